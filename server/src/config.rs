@@ -43,7 +43,7 @@ pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
 /// Most uploads of records at a time.
 pub const MAX_IMPORTS: usize = 2;
 /// Most records that are assembled or replayed at a time, for each purpose.
-pub const MAX_RECORDS_IN_HAND: usize = 2;
+pub const MAX_CONCURRENT_RECORDS: usize = 2;
 /// Most records that are sent at a time.
 pub const MAX_RECORDS_SENT: usize = 8;
 /// How long a client may take to receive one message of a record.
@@ -63,7 +63,7 @@ pub const MAX_FOLLOWERS: usize = 256;
 /// Shortest time between two updates of a followed tournament.
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
 /// Most updates for followers, and most results, that are computed at a time.
-pub const MAX_RESULTS_IN_HAND: usize = 2;
+pub const MAX_CONCURRENT_RESULTS: usize = 2;
 /// Most games in an update of a followed tournament. It keeps a message well below the 4 MB that
 /// clients accept by default. At most half as many are played at a time.
 pub const MAX_GAMES_FOLLOWED: usize = 512;
@@ -76,7 +76,7 @@ pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
 /// How old a cached leaderboard may be although games have ended since.
 pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
 /// 1/N of the time may be spent computing the leaderboard.
-pub const LEADERBOARD_PART: u32 = 10;
+pub const LEADERBOARD_SHARE: u32 = 10;
 /// How long open streams and connections may delay a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.

@@ -1,5 +1,5 @@
-//! A server within the process of somebody else: of a command that plays at once, of the examiner of agents, of a test. It listens on a free
-//! port of this machine. What a server does is in `serve`.
+//! A server inside another process: a command that plays, the examiner, or a test. It listens on a
+//! free port of this machine. `serve` is the server itself.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -15,14 +15,14 @@ use crate::config::ServerConfig;
 use crate::serve::{ServeError, serve};
 use crate::store::{MemoryStore, Store};
 
-/// Why a server within this process did not end well.
+/// Why a server in this process failed.
 #[derive(Debug, thiserror::Error)]
 pub enum HostError {
-    /// It said why.
+    /// The server failed.
     #[error(transparent)]
     Serve(#[from] ServeError),
-    /// Its task did not come to its end.
-    #[error("the server within this process was broken off: {0}")]
+    /// Its task panicked or was cancelled.
+    #[error("the server in this process was interrupted: {0}")]
     BrokenOff(#[from] JoinError),
 }
 
@@ -36,10 +36,10 @@ pub struct Host {
 }
 
 impl Host {
-    /// Starts a server of this configuration over a store.
+    /// Starts a server with these settings and this store.
     ///
     /// # Errors
-    /// There is no free port.
+    /// No port is free.
     pub async fn start(config: ServerConfig, store: Arc<dyn Store>) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
         let address = listener.local_addr()?;
@@ -53,11 +53,11 @@ impl Host {
         })
     }
 
-    /// Starts a server for this process alone: games are kept in memory and, if there is a folder for them, records in files. When it is
-    /// stopped its games have ended, or nobody waits for them any more.
+    /// Starts a server for this process only. Games are stored in memory; records are written to files if
+    /// there is a folder for them. Stopping it does not wait for running games.
     ///
     /// # Errors
-    /// There is no free port.
+    /// No port is free.
     pub async fn in_memory(data_dir: Option<PathBuf>) -> io::Result<Self> {
         let config = ServerConfig {
             data_dir,
@@ -67,25 +67,25 @@ impl Host {
         Self::start(config, Arc::new(MemoryStore::default())).await
     }
 
-    /// Where it listens.
+    /// Its socket address.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Where it listens, as clients want it.
+    /// Its URL for clients.
     pub fn url(&self) -> String {
         format!("http://{}", self.address)
     }
 
-    /// Asks it to stop, without waiting for it.
-    pub fn ask_to_stop(&self) {
+    /// Requests a stop without waiting for it.
+    pub fn request_stop(&self) {
         self.stop.cancel();
     }
 
-    /// Waits until it has ended by itself, or because it was asked to.
+    /// Waits until it has stopped.
     ///
     /// # Errors
-    /// It did not end well.
+    /// The server failed.
     pub async fn ended(self) -> Result<(), HostError> {
         Ok(self.serving.await??)
     }
@@ -93,9 +93,9 @@ impl Host {
     /// Stops it and waits until all records are written.
     ///
     /// # Errors
-    /// It did not end well.
+    /// The server failed.
     pub async fn stop(self) -> Result<(), HostError> {
-        self.ask_to_stop();
+        self.request_stop();
         self.ended().await
     }
 }

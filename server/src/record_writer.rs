@@ -1,4 +1,4 @@
-//! Writing the records of finished games to files, in the background, a few at a time.
+//! Writes the records of finished games to files, in the background, a few at a time.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use tokio::sync::Semaphore;
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-use crate::config::MAX_RECORDS_IN_HAND;
+use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert;
 use crate::store::Store;
 use chefshat_room::ids::Id;
@@ -23,13 +23,13 @@ pub struct RecordWriter {
 }
 
 impl RecordWriter {
-    /// Writes what `store` holds under `data_dir`; a shutdown waits for `tracker`.
+    /// Writes games of `store` under `data_dir`; a shutdown waits for `tracker`.
     pub fn new(store: Arc<dyn Store>, data_dir: Option<PathBuf>, tracker: TaskTracker) -> Self {
         Self {
             store,
             data_dir,
             tracker,
-            permits: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+            permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
         }
     }
 
@@ -38,8 +38,8 @@ impl RecordWriter {
         self.data_dir.as_deref()
     }
 
-    /// Writes the record of a finished game when its turn comes, and has the store note it. What fails is tried again when the server next
-    /// starts.
+    /// Queues the record of a finished game and marks it as written in the store. A record that fails is
+    /// tried again at the next start of the server.
     pub fn write_record(&self, game: Id) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();
@@ -48,31 +48,31 @@ impl RecordWriter {
     }
 
     async fn write(self, game: Id, data_dir: PathBuf) {
-        // Nobody closes it; if somebody did, the record would merely not wait.
+        // The semaphore is never closed; if it were, the record would merely not wait.
         let _permit = self.permits.acquire().await.ok();
-        let kept = match self.store.finished(game).await {
-            Ok(Some(kept)) => kept,
+        let stored = match self.store.finished(game).await {
+            Ok(Some(stored)) => stored,
             Ok(None) => return,
             Err(error) => {
-                error!(%game, %error, "the record is not written");
+                error!(%game, %error, "writing a record failed");
                 return;
             }
         };
         let written = tokio::task::spawn_blocking(move || {
-            let lines = convert::lines_of(&kept);
+            let lines = convert::lines_of(&stored);
             let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
             chefshat_record::jsonl::write(&path, &lines).map(|()| path)
         })
         .await;
         match written {
             Ok(Ok(path)) => {
-                info!(%game, path = %path.display(), "the record is written");
-                if let Err(error) = self.store.note_filed(game).await {
-                    error!(%game, %error, "that the record is written was not noted");
+                info!(%game, path = %path.display(), "record written");
+                if let Err(error) = self.store.mark_record_written(game).await {
+                    error!(%game, %error, "a record was written but not marked as written");
                 }
             }
-            Ok(Err(error)) => error!(%game, %error, "the record is not written"),
-            Err(error) => error!(%game, %error, "the record is not written"),
+            Ok(Err(error)) => error!(%game, %error, "writing a record failed"),
+            Err(error) => error!(%game, %error, "writing a record failed"),
         }
     }
 }

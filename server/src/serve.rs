@@ -1,5 +1,5 @@
-//! Serving: all services and the page on one port, for gRPC and gRPC-web, over whatever connections come in; and shutting down so that nobody is left
-//! hanging.
+//! Serves all services and the page on one port, for gRPC and gRPC-web, and shuts down without
+//! leaving a client waiting.
 
 use std::future::Future;
 use std::io;
@@ -34,29 +34,31 @@ const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10
 /// Largest request headers, bytes.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
 
-/// Why serving ended otherwise than by a shutdown.
+/// Why serving failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// The transport failed.
     #[error("the server's transport failed: {0}")]
     Transport(#[from] tonic::transport::Error),
-    /// The store failed. What was acknowledged is kept; the outcome of everything else shows when the store is opened again.
+    /// The store failed. Acknowledged decisions are stored; the fate of others shows when the store is
+    /// opened again.
     #[error(
-        "{0}; every decision that was acknowledged is kept, and durable games go on when the server is started again"
+        "{0}; every acknowledged decision is stored, and durable games resume when the server is started again"
     )]
     Store(#[from] StoreError),
-    /// There are no threads to step games with.
-    #[error("the threads that step clients' own games were not started: {0}")]
+    /// The threads that step vector games could not be started.
+    #[error("starting the threads of vector streams failed: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A web origin is not one.
-    #[error("{0:?} is not a web origin; write for instance https://example.org")]
+    /// A setting is not a web origin.
+    #[error("{0:?} is not a web origin; an example is https://example.org")]
     Origin(String),
 }
 
-/// Goes on with the store's games and serves on a listening socket until `shutdown` is ready and everything has ended.
+/// Resumes the games of a store and serves on a socket until `shutdown` completes and everything has
+/// ended.
 ///
 /// # Errors
-/// A failing transport or store, or a web origin that is none.
+/// The transport or store failed, or an allowed origin is not a web origin.
 pub async fn serve(
     listener: TcpListener,
     config: ServerConfig,
@@ -67,7 +69,7 @@ pub async fn serve(
     server.serve(listener, shutdown).await
 }
 
-/// A server whose games go on, before it has a socket.
+/// A server whose games are resumed, before it has a socket.
 #[derive(Debug)]
 pub struct Server {
     config: ServerConfig,
@@ -79,10 +81,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// A server in which every game goes on that its store holds unfinished.
+    /// Creates a server and resumes the unfinished games of its store.
     ///
     /// # Errors
-    /// The store's.
+    /// The store failed.
     pub async fn restored(config: ServerConfig, store: Arc<dyn Store>) -> Result<Self, ServeError> {
         let tracker = TaskTracker::new();
         let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
@@ -99,15 +101,15 @@ impl Server {
         })
     }
 
-    /// How many games go on that had begun or were awaited before the server was started.
+    /// Number of resumed games and of tournament games that are still to be played.
     pub fn games(&self) -> usize {
         self.games
     }
 
-    /// Serves on a listening socket until `shutdown` is ready and everything has ended.
+    /// Serves on a socket until `shutdown` completes and everything has ended.
     ///
     /// # Errors
-    /// A failing transport or store, or a web origin that is none.
+    /// The transport or store failed, or an allowed origin is not a web origin.
     pub async fn serve(
         self,
         listener: TcpListener,
@@ -121,10 +123,10 @@ impl Server {
         self.serve_incoming(incoming, shutdown).await
     }
 
-    /// Serves on connections of any kind until `shutdown` is ready and everything has ended.
+    /// Serves on connections of any kind until `shutdown` completes and everything has ended.
     ///
     /// # Errors
-    /// A failing transport or store, or a web origin that is none.
+    /// The transport or store failed, or an allowed origin is not a web origin.
     pub async fn serve_incoming<I, C>(
         self,
         incoming: I,
@@ -175,7 +177,7 @@ impl Server {
             health
                 .set_service_status("", tonic_health::ServingStatus::NotServing)
                 .await;
-            // Games that end from here on count when the server is back.
+            // Games that end from here on count when the server is restarted.
             tournaments.stop();
             rooms.shut_down(config.grace).await;
             tournaments.end();
@@ -187,8 +189,8 @@ impl Server {
         };
         tokio::select! {
             served = serving => served?,
-            () = ended_or_drained => warn!("connections that would not close are dropped"),
-            // Nothing can be acknowledged any more: whoever waits is better told at once, by the end of the process.
+            () = ended_or_drained => warn!("dropping connections that do not close"),
+            // Nothing more can be acknowledged: waiting clients learn it at once when the process ends.
             failure = store.failed() => return Err(ServeError::Store(failure)),
         }
         tournaments.end();
@@ -264,10 +266,10 @@ fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<
         .register_encoded_file_descriptor_set(chefshat_proto::DESCRIPTORS)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
         .build_v1()
-        .expect("the descriptors are those the code was generated from")
+        .expect("the descriptors come from the generated code")
 }
 
-/// What browsers of other origins may do: call, and read what gRPC puts into headers.
+/// Lets browsers of other origins call and read the headers that gRPC uses.
 fn cors(origins: &[String]) -> Result<CorsLayer, ServeError> {
     let layer = CorsLayer::new()
         .allow_methods([http::Method::POST])

@@ -154,7 +154,7 @@ impl Process {
     }
 
     /// SIGTERM, as an operator would.
-    pub async fn ask_to_stop(&self) {
+    pub async fn request_stop(&self) {
         let id = self.id().to_string();
         let asked = Command::new("kill").args(["-TERM", &id]).status().await;
         assert!(asked.expect("kill runs").success());
@@ -162,7 +162,7 @@ impl Process {
 
     /// SIGTERM, and waits until it has ended.
     pub async fn stop(self) -> Ended {
-        self.ask_to_stop().await;
+        self.request_stop().await;
         self.ended().await
     }
 

@@ -74,8 +74,8 @@ impl TestServer {
     }
 
     /// Asks the server to stop.
-    pub fn ask_to_stop(&self) {
-        self.host.ask_to_stop();
+    pub fn request_stop(&self) {
+        self.host.request_stop();
     }
 
     /// Waits until the server has ended by itself.

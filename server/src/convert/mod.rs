@@ -18,13 +18,14 @@ mod vector;
 pub use decision::{annotations_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
-pub use name::name_to_show;
+pub use name::checked_name;
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto, simulation_policy};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines, summary};
 pub use room::{
-    called_from_proto, describe, fills_from_proto, participants, seats_to_proto, tournament_id,
+    describe, display_names_from_proto, fills_from_proto, participants, seats_to_proto,
+    tournament_id,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};

@@ -8,7 +8,7 @@ use crate::config::MAX_NAME_CHARS;
 ///
 /// # Errors
 /// It has fewer than `least` or too many characters, or contains invisible characters.
-pub fn name_to_show(field: &'static str, name: &str, least: usize) -> Result<String, FieldProblem> {
+pub fn checked_name(field: &'static str, name: &str, least: usize) -> Result<String, FieldProblem> {
     let name = name.trim();
     let length = name.chars().count();
     if !(least..=MAX_NAME_CHARS).contains(&length) {
@@ -19,7 +19,7 @@ pub fn name_to_show(field: &'static str, name: &str, least: usize) -> Result<Str
     }
     if name
         .chars()
-        .any(|letter| letter.is_control() || is_unseen(letter))
+        .any(|letter| letter.is_control() || is_invisible(letter))
     {
         return Err(FieldProblem::new(
             field,
@@ -31,7 +31,7 @@ pub fn name_to_show(field: &'static str, name: &str, least: usize) -> Result<Str
 
 /// Whether a character is invisible: joiners, direction marks, fillers, tags (Unicode's category
 /// Cf, the Hangul fillers, the grapheme joiner and the blank Braille pattern).
-fn is_unseen(letter: char) -> bool {
+fn is_invisible(letter: char) -> bool {
     matches!(letter,
         '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
         | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}' | '\u{feff}' | '\u{ffa0}'

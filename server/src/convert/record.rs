@@ -114,8 +114,8 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
 }
 
 /// All lines of the record of a stored game.
-pub fn lines_of(kept: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
-    match kept {
+pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
+    match stored {
         StoredGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
         StoredGame::Imported(lines) => Cow::Borrowed(lines),
     }

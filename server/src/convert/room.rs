@@ -8,7 +8,7 @@ use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::kind::{kind_from_proto, kind_to_proto};
-use super::name::name_to_show;
+use super::name::checked_name;
 use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
@@ -55,7 +55,7 @@ pub fn fills_from_proto(
 ///
 /// # Errors
 /// An open seat with a name, or a name that is not allowed.
-pub fn called_from_proto(
+pub fn display_names_from_proto(
     seats: &[v1::SeatConfig],
 ) -> Result<BTreeMap<usize, String>, FieldProblem> {
     let named = seats
@@ -68,7 +68,7 @@ pub fn called_from_proto(
                 let problem = "only a built-in agent takes a name here; participants choose theirs when they join";
                 return Err(FieldProblem::new("seats", problem));
             }
-            Ok((seat, name_to_show("seats", &config.name, 1)?))
+            Ok((seat, checked_name("seats", &config.name, 1)?))
         })
         .collect()
 }

@@ -16,10 +16,10 @@ use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Policy};
 
 /// Defaults of fields that a request leaves unset.
-const STANDARD_PARTICIPANTS: u32 = 64;
-const STANDARD_NO_SHOW_MS: u32 = 60_000;
-const STANDARD_CALLS: u32 = 2;
-const STANDARD_PARALLEL: u32 = 64;
+const DEFAULT_PARTICIPANTS: u32 = 64;
+const DEFAULT_NO_SHOW_MS: u32 = 60_000;
+const DEFAULT_CALLS: u32 = 2;
+const DEFAULT_PARALLEL: u32 = 64;
 
 /// The checked settings of a tournament.
 #[derive(Debug)]
@@ -52,14 +52,14 @@ pub fn tournament_plan(
     let deals = deals_from_proto(message.deals)?;
     let standard = |value: u32, standard: u32| if value == 0 { standard } else { value };
     let count = |value: u32| usize::try_from(value).unwrap_or(usize::MAX);
-    let no_show_ms = standard(message.no_show_time_ms, STANDARD_NO_SHOW_MS);
+    let no_show_ms = standard(message.no_show_time_ms, DEFAULT_NO_SHOW_MS);
     let built_in: Vec<AgentKind> = (message.built_in_agents.iter())
         .map(|name| {
             agent("built_in_agents", name)?
                 .ok_or_else(|| FieldProblem::new("built_in_agents", "a built-in agent has no name"))
         })
         .collect::<Result<_, _>>()?;
-    let max_participants = standard(message.max_participants, STANDARD_PARTICIPANTS);
+    let max_participants = standard(message.max_participants, DEFAULT_PARTICIPANTS);
     if built_in.len() > count(max_participants).min(MAX_PARTICIPANTS) {
         let problem = format!(
             "{} built-in agents do not fit {max_participants} participants",
@@ -79,8 +79,8 @@ pub fn tournament_plan(
             start_when_joined: (message.start_when_joined != 0)
                 .then(|| count(message.start_when_joined)),
             no_show_ms: no_show_ms.into(),
-            max_calls: standard(message.max_calls, STANDARD_CALLS),
-            max_parallel: count(standard(message.max_parallel_games, STANDARD_PARALLEL)),
+            max_calls: standard(message.max_calls, DEFAULT_CALLS),
+            max_parallel: count(standard(message.max_parallel_games, DEFAULT_PARALLEL)),
             draw_seed: seed("draw_seed", &message.draw_seed)?.unwrap_or(draw_seed),
             filler: agent("filler", &message.filler)?.unwrap_or(AgentKind::Random),
         },
@@ -133,7 +133,8 @@ fn policy(
     }
     if deals == Deals::SameAtAllTables && asked.durability() == v1::Durability::Ephemeral {
         return refuse(
-            "durability: a lost game would be dealt again to participants who have seen its cards".into(),
+            "durability: a lost game would be dealt again to participants who have seen its cards"
+                .into(),
         );
     }
     asked.abort = v1::AbortPolicy::Never.into();

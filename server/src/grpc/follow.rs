@@ -1,4 +1,4 @@
-//! One follower of a tournament: when it is told what. What it is told is worked out in `tournaments`, for all followers together.
+//! Sends a tournament to one follower. `tournaments` computes the messages, for all followers together.
 
 use std::sync::Arc;
 
@@ -9,14 +9,14 @@ use tonic::{Code, Status};
 
 use super::status::{self, status};
 use crate::config::{FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, HEARTBEAT};
-use crate::tournaments::{NotWorkedOut, TournamentHandle};
+use crate::tournaments::{ComputeError, TournamentHandle};
 
 type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
 
-/// Sends the tournament whenever it has changed, until it is over.
+/// Sends the tournament whenever it changes, until it is over.
 ///
 /// # Errors
-/// The follower has gone away, or does not take in what it is told, or there is nothing to tell.
+/// The follower has gone, is too slow, or the message could not be computed.
 pub(super) async fn follow(
     hosted: &Arc<TournamentHandle>,
     permits: &Arc<Semaphore>,
@@ -25,9 +25,12 @@ pub(super) async fn follow(
     let mut changes = hosted.changes();
     loop {
         changes.mark_unchanged();
-        let told = hosted.told(permits).await.map_err(not_worked_out)?;
-        let message = told.message.clone();
-        drop(told);
+        let update = hosted
+            .follower_update(permits)
+            .await
+            .map_err(compute_failed)?;
+        let message = update.message.clone();
+        drop(update);
         let over = is_over(&message);
         let sent = Instant::now();
         send(sender, message).await?;
@@ -41,17 +44,17 @@ pub(super) async fn follow(
     }
 }
 
-/// Tells a client why there is no more. It waits until that is taken or the client has gone away.
+/// Tells a client why the stream ends. Waits until the status is received or the client has gone.
 pub(super) async fn end(sender: &Sender, followed: Result<(), Status>) {
     if let Err(status) = followed {
-        // A client that has gone away does not want to know.
+        // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
     }
 }
 
-/// What a client is told when something about a tournament could not be worked out.
-pub(super) fn not_worked_out(problem: NotWorkedOut) -> Status {
-    tracing::error!(%problem, "what was asked about tournaments was not worked out");
+/// The status for a client when something about a tournament could not be computed.
+pub(super) fn compute_failed(problem: ComputeError) -> Status {
+    tracing::error!(%problem, "a message about tournaments could not be computed");
     status::internal()
 }
 
@@ -70,7 +73,7 @@ async fn send(sender: &Sender, message: FollowTournamentResponse) -> Result<(), 
         status(
             Code::ResourceExhausted,
             "FOLLOWER_TOO_SLOW",
-            format!("what was told was not taken in within {seconds} s; follow again"),
+            format!("an update was not received within {seconds} s; follow again"),
             [],
         )
     })
@@ -83,16 +86,16 @@ mod tests {
     use crate::grpc::follow::*;
 
     #[tokio::test(start_paused = true)]
-    async fn a_follower_that_takes_nothing_in_is_given_up() {
+    async fn a_follower_that_does_not_read_is_dropped() {
         let hosted = TournamentHandle::for_tests(4);
         let (sender, mut receiver) = mpsc::channel(1);
         let permits = Arc::new(Semaphore::new(1));
         // The first message goes into the channel, the heartbeat does not.
         let ended = follow(&hosted, &permits, &sender).await;
-        let ended = ended.expect_err("it was not taken in");
-        let info = ended.get_details_error_info().expect("it says why");
+        let ended = ended.expect_err("the follower is too slow");
+        let info = ended.get_details_error_info().expect("error info");
         assert_eq!(info.reason, "FOLLOWER_TOO_SLOW");
-        let first = receiver.recv().await.expect("it was sent");
+        let first = receiver.recv().await.expect("a message");
         let tournament = first.expect("no error").tournament.expect("a tournament");
         assert_eq!(tournament.participants.len(), 4);
     }

@@ -1,4 +1,4 @@
-//! `ServerService`: what the server is and can do.
+//! `ServerService`: the server's version, limits and action tables.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub struct Info {
 }
 
 impl Info {
-    /// The service for these rooms.
+    /// Creates the service for these rooms.
     pub fn new(rooms: Arc<Rooms>, config: &ServerConfig) -> Self {
         let limits = [
             ("max_rooms", config.max_rooms),

@@ -1,4 +1,5 @@
-//! The gRPC services: they translate and forward. No handler owns state, so that one dropped half-way loses nothing.
+//! The gRPC services: they translate and forward. No handler owns state, so a cancelled one loses
+//! nothing.
 
 mod follow;
 mod info;

@@ -1,4 +1,4 @@
-//! What a request for a new room asks for, checked, with the recorded games it names looked up.
+//! Checks requests for new rooms and reads the recorded games they name.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,16 +27,16 @@ struct Beginning {
     game_seed: Option<[u8; 32]>,
 }
 
-/// Checks what is asked for.
+/// Checks a request for a new room.
 pub(super) async fn new_room(
     recorded: &Recorded,
     mut request: v1::CreateRoomRequest,
 ) -> Result<NewRoom, Status> {
     let request_id = request_id(&std::mem::take(&mut request.request_id))?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
-    let name = convert::name_to_show("name", &request.name, 0)
+    let name = convert::checked_name("name", &request.name, 0)
         .map_err(|problem| field("NAME_REFUSED", &problem))?;
-    let policy = kept_policy(recorded, &request.policy.unwrap_or_default())
+    let policy = supported_policy(recorded, &request.policy.unwrap_or_default())
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
     let game_seed = game_seed(&request.game_seed)?;
     let beginning = match &request.start {
@@ -70,7 +70,7 @@ pub(super) async fn new_room(
         rules: beginning.rules,
         policy,
         fills,
-        called: convert::called_from_proto(&request.seats).map_err(refused)?,
+        called: convert::display_names_from_proto(&request.seats).map_err(refused)?,
         start: beginning.start,
         game_seed: beginning.game_seed,
         seating: None,
@@ -78,15 +78,15 @@ pub(super) async fn new_room(
     })
 }
 
-/// A policy that promises no more than the server's store can keep.
-pub(super) fn kept_policy(
+/// A policy that promises no more than the server's store supports.
+pub(super) fn supported_policy(
     recorded: &Recorded,
     message: &v1::RoomPolicy,
 ) -> Result<Policy, FieldProblem> {
     let mut policy = convert::policy_from_proto(message)?;
     if !recorded.rooms().store().outlives_server() {
         if message.durability() == v1::Durability::Durable {
-            let problem = "this server keeps games in memory alone; leave it unset";
+            let problem = "this server stores games in memory only; leave it unset";
             return Err(FieldProblem::new("durability", problem));
         }
         policy.durability = Durability::Ephemeral;
@@ -100,7 +100,7 @@ fn hosted_rules(message: &v1::RuleSet) -> Result<RuleSet, Status> {
     Ok(rules)
 }
 
-/// Checks that a game by these rules is not longer than one that is hosted may be.
+/// Checks that a game by these rules is short enough to be hosted.
 fn check_length(rules: &RuleSet) -> Result<(), Status> {
     let Some(problem) = too_long(rules) else {
         return Ok(());
@@ -116,7 +116,7 @@ fn check_length(rules: &RuleSet) -> Result<(), Status> {
     ))
 }
 
-/// Why a game by these rules is longer than one that is hosted may be, if it is.
+/// The problem with rules whose games are too long to be hosted, if any.
 pub(super) fn too_long(rules: &RuleSet) -> Option<FieldProblem> {
     let (stop_field, length) = match rules.stop() {
         Stop::Points(points) => ("target_points", points),
@@ -140,7 +140,7 @@ fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
     })
 }
 
-/// A game that begins as a recorded one did.
+/// A game that branches from a recorded one.
 async fn branched(
     recorded: &Recorded,
     point: &v1::BranchPoint,
@@ -187,7 +187,7 @@ async fn branched(
     })
 }
 
-/// What a client is told that names a point from which no game can go on.
+/// The status for a point from which no game can continue.
 pub(super) fn branch_refused(error: &BranchError) -> Status {
     let name = match error {
         BranchError::TooFar { .. } | BranchError::Over(_) => "decisions",
@@ -199,7 +199,7 @@ pub(super) fn branch_refused(error: &BranchError) -> Status {
     )
 }
 
-/// The players of the seats that are filled by a recorded one.
+/// The recorded players of seats that replay one.
 async fn recorded_players(
     recorded: &Recorded,
     fills: &[Fill],

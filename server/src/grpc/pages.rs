@@ -1,25 +1,25 @@
-//! Lists that are given out page by page: how much of one page is asked for, and where it begins.
+//! Paging of lists: page sizes and tokens.
 
 use chefshat_record::convert::FieldProblem;
 use tonic::Status;
 
 use super::status::field;
 
-/// Entries of a page where a request does not say.
-const STANDARD_PAGE: u32 = 50;
-/// Most entries of a page.
-const MAX_PAGE: u32 = 100;
+/// Default page size.
+const DEFAULT_PAGE_SIZE: u32 = 50;
+/// Largest page size.
+const MAX_PAGE_SIZE: u32 = 100;
 
-/// How many entries a page is to have.
+/// The page size of a request.
 pub(super) fn page_size(asked: u32) -> usize {
     let size = match asked {
-        0 => STANDARD_PAGE,
-        size => size.min(MAX_PAGE),
+        0 => DEFAULT_PAGE_SIZE,
+        size => size.min(MAX_PAGE_SIZE),
     };
     usize::try_from(size).unwrap_or(usize::MAX)
 }
 
-/// The number of the last entry of the page before; `None` for the first page.
+/// The number of the last entry of the previous page; `None` for the first page.
 pub(super) fn last_shown(page_token: &str) -> Result<Option<u64>, Status> {
     if page_token.is_empty() {
         return Ok(None);

@@ -1,5 +1,5 @@
-//! `PlayService`: streams of seats, and single commands without a stream. `reader` carries out the requests of a stream; the responses come
-//! from its outbox, which rooms fill.
+//! `PlayService`: streams of seats, and single commands without a stream. `reader` executes the
+//! requests of a stream; the responses come from its outbox, which rooms fill.
 
 mod reader;
 
@@ -30,12 +30,12 @@ use reader::{Reader, answer_action, express_action};
 pub struct Play {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
-    /// Cancelled when all streams are to end.
+    /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
 
 impl Play {
-    /// The service for these rooms and tournaments; `closing` ends its streams.
+    /// Creates the service for these rooms and tournaments; `closing` ends its streams.
     pub fn new(
         rooms: Arc<Rooms>,
         tournaments: Arc<Tournaments>,
@@ -48,7 +48,7 @@ impl Play {
         }
     }
 
-    /// The reader of a new stream.
+    /// Creates the reader of a new stream.
     fn reader(&self, outbox: &Arc<Outbox>, with_decisions: bool) -> Reader {
         Reader::new(&self.rooms, &self.tournaments, outbox, with_decisions)
     }
@@ -130,7 +130,7 @@ impl PlayService for Play {
             None => {
                 return Err(field(
                     "COMMAND_MISSING",
-                    &FieldProblem::new("command", "say what the seat does"),
+                    &FieldProblem::new("command", "set a command"),
                 ));
             }
         };

@@ -1,5 +1,5 @@
-//! Recorded games as services need them: found by their id, read a few at a time, off the threads that serve others. A turn is held by the
-//! work itself, not by who asked for it: a call that is given up does not make room for another before its work has ended.
+//! Reads recorded games for the services, a few at a time, on blocking threads. The work itself holds
+//! its permit, so a cancelled call does not make room for another before its work has ended.
 
 use std::sync::Arc;
 
@@ -8,29 +8,29 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Code, Status};
 
 use super::status::{self, status};
-use crate::config::MAX_RECORDS_IN_HAND;
+use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert::lines_of;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use chefshat_room::ids::Id;
 
-/// Why a record is withheld for a while.
+/// Reason of the error while games with the same deals are being played.
 pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 
 /// The recorded games of a server.
 #[derive(Debug, Clone)]
 pub struct Recorded {
     rooms: Arc<Rooms>,
-    /// Records are large while they are put together: only so many at a time.
+    /// Limits how many records are assembled at a time, because they are large.
     permits: Arc<Semaphore>,
 }
 
 impl Recorded {
-    /// The recorded games of these rooms' store.
+    /// Creates a reader of the recorded games in these rooms' store.
     pub fn new(rooms: Arc<Rooms>) -> Self {
         Self {
             rooms,
-            permits: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+            permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
         }
     }
 
@@ -39,7 +39,7 @@ impl Recorded {
         &self.rooms
     }
 
-    /// What `work` makes of the record of a game that has ended.
+    /// Runs `work` on the record of a finished game.
     pub(super) async fn of_game<T: Send + 'static>(
         &self,
         game_id: &str,
@@ -49,9 +49,7 @@ impl Recorded {
             status(
                 Code::NotFound,
                 "GAME_UNKNOWN",
-                format!(
-                    "the server holds no game {game_id:?}; list its records to see which it holds"
-                ),
+                format!("the server has no game {game_id:?}; list its records to see which it has"),
                 [("field", "game_id")],
             )
         };
@@ -60,27 +58,27 @@ impl Recorded {
             return Err(status(
                 Code::FailedPrecondition,
                 "GAME_RUNNING",
-                "this game has not ended; its record can be had when it has",
+                "this game has not ended; its record is available afterwards",
                 [("field", "game_id")],
             ));
         }
         let permit = permit(&self.permits).await;
-        let kept = (self.rooms.store().finished(game).await)
-            .map_err(not_read)?
+        let stored = (self.rooms.store().finished(game).await)
+            .map_err(read_failed)?
             .ok_or_else(unknown)?;
-        if (kept.tournament()).is_some_and(|game| self.rooms.is_withheld(game)) {
+        if (stored.tournament()).is_some_and(|game| self.rooms.is_withheld(game)) {
             return Err(status(
                 Code::FailedPrecondition,
                 SERIES_OPEN,
-                "other games with the same deals are being played; its record can be had when they have ended",
+                "other games with the same deals are being played; the record is available when they have ended",
                 [("field", "game_id")],
             ));
         }
-        in_background(permit, move || work(lines_of(&kept).into_owned())).await
+        in_background(permit, move || work(lines_of(&stored).into_owned())).await
     }
 
-    /// What `work` makes of something that is as large as a record.
-    pub(super) async fn in_turn<T: Send + 'static>(
+    /// Runs work that needs as much memory as a record.
+    pub(super) async fn with_permit<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
@@ -88,19 +86,19 @@ impl Recorded {
     }
 }
 
-/// Waits for a turn; what is returned holds it.
+/// Waits for a permit.
 pub(super) async fn permit(permits: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
-    // Nobody closes it; if somebody did, the request would merely not wait.
+    // The semaphore is never closed; if it were, the request would merely not wait.
     Arc::clone(permits).acquire_owned().await.ok()
 }
 
-/// What a client is told when the store cannot be read.
-pub(super) fn not_read(error: StoreError) -> Status {
-    tracing::error!(%error, "a record was not read");
+/// The status for a client when the store cannot be read.
+pub(super) fn read_failed(error: StoreError) -> Status {
+    tracing::error!(%error, "reading a record failed");
     status::internal()
 }
 
-/// Does work that takes milliseconds on a thread that serves nobody. The turn ends with the work.
+/// Runs work that takes milliseconds on a blocking thread. The permit is released when it ends.
 async fn in_background<T: Send + 'static>(
     permit: Option<OwnedSemaphorePermit>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -110,7 +108,7 @@ async fn in_background<T: Send + 'static>(
         work()
     });
     working.await.map_err(|error| {
-        tracing::error!(%error, "work on a record was not done");
+        tracing::error!(%error, "work on a record failed");
         status::internal()
     })
 }

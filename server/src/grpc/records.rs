@@ -1,4 +1,4 @@
-//! `RecordService`: finding, reading and importing records of games that have ended.
+//! `RecordService`: lists, reads and imports records of finished games.
 
 use std::iter::Peekable;
 use std::pin::Pin;
@@ -17,7 +17,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::pages;
-use super::recorded::{Recorded, SERIES_OPEN, not_read, permit};
+use super::recorded::{Recorded, SERIES_OPEN, permit, read_failed};
 use super::status::{disk_nearly_full, field, has_reason, status};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
@@ -27,7 +27,8 @@ use crate::store::Part;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
-/// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
+/// Most lines in one message, and most bytes unless a single line is longer: well below the limit of
+/// gRPC clients.
 const LINES_PER_MESSAGE: usize = 512;
 const BYTES_PER_MESSAGE: usize = 1024 * 1024;
 /// Summaries read at a time while many records are streamed.
@@ -38,14 +39,14 @@ const STREAM_PAGE: usize = 100;
 pub struct Records {
     recorded: Recorded,
     tournaments: Arc<Tournaments>,
-    /// Records that are on their way to clients stay in memory until these have taken them.
+    /// Limits the records in memory while clients receive them.
     sending: Arc<Semaphore>,
     receiving: Arc<Semaphore>,
     allow_import: bool,
 }
 
 impl Records {
-    /// The service for these games.
+    /// Creates the service for these games.
     pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, allow_import: bool) -> Self {
         Self {
             recorded,
@@ -63,10 +64,11 @@ impl Records {
         count: usize,
     ) -> Result<Vec<(u64, v1::RecordSummary)>, Status> {
         let store = self.recorded.rooms().store();
-        store.list(filter, part, count).await.map_err(not_read)
+        store.list(filter, part, count).await.map_err(read_failed)
     }
 
-    /// Sends all records that a filter lets through, page by page: nothing is read before the client has taken what was read before.
+    /// Sends all records that match a filter, page by page. Reads the next page when the client has
+    /// received the last one.
     async fn send_all(
         &self,
         filter: &v1::RecordFilter,
@@ -83,7 +85,7 @@ impl Records {
                 let _permit = permit(&self.sending).await;
                 let lines = self.recorded.of_game(&summary.game_id, |lines| lines).await;
                 let lines = match lines {
-                    // It can be had when the games with the same deals have ended.
+                    // Withheld while games with the same deals are being played.
                     Err(status) if has_reason(&status, SERIES_OPEN) => continue,
                     lines => lines?,
                 };
@@ -113,7 +115,7 @@ impl RecordService for Records {
             true => last.map_or(Part::FROM_NEWEST, Part::Before),
         };
         let size = pages::page_size(request.page_size);
-        // One more than asked for tells whether there is another page.
+        // One more than requested, to find out whether there is another page.
         let mut found = self.page(&filter, part, size + 1).await?;
         let more = found.len() > size;
         found.truncate(size);
@@ -166,7 +168,7 @@ impl RecordService for Records {
             return Err(status(
                 Code::PermissionDenied,
                 "IMPORT_OFF",
-                "this server takes no records from elsewhere; its host switches that on with --allow-import",
+                "this server does not import records; its host can allow it with --allow-import",
                 [],
             ));
         }
@@ -181,21 +183,21 @@ impl RecordService for Records {
             let summary = replay::replay(&lines).map(|replayed| summary(&lines, &replayed));
             (Arc::<[v1::RecordLine]>::from(lines), summary)
         };
-        let (lines, summary) = self.recorded.in_turn(replaying).await?;
+        let (lines, summary) = self.recorded.with_permit(replaying).await?;
         let summary = summary
             .map_err(|error| refused(error.line, &error.problem))?
-            .ok_or_else(|| refused(1, "nothing was dealt in this game"))?;
+            .ok_or_else(|| refused(1, "the game has no deal"))?;
         let game = Id::parse(&summary.game_id)
-            .ok_or_else(|| refused(1, "the game id has not 32 hexadecimal digits"))?;
+            .ok_or_else(|| refused(1, "the game id does not have 32 hexadecimal digits"))?;
         let rooms = self.recorded.rooms();
         let is_ours = rooms.is_running(game) || self.tournaments.has_announced(game);
         let new = !is_ours
-            && (rooms.store().import(game, summary.clone(), lines).await).map_err(not_kept)?;
+            && (rooms.store().import(game, summary.clone(), lines).await).map_err(import_failed)?;
         if !new {
             return Err(status(
                 Code::AlreadyExists,
                 "GAME_KNOWN",
-                "the server holds a game of this id already",
+                "the server already has a game with this id",
                 [("field", "game_id")],
             ));
         }
@@ -206,7 +208,7 @@ impl RecordService for Records {
     }
 }
 
-/// A filter whose values are all of their enums.
+/// Checks that the enum values of a filter are known.
 fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status> {
     let filter = filter.unwrap_or_default();
     let wrong = if v1::RoomState::try_from(filter.state).is_err() {
@@ -237,11 +239,11 @@ async fn received(
             return Err(status(
                 Code::ResourceExhausted,
                 "RECORD_TOO_LARGE",
-                format!("a record of more than {MAX_IMPORT_BYTES} bytes is not taken"),
+                format!("a record has at most {MAX_IMPORT_BYTES} bytes"),
                 [("max_bytes", &MAX_IMPORT_BYTES.to_string())],
             ));
         }
-        // A line can take much more memory than it takes bytes.
+        // A decoded line can take far more memory than its bytes.
         for (number, line) in (lines.len() + 1..).zip(&request.lines) {
             check_line(line).map_err(|problem| refused(number, &problem))?;
         }
@@ -249,7 +251,7 @@ async fn received(
             return Err(status(
                 Code::ResourceExhausted,
                 "RECORD_TOO_LARGE",
-                format!("a record of more than {MAX_IMPORT_LINES} lines is not taken"),
+                format!("a record has at most {MAX_IMPORT_LINES} lines"),
                 [("max_lines", &MAX_IMPORT_LINES.to_string())],
             ));
         }
@@ -258,7 +260,7 @@ async fn received(
     Ok(lines)
 }
 
-/// Refuses a line that is no part of any record, before more of its kind gather.
+/// Refuses a line that belongs to no record, before more lines are received.
 fn check_line(line: &v1::RecordLine) -> Result<(), String> {
     let line = line.line.as_ref().ok_or("the line is empty")?;
     match excess(line) {
@@ -279,8 +281,8 @@ fn refused(line: usize, problem: &str) -> Status {
     )
 }
 
-fn not_kept(error: crate::store::StoreError) -> Status {
-    tracing::error!(%error, "a record was not kept");
+fn import_failed(error: crate::store::StoreError) -> Status {
+    tracing::error!(%error, "importing a record failed");
     super::status::store_failed()
 }
 
@@ -296,7 +298,7 @@ fn import_too_slow() -> Status {
     )
 }
 
-/// Where responses are put, and the stream that gives them to the transport.
+/// A channel for responses, and its stream for the transport.
 fn channel<T: Send + 'static>() -> (mpsc::Sender<Result<T, Status>>, Responses<T>) {
     let (sender, receiver) = mpsc::channel(1);
     (sender, Box::pin(ReceiverStream::new(receiver)))
@@ -305,7 +307,7 @@ fn channel<T: Send + 'static>() -> (mpsc::Sender<Result<T, Status>>, Responses<T
 /// Sends the lines of one record.
 ///
 /// # Errors
-/// The client has gone away, or does not take them in.
+/// The client has gone or is too slow.
 async fn send<T>(
     sender: &mpsc::Sender<Result<T, Status>>,
     lines: Vec<v1::RecordLine>,
@@ -320,10 +322,11 @@ async fn send<T>(
     Ok(())
 }
 
-/// Tells the client why there is no more. It waits, without anything large in its hands, until that is taken or the client has gone away.
+/// Tells the client why the stream ends. Waits, without anything large in memory, until the status is
+/// received or the client has gone.
 async fn end<T>(sender: &mpsc::Sender<Result<T, Status>>, sent: Result<(), Status>) {
     if let Err(status) = sent {
-        // A client that has gone away does not want to know.
+        // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
     }
 }
@@ -333,12 +336,12 @@ fn reader_too_slow() -> Status {
     status(
         Code::ResourceExhausted,
         "READER_TOO_SLOW",
-        format!("a part of a record was not taken in within {seconds} s; ask for it again"),
+        format!("a part of a record was not received within {seconds} s; request it again"),
         [],
     )
 }
 
-/// The next lines that make up one message.
+/// The next lines that fit one message.
 fn next_part(lines: &mut Peekable<impl Iterator<Item = v1::RecordLine>>) -> Vec<v1::RecordLine> {
     let (mut part, mut bytes) = (Vec::new(), 0);
     while let Some(line) = lines.next_if(|line| {

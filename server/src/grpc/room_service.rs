@@ -1,4 +1,4 @@
-//! `RoomService`: making, finding, joining and closing rooms.
+//! `RoomService`: creates, lists, joins and closes rooms.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -18,10 +18,10 @@ use crate::rooms::Rooms;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::ParticipantKind;
 
-/// Rooms looked at for one page.
+/// Rooms examined for one page.
 const ROOMS_LOOKED_AT: usize = 200;
 
-/// Rooms asked at a time to describe themselves.
+/// Rooms that describe themselves at a time.
 const ROOMS_ASKED: usize = 32;
 
 /// The service.
@@ -32,7 +32,7 @@ pub struct RoomCalls {
 }
 
 impl RoomCalls {
-    /// The service for these rooms, and these recorded games that new ones may begin from.
+    /// Creates the service for these rooms. New ones may branch from these recorded games.
     pub fn new(rooms: Arc<Rooms>, recorded: Recorded) -> Self {
         Self { rooms, recorded }
     }
@@ -41,7 +41,7 @@ impl RoomCalls {
         find(&self.rooms, room_id)
     }
 
-    /// The room of a join code; where an id is given too, it must be this room's.
+    /// The room with a join code; if an id is given too, it must match.
     fn find_by_code(&self, room_id: &str, join_code: &str) -> Result<Handle, Status> {
         if room_id.is_empty() {
             return self.rooms.by_code(join_code).ok_or_else(join_code_wrong);
@@ -54,7 +54,7 @@ impl RoomCalls {
     }
 }
 
-/// Describes numbered rooms in their order; asks [`ROOMS_ASKED`] of them at a time.
+/// Describes numbered rooms in order, [`ROOMS_ASKED`] of them at a time.
 fn described<H, R, D: Future<Output = R>>(
     rooms: Vec<(u64, H)>,
     describe: impl Fn(H) -> D,
@@ -68,7 +68,7 @@ fn described<H, R, D: Future<Output = R>>(
         .buffered(ROOMS_ASKED)
 }
 
-/// The room of an id as it stands in a message.
+/// The room with an id from a message.
 pub(super) fn find(rooms: &Rooms, room_id: &str) -> Result<Handle, Status> {
     Id::parse(room_id)
         .and_then(|id| rooms.get(id))
@@ -121,7 +121,7 @@ impl RoomService for RoomCalls {
             }
         };
         let mut response = v1::ListRoomsResponse::default();
-        // Rooms in other states are passed over, up to a limit for one page.
+        // Rooms in other states are skipped, up to a limit for one page.
         let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
@@ -158,7 +158,7 @@ impl RoomService for RoomCalls {
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let name = convert::name_to_show("name", &request.name, 1)
+        let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let request_id = request_id(&request.request_id)?;
         let joined = handle
@@ -219,7 +219,7 @@ fn join_code_wrong() -> Status {
     status::status(
         Code::PermissionDenied,
         "JOIN_CODE_WRONG",
-        "no room here has this join code; ask the room's creator for it, and join a tournament as one if it is a tournament's",
+        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one",
         [("field", "join_code")],
     )
 }
@@ -231,9 +231,9 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn rooms_of_a_list_are_asked_at_the_same_time() {
+    async fn rooms_of_a_list_are_described_concurrently() {
         let rooms: Vec<_> = (0..64).map(|number| (number, ())).collect();
-        // Nobody answers before as many are asked.
+        // No call returns before this many have started.
         let barrier = Barrier::new(ROOMS_ASKED);
         let barrier = &barrier;
         let describe = |()| async move {

@@ -25,7 +25,7 @@ pub struct Spectate {
 }
 
 impl Spectate {
-    /// The service for these rooms; `closing` ends its streams.
+    /// Creates the service for these rooms; `closing` ends its streams.
     pub fn new(rooms: Arc<Rooms>, closing: CancellationToken) -> Self {
         Self { rooms, closing }
     }

@@ -1,5 +1,6 @@
-//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in UPPER_SNAKE, domain `chefshat`, metadata that
-//! names the field or limit at fault. What a client cannot act on goes to the log instead.
+//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in UPPER_SNAKE,
+//! domain `chefshat`, metadata with the field or limit at fault. Errors that a client cannot act on
+//! go to the log instead.
 
 use std::collections::HashMap;
 
@@ -17,7 +18,7 @@ use chefshat_room::{ExpressError, JoinError, LeaveError};
 /// Domain of every `ErrorInfo`.
 const DOMAIN: &str = "chefshat";
 
-/// A status with its reason and what it is about.
+/// Creates a status with its reason and metadata.
 pub fn status<const N: usize>(
     code: Code,
     reason: &str,
@@ -35,12 +36,12 @@ pub fn status<const N: usize>(
     )
 }
 
-/// A stream is not told of more games before it has taken in those it was told of.
+/// Too many calls to games wait for a stream.
 pub fn calls_not_taken() -> Status {
     status(
         Code::Unavailable,
         "CALLS_NOT_TAKEN",
-        "too many calls to games waited for this stream; connect again, and attach fewer participants to one stream",
+        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream",
         [],
     )
 }
@@ -50,7 +51,7 @@ pub fn has_reason(status: &Status, reason: &str) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason == reason)
 }
 
-/// A status as the message that refuses a command on a stream.
+/// Converts a status to the message that refuses a command on a stream.
 pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
     let (reason, metadata) = status
         .get_details_error_info()
@@ -65,7 +66,7 @@ pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
     }
 }
 
-/// A field that cannot be accepted.
+/// The status for an invalid field.
 pub fn field(reason: &str, problem: &FieldProblem) -> Status {
     status(
         Code::InvalidArgument,
@@ -80,7 +81,7 @@ pub fn room_unknown() -> Status {
     status(
         Code::NotFound,
         "ROOM_UNKNOWN",
-        "there is no such room here; it may have been closed",
+        "this room does not exist; it may have been closed",
         [],
     )
 }
@@ -90,12 +91,12 @@ pub fn ticket_unknown() -> Status {
     status(
         Code::Unauthenticated,
         "TICKET_UNKNOWN",
-        "this ticket opens no seat here: it is mistyped, its seat was freed, or its room is gone; join again",
+        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again",
         [("field", "ticket")],
     )
 }
 
-/// The id of a request, if it has one.
+/// The id of a request, if set.
 pub fn request_id(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
     if bytes.is_empty() {
         return Ok(None);
@@ -109,7 +110,7 @@ pub fn request_id(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
     })
 }
 
-/// A request id was used with other content.
+/// A request id was reused with other content.
 pub fn request_id_used(message: &str) -> Status {
     status(
         Code::AlreadyExists,
@@ -119,7 +120,7 @@ pub fn request_id_used(message: &str) -> Status {
     )
 }
 
-/// There is no space for more games.
+/// The disk has no space for more games.
 pub fn disk_nearly_full(message: &str) -> Status {
     status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
 }
@@ -129,17 +130,17 @@ pub fn store_failed() -> Status {
     status(
         Code::Unavailable,
         "STORE_FAILED",
-        "the server can keep nothing any more and stops; what it has acknowledged is kept: connect again when it is back",
+        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back",
         [],
     )
 }
 
-/// The server failed in a way that a client can do nothing about.
+/// The server failed in a way that clients cannot resolve.
 pub fn internal() -> Status {
     status(
         Code::Internal,
         "INTERNAL",
-        "the server could not do this; its log says why",
+        "the server failed to do this; see its log",
         [],
     )
 }
@@ -154,17 +155,17 @@ pub fn shutting_down() -> Status {
     )
 }
 
-/// A spectator was cut off.
+/// A spectator was disconnected because it reads too slowly.
 pub fn spectator_too_slow() -> Status {
     status(
         Code::ResourceExhausted,
         "SPECTATOR_TOO_SLOW",
-        "the stream was not read fast enough; watch again from the number after the last event seen",
+        "the stream was not read fast enough; watch again from the number after the last event received",
         [],
     )
 }
 
-/// Why a stream ended, for its client.
+/// The status for the end of a stream.
 pub fn stream_ended(end: StreamEnd) -> Status {
     match end {
         StreamEnd::Complete => Status::ok(""),
@@ -177,12 +178,12 @@ pub fn stream_ended(end: StreamEnd) -> Status {
     }
 }
 
-/// A room was there and is not to be reached: it has just gone, or it was put down because the server stops.
+/// A room became unreachable: it has just ended, or was suspended because the server stops.
 pub fn room_gone() -> Status {
     status(
         Code::Unavailable,
         "ROOM_GONE",
-        "the room is not to be reached just now: the server stops, or the room has ended this moment; try again",
+        "the room cannot be reached: it has just ended, or the server is stopping; try again",
         [],
     )
 }
@@ -193,7 +194,7 @@ impl From<RoomGone> for Refusal {
     }
 }
 
-/// A status that other errors turn into.
+/// A wrapper to convert other errors to a status.
 #[derive(Debug)]
 pub struct Refusal(pub Status);
 
@@ -255,7 +256,7 @@ impl From<CreateError> for Refusal {
             CreateError::ShuttingDown => shutting_down(),
             CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
             CreateError::Store(error) => {
-                tracing::error!(%error, "a room was not made");
+                tracing::error!(%error, "creating a room failed");
                 store_failed()
             }
         })
@@ -268,19 +269,19 @@ impl From<SpectateError> for Refusal {
             SpectateError::NotAdmitted => status(
                 Code::PermissionDenied,
                 "SPECTATORS_NOT_ADMITTED",
-                "this room admits no spectators",
+                "this room does not admit spectators",
                 [],
             ),
             SpectateError::Full => status(
                 Code::ResourceExhausted,
                 "TOO_MANY_SPECTATORS",
-                "this room has as many spectators as it can take",
+                "this room has no space for more spectators",
                 [],
             ),
             SpectateError::SnapshotDelayed => status(
                 Code::FailedPrecondition,
                 "SNAPSHOT_DELAYED",
-                "this room shows its events with a delay; ask for events instead of a snapshot",
+                "this room delays its events for spectators; request events instead of a snapshot",
                 [("field", "snapshot")],
             ),
         })

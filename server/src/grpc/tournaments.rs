@@ -1,4 +1,4 @@
-//! `TournamentService`: what is asked is checked and handed to the tournament; what it shows of itself is put into messages.
+//! `TournamentService`: checks requests, forwards them to the tournament, and converts the results.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -13,14 +13,14 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::follow::{end, follow, not_worked_out};
-use super::new_room::{kept_policy, too_long};
+use super::follow::{compute_failed, end, follow};
+use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
     disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
 };
-use crate::config::{MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES, MAX_RESULTS_IN_HAND};
+use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
 use crate::convert;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TournamentHandle, Tournaments,
@@ -28,8 +28,8 @@ use crate::tournaments::{
 use chefshat_room::ids::{Id, RequestKey, random_bytes};
 use chefshat_room::journal::ParticipantKind;
 
-/// Games of a page, and lines of a leaderboard, where a request does not say.
-const STANDARD_LINES: u32 = 100;
+/// Default page size of games, and default number of rows of a leaderboard.
+const DEFAULT_LINES: u32 = 100;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -38,16 +38,16 @@ pub struct TournamentCalls {
     recorded: Recorded,
     leaderboard: Arc<Leaderboard>,
     followers: Arc<Semaphore>,
-    /// Turns to work out what followers are told.
-    telling: Arc<Semaphore>,
-    /// Turns to work out results.
-    summing_up: Arc<Semaphore>,
-    /// Cancelled when all streams are to end.
+    /// Permits to compute updates for followers.
+    update_permits: Arc<Semaphore>,
+    /// Permits to compute results.
+    result_permits: Arc<Semaphore>,
+    /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
 
 impl TournamentCalls {
-    /// The service for these tournaments; `closing` ends its streams.
+    /// Creates the service for these tournaments; `closing` ends its streams.
     pub fn new(
         tournaments: Arc<Tournaments>,
         recorded: Recorded,
@@ -58,8 +58,8 @@ impl TournamentCalls {
             leaderboard: Arc::new(Leaderboard::new(Arc::clone(recorded.rooms()))),
             recorded,
             followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
-            telling: Arc::new(Semaphore::new(MAX_RESULTS_IN_HAND)),
-            summing_up: Arc::new(Semaphore::new(MAX_RESULTS_IN_HAND)),
+            update_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
+            result_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
             closing,
         }
     }
@@ -68,7 +68,7 @@ impl TournamentCalls {
         (Id::parse(id).and_then(|id| self.tournaments.get(id))).ok_or_else(unknown)
     }
 
-    /// The tournament of a join code; where an id is given too, it must be this tournament's.
+    /// The tournament with a join code; if an id is given too, it must match.
     fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<TournamentHandle>, Status> {
         let hosted = match id {
             "" => self.tournaments.by_code(join_code),
@@ -79,13 +79,13 @@ impl TournamentCalls {
             status(
                 Code::PermissionDenied,
                 "JOIN_CODE_WRONG",
-                "no tournament here has this join code; ask its owner for it",
+                "no tournament has this join code; ask its owner for it",
                 [("field", "join_code")],
             )
         })
     }
 
-    fn find_own(&self, id: &str, owner_token: &str) -> Result<Arc<TournamentHandle>, Status> {
+    fn find_owned(&self, id: &str, owner_token: &str) -> Result<Arc<TournamentHandle>, Status> {
         let hosted = self.find(id)?;
         if hosted.is_owner(owner_token) {
             return Ok(hosted);
@@ -112,7 +112,7 @@ impl TournamentService for TournamentCalls {
         let settings = request.settings.unwrap_or_default();
         let request_key = request_id(&request.request_id)?
             .map(|id| RequestKey::new(id, &settings.encode_to_vec()));
-        let name = convert::name_to_show("name", &settings.name, 1)
+        let name = convert::checked_name("name", &settings.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
             .map_err(|problem| refused(&problem))?;
@@ -120,14 +120,14 @@ impl TournamentService for TournamentCalls {
             return Err(refused_within("rules", &problem));
         }
         let asked = settings.policy.unwrap_or_default();
-        plan.policy.durability = kept_policy(&self.recorded, &asked)
+        plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
         let (hosted, owner) = self
             .tournaments
             .create(&name, plan, request_key)
             .await
-            .map_err(not_made)?;
+            .map_err(create_refused)?;
         Ok(Response::new(v1::CreateTournamentResponse {
             tournament: Some(hosted.describe()),
             join_code: hosted.join_code().to_owned(),
@@ -182,13 +182,13 @@ impl TournamentService for TournamentCalls {
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
         let hosted = self.find_by_code(&request.tournament_id, &request.join_code)?;
-        let name = convert::name_to_show("name", &request.name, 1)
+        let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !hosted.admits(kind) {
             return Err(status(
                 Code::FailedPrecondition,
                 "KIND_NOT_ADMITTED",
-                "this tournament admits other kinds of participants",
+                "this tournament does not admit this kind of participant",
                 [("field", "kind")],
             ));
         }
@@ -203,7 +203,7 @@ impl TournamentService for TournamentCalls {
             .join(entry)
             .await
             .map_err(stopped)?
-            .map_err(not_joined)?;
+            .map_err(join_refused)?;
         Ok(Response::new(v1::JoinTournamentResponse {
             tournament: Some(hosted.describe()),
             participant: convert::number(participant),
@@ -216,9 +216,9 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::StartTournamentRequest>,
     ) -> Result<Response<v1::StartTournamentResponse>, Status> {
         let request = request.into_inner();
-        let hosted = self.find_own(&request.tournament_id, &request.owner_token)?;
-        let begun = hosted.begin().await.map_err(stopped)?;
-        begun.map_err(|problem| {
+        let hosted = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let started = hosted.begin().await.map_err(stopped)?;
+        started.map_err(|problem| {
             let reason = match problem {
                 BeginProblem::TooFew { .. } => "TOO_FEW_PARTICIPANTS",
                 BeginProblem::Started => "TOURNAMENT_STARTED",
@@ -234,7 +234,7 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::CloseTournamentRequest>,
     ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
         let request = request.into_inner();
-        let hosted = self.find_own(&request.tournament_id, &request.owner_token)?;
+        let hosted = self.find_owned(&request.tournament_id, &request.owner_token)?;
         hosted.close().await.map_err(stopped)?;
         let tournament = Some(hosted.describe());
         Ok(Response::new(v1::CloseTournamentResponse { tournament }))
@@ -250,15 +250,15 @@ impl TournamentService for TournamentCalls {
             status(
                 Code::ResourceExhausted,
                 "TOO_MANY_FOLLOWERS",
-                "the server's tournaments are followed by as many as it can take",
+                "the server's tournaments have the most followers it allows",
                 [("max_followers", &MAX_FOLLOWERS.to_string())],
             )
         })?;
         let (sender, responses) = mpsc::channel(1);
-        let (closing, permits) = (self.closing.clone(), Arc::clone(&self.telling));
+        let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
         let following = async move {
             let followed = follow(&hosted, &permits, &sender).await;
-            // One that takes nothing in keeps nobody from following.
+            // A follower that does not read does not block the others.
             drop(place);
             end(&sender, followed).await;
         };
@@ -271,8 +271,8 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
         let hosted = self.find(&request.into_inner().tournament_id)?;
-        let results = hosted.results(&self.summing_up).await;
-        let results = results.map_err(not_worked_out)?.message.clone();
+        let results = hosted.results(&self.result_permits).await;
+        let results = results.map_err(compute_failed)?.message.clone();
         Ok(Response::new(results))
     }
 
@@ -285,7 +285,7 @@ impl TournamentService for TournamentCalls {
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
         let size = match request.page_size {
-            0 => STANDARD_LINES,
+            0 => DEFAULT_LINES,
             size => size.min(MAX_GAMES_PAGE),
         };
         let size = usize::try_from(size).unwrap_or(usize::MAX);
@@ -310,10 +310,10 @@ impl TournamentService for TournamentCalls {
         convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?;
         let limit = match request.limit {
-            0 => STANDARD_LINES,
+            0 => DEFAULT_LINES,
             limit => limit.min(MAX_LEADERBOARD_LINES),
         };
-        let ratings = self.leaderboard.ratings().await.map_err(not_worked_out)?;
+        let ratings = self.leaderboard.ratings().await.map_err(compute_failed)?;
         Ok(Response::new(convert::leaderboard(
             &ratings,
             request.kind(),
@@ -327,7 +327,7 @@ fn unknown() -> Status {
     status(
         Code::NotFound,
         "TOURNAMENT_UNKNOWN",
-        "there is no such tournament here",
+        "this tournament does not exist",
         [("field", "tournament_id")],
     )
 }
@@ -336,7 +336,7 @@ fn stopped(_: Stopped) -> Status {
     shutting_down()
 }
 
-/// A field of the settings that cannot be accepted.
+/// The status for an invalid setting.
 fn refused(problem: &FieldProblem) -> Status {
     let reason = match problem.field {
         "rules" => "RULE_SET_REFUSED",
@@ -346,12 +346,12 @@ fn refused(problem: &FieldProblem) -> Status {
     field(reason, problem)
 }
 
-/// The same, of a field within a field, which is named in words.
+/// The status for an invalid field within a setting.
 fn refused_within(outer: &'static str, problem: &FieldProblem) -> Status {
     refused(&FieldProblem::new(outer, problem.to_string()))
 }
 
-fn not_made(problem: CreateProblem) -> Status {
+fn create_refused(problem: CreateProblem) -> Status {
     match problem {
         CreateProblem::Settings(problem) => {
             refused(&FieldProblem::new(problem.field, problem.problem))
@@ -366,13 +366,13 @@ fn not_made(problem: CreateProblem) -> Status {
         CreateProblem::ShuttingDown => shutting_down(),
         CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),
         CreateProblem::Store(error) => {
-            tracing::error!(%error, "a tournament was not made");
+            tracing::error!(%error, "creating a tournament failed");
             store_failed()
         }
     }
 }
 
-fn not_joined(refusal: JoinRefusal) -> Status {
+fn join_refused(refusal: JoinRefusal) -> Status {
     let problem = match refusal {
         JoinRefusal::Rules(problem) => problem,
         JoinRefusal::RequestIdUsed => return request_id_used(&refusal.to_string()),

@@ -1,5 +1,6 @@
-//! `VectorService`: games of a client's own, stepped in batches on a thread pool of their own, so that rooms keep their clocks. How the games
-//! go is decided in `chefshat_simulation::vector`; here streams are read and written, and the records of games are cut into messages.
+//! `VectorService`: games of a client, stepped in batches on their own thread pool so that rooms stay
+//! responsive. `chefshat_simulation::vector` plays the games; this file reads and writes the streams
+//! and splits records into messages.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::time::Duration;
 use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1::{
-    self, run_request::Request as Asked, run_response::Response as Said,
+    self, run_request::Request as RequestKind, run_response::Response as ResponseKind,
     vector_service_server::VectorService, vector_setup,
 };
 use chefshat_record::branch::{BranchError, branch_of};
@@ -37,7 +38,7 @@ use crate::convert::Reset;
 use chefshat_record::convert::Played;
 use chefshat_room::ids::random_bytes;
 
-/// Messages that wait for a client that reads slowly. It has at most one batch to answer, so more are parts of records.
+/// Messages queued for a slow client. At most one is a batch; the others are parts of records.
 const SEND_AHEAD: usize = 4;
 /// Size from which a part of a record is sent, bytes.
 const RECORD_PART_BYTES: usize = 512 * 1024;
@@ -48,16 +49,16 @@ pub struct Vectors {
     recorded: Recorded,
     pool: Arc<ThreadPool>,
     streams: Arc<Semaphore>,
-    /// Games times seats that clients play.
+    /// Permits for games times seats that clients play.
     seats: Arc<Semaphore>,
     closing: CancellationToken,
 }
 
 impl Vectors {
-    /// The service, with so many threads (0: one for each core), for games that may branch from recorded ones; `closing` ends its streams.
+    /// Creates the service with this number of threads (0: one for each core). `closing` ends its streams.
     ///
     /// # Errors
-    /// When the operating system has no threads to give.
+    /// The operating system cannot start the threads.
     pub fn new(
         recorded: Recorded,
         threads: usize,
@@ -106,22 +107,22 @@ struct Runner {
     _permit: OwnedSemaphorePermit,
 }
 
-/// Why a stream ends.
+/// The reason why a stream ends.
 enum End {
-    /// The client ended it, or is gone.
-    Left,
-    /// The client is told.
-    Told(Status),
+    /// The client ended it or has gone.
+    Gone,
+    /// The client receives this status.
+    Failed(Status),
 }
 
 impl From<Status> for End {
     fn from(status: Status) -> End {
-        End::Told(status)
+        End::Failed(status)
     }
 }
 
-/// What a client asked of its games.
-enum Move {
+/// A request of a client.
+enum Command {
     Actions(Vec<ActionId>),
     Reset(Reset),
 }
@@ -131,10 +132,10 @@ impl Runner {
         let closing = self.service.closing.clone();
         let end = tokio::select! {
             end = self.play(&mut requests) => end,
-            () = closing.cancelled() => Err(End::Told(shutting_down())),
+            () = closing.cancelled() => Err(End::Failed(shutting_down())),
         };
-        if let Err(End::Told(status)) = end {
-            // If the client is gone, or still does not read, nobody is to be told.
+        if let Err(End::Failed(status)) = end {
+            // It fails only if the client has gone or still does not read.
             let _ = self
                 .responses
                 .send_timeout(Err(status), VECTOR_SEND_TIMEOUT)
@@ -145,87 +146,94 @@ impl Runner {
     async fn play(&self, requests: &mut Streaming<v1::RunRequest>) -> Result<(), End> {
         let first = timeout(VECTOR_SETUP_TIMEOUT, next(requests)).await;
         let message = match first.map_err(|_| setup_too_late())?? {
-            None => return Err(End::Left),
-            Some(Some(Asked::Setup(message))) => message,
+            None => return Err(End::Gone),
+            Some(Some(RequestKind::Setup(message))) => message,
             Some(_) => {
-                let words = "the first message is the setup of the games";
+                let words = "the first message must be the setup of the games";
                 return Err(field("SETUP_MISSING", &FieldProblem::new("setup", words)).into());
             }
         };
         let setup = self.setup(&message).await?;
         let _seats = self.reserve(&setup)?;
-        self.say(Said::Started(convert::started_to_proto(&setup)))
+        self.send(ResponseKind::Started(convert::started_to_proto(&setup)))
             .await?;
-        let begun = self.stepped(move || VectorGames::new(setup)).await?;
+        let begun = self.run_on_pool(move || VectorGames::new(setup)).await?;
         let (mut games, mut batch) = begun;
         loop {
             for played in std::mem::take(&mut batch.played) {
-                // One at a time: a record is far larger than what it is made of.
-                let made = self.stepped(move || (record_parts(games.setup(), &played), games));
+                // One at a time: a record is far larger than the game it is made from.
+                let made = self.run_on_pool(move || (record_parts(games.setup(), &played), games));
                 let parts;
                 (parts, games) = made.await?;
                 for part in parts {
-                    self.say(Said::Record(part)).await?;
+                    self.send(ResponseKind::Record(part)).await?;
                 }
             }
             let statistics = games.setup().statistics();
-            let said = Said::Batch(Box::new(convert::batch_to_proto(batch, statistics)));
-            self.say(said).await?;
-            let Some(asked) = self.asked(requests).await? else {
-                return Err(End::Left);
+            let response =
+                ResponseKind::Batch(Box::new(convert::batch_to_proto(batch, statistics)));
+            self.send(response).await?;
+            let Some(command) = self.next_command(requests).await? else {
+                return Err(End::Gone);
             };
             let stepped;
             (stepped, games) = self
-                .stepped(move || (moved(&mut games, asked), games))
+                .run_on_pool(move || (execute(&mut games, command), games))
                 .await?;
             batch = stepped.map_err(|error| step_refused(&error))?;
         }
     }
 
-    /// What the client asks of its games; `None` when it has ended the stream.
-    async fn asked(&self, requests: &mut Streaming<v1::RunRequest>) -> Result<Option<Move>, End> {
-        let asked = timeout(VECTOR_IDLE_TIMEOUT, next(requests)).await;
-        match asked.map_err(|_| client_idle())?? {
+    /// The next request of the client; `None` when it has ended the stream.
+    async fn next_command(
+        &self,
+        requests: &mut Streaming<v1::RunRequest>,
+    ) -> Result<Option<Command>, End> {
+        let message = timeout(VECTOR_IDLE_TIMEOUT, next(requests)).await;
+        match message.map_err(|_| client_idle())?? {
             None => Ok(None),
-            Some(Some(Asked::Actions(message))) => Ok(Some(Move::Actions(actions(&message)?))),
-            Some(Some(Asked::Reset(message))) => {
+            Some(Some(RequestKind::Actions(message))) => {
+                Ok(Some(Command::Actions(actions(&message)?)))
+            }
+            Some(Some(RequestKind::Reset(message))) => {
                 let reset = convert::reset_from_proto(&message)
                     .map_err(|problem| field("RESET_REFUSED", &problem))?;
-                Ok(Some(Move::Reset(reset)))
+                Ok(Some(Command::Reset(reset)))
             }
-            Some(Some(Asked::Setup(_))) => {
-                let words = "the games are set up already; open another stream for others";
+            Some(Some(RequestKind::Setup(_))) => {
+                let words = "the games are already set up; open another stream for others";
                 Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into())
             }
             Some(None) => {
-                let words = "say what is to be done: actions or reset";
+                let words = "set a request: actions or reset";
                 Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into())
             }
         }
     }
 
-    /// Does work on games on the pool's threads. Given up, it is done all the same, and what it gives is dropped.
-    async fn stepped<T: Send + 'static>(
+    /// Runs work on the pool's threads. If the call is cancelled, the work completes and its result is
+    /// dropped.
+    async fn run_on_pool<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
         on_pool(&self.service.pool, work).await
     }
 
-    async fn say(&self, said: Said) -> Result<(), End> {
+    async fn send(&self, response: ResponseKind) -> Result<(), End> {
         let response = v1::RunResponse {
-            response: Some(said),
+            response: Some(response),
         };
         self.responses
             .send_timeout(Ok(response), VECTOR_SEND_TIMEOUT)
             .await
             .map_err(|error| match error {
-                SendTimeoutError::Timeout(_) => End::Told(client_too_slow()),
-                SendTimeoutError::Closed(_) => End::Left,
+                SendTimeoutError::Timeout(_) => End::Failed(client_too_slow()),
+                SendTimeoutError::Closed(_) => End::Gone,
             })
     }
 
-    /// Counts the seats of these games among those of all streams, as long as what is returned is kept.
+    /// Reserves the seats of these games among those of all streams, until the permit is dropped.
     fn reserve(&self, setup: &VectorSetup) -> Result<OwnedSemaphorePermit, Status> {
         let seats = setup.games() * convert::number(setup.client_seats().count());
         Arc::clone(&self.service.seats)
@@ -233,7 +241,7 @@ impl Runner {
             .map_err(|_| too_many_games(seats))
     }
 
-    /// What a setup asks for, with the recorded game that it names looked up.
+    /// Checks a setup message and reads the recorded game it names.
     async fn setup(&self, message: &v1::VectorSetup) -> Result<VectorSetup, Status> {
         let seeds = convert::setup_seeds(message, || u64::from_le_bytes(random_bytes()))
             .map_err(|problem| field("SEED_REFUSED", &problem))?;
@@ -261,7 +269,7 @@ impl Runner {
         }
     }
 
-    /// A recorded game as it stood at a point.
+    /// The state of a recorded game at a point.
     async fn point(
         &self,
         point: &v1::BranchPoint,
@@ -295,41 +303,43 @@ impl Runner {
     }
 }
 
-/// Does work on a pool's threads. Work that panics ends nothing but itself: rooms are served by the same process.
+/// Runs work on a pool's threads. A panic ends only this work, because rooms share the process.
 async fn on_pool<T: Send + 'static>(
     pool: &ThreadPool,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Status> {
     let (done, result) = oneshot::channel();
     pool.spawn(move || {
-        // What the work had in hand is dropped, so that nobody sees it half done.
+        // The state of the work is dropped, so it is never seen half done.
         match std::panic::catch_unwind(AssertUnwindSafe(work)) {
             Ok(value) => drop(done.send(value)),
             Err(_) => {
-                tracing::error!("the games of a client were given up: stepping them panicked")
+                tracing::error!("the games of a client were lost: stepping them panicked")
             }
         }
     });
     result.await.map_err(|_| internal())
 }
 
-/// What the client sends next, if anything is in it; `None` when it has ended the stream.
-async fn next(requests: &mut Streaming<v1::RunRequest>) -> Result<Option<Option<Asked>>, End> {
-    // A message that is too large or no message is the client's to know; a broken connection finds nobody to tell.
-    let message = requests.message().await.map_err(End::Told)?;
+/// The content of the next message, if set; `None` when the client has ended the stream.
+async fn next(
+    requests: &mut Streaming<v1::RunRequest>,
+) -> Result<Option<Option<RequestKind>>, End> {
+    // The client is told about a message that is too large or malformed; a broken connection has no reader.
+    let message = requests.message().await.map_err(End::Failed)?;
     Ok(message.map(|message| message.request))
 }
 
-/// Moves the games as asked.
-fn moved(games: &mut VectorGames, asked: Move) -> Result<Batch, StepError> {
-    match asked {
-        Move::Actions(actions) => games.step(&actions),
-        Move::Reset(Reset::All(seeds)) => Ok(games.reset(seeds)),
-        Move::Reset(Reset::Some(some)) => games.reset_some(&some),
+/// Executes a request.
+fn execute(games: &mut VectorGames, command: Command) -> Result<Batch, StepError> {
+    match command {
+        Command::Actions(actions) => games.step(&actions),
+        Command::Reset(Reset::All(seeds)) => Ok(games.reset(seeds)),
+        Command::Reset(Reset::Some(some)) => games.reset_some(&some),
     }
 }
 
-/// The record of a game, in parts.
+/// Splits the record of a game into parts.
 fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
     let limit = match setup.invalid_actions() {
         InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
@@ -367,7 +377,7 @@ fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecor
 fn actions(message: &v1::VectorActions) -> Result<Vec<ActionId>, Status> {
     let (actions, rest) = message.actions.as_chunks::<2>();
     if !rest.is_empty() {
-        let words = "the column is not whole: 2 bytes for each action";
+        let words = "the column is incomplete: 2 bytes for each action";
         return Err(field(
             "ACTIONS_REFUSED",
             &FieldProblem::new("actions", words),
@@ -418,7 +428,7 @@ fn too_many() -> Status {
         Code::ResourceExhausted,
         "TOO_MANY_VECTOR_STREAMS",
         format!(
-            "this server steps the games of {MAX_VECTOR_STREAMS} streams at a time; end one, or play more games on each"
+            "this server serves {MAX_VECTOR_STREAMS} vector streams at a time; end one, or play more games on each"
         ),
         [
             ("limit", "max_vector_streams"),
@@ -432,7 +442,7 @@ fn too_many_games(seats: u32) -> Status {
         Code::ResourceExhausted,
         "TOO_MANY_VECTOR_GAMES",
         format!(
-            "games times seats are {seats} here, and all streams of this server together play at most {MAX_VECTOR_SEATS_IN_ALL}; play fewer games, or when others have ended"
+            "these games have {seats} seats in total, and all streams of this server together may play {MAX_VECTOR_SEATS_IN_ALL}; play fewer games, or wait until others have ended"
         ),
         [
             ("limit", "max_vector_seats_in_all"),
@@ -447,27 +457,27 @@ fn too_many_games(seats: u32) -> Status {
 fn setup_too_late() -> Status {
     too_late(
         "SETUP_TOO_LATE",
-        "no setup came",
+        "no setup arrived",
         VECTOR_SETUP_TIMEOUT,
-        "open the stream when you know which games you want",
+        "open the stream when the setup is known",
     )
 }
 
 fn client_idle() -> Status {
     too_late(
         "CLIENT_IDLE",
-        "nothing was answered",
+        "no answer arrived",
         VECTOR_IDLE_TIMEOUT,
-        "open another stream; games can begin with the seeds these had",
+        "open another stream; games can start with the same seeds",
     )
 }
 
 fn client_too_slow() -> Status {
     too_late(
         "CLIENT_TOO_SLOW",
-        "a message was not taken in",
+        "a message was not received",
         VECTOR_SEND_TIMEOUT,
-        "read what comes, also while you think",
+        "read the stream continuously",
     )
 }
 
@@ -487,7 +497,7 @@ mod tests {
     use crate::grpc::vector::*;
 
     #[tokio::test]
-    async fn work_that_panics_ends_nothing_but_itself() {
+    async fn a_panic_ends_only_its_own_work() {
         let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let failed = on_pool(&pool, || -> u32 { panic!("on purpose") }).await;
         assert_eq!(failed.unwrap_err().code(), Code::Internal);

@@ -36,7 +36,7 @@ impl Rooms {
         {
             error!(%error, "unfinished files of records were not removed");
         }
-        let unfiled = self.context.store.unfiled().await?;
+        let without_record_file = self.context.store.without_record_file().await?;
         let mut players = Players::default();
         let mut restored = 0;
         for game in self.context.store.resumable_games(ended_since_ms).await? {
@@ -52,7 +52,7 @@ impl Rooms {
         if restored > 0 {
             info!(games = restored, "games go on where they stood");
         }
-        for game in unfiled {
+        for game in without_record_file {
             self.context.record_writer.write_record(game);
         }
         Ok(restored)
@@ -129,10 +129,10 @@ async fn read(
     store: &Arc<dyn Store>,
     (game, seat): (Id, u32),
 ) -> Result<Arc<RecordedPlayer>, String> {
-    let kept = (store.finished(game).await)
+    let stored = (store.finished(game).await)
         .map_err(|error| error.to_string())?
         .ok_or("there is no such record")?;
-    let reading = move || convert::recorded_player(&convert::lines_of(&kept), seat);
+    let reading = move || convert::recorded_player(&convert::lines_of(&stored), seat);
     tokio::task::spawn_blocking(reading)
         .await
         .map_err(|error| error.to_string())?

@@ -1,4 +1,4 @@
-//! A store that fails when told to, for tests: what a full disk would do.
+//! A store that fails on request, for tests: simulates a full disk.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,18 +13,18 @@ use super::{Journal, MemoryStore, Part, ResumableGame, Store, StoreError, Stored
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// A memory store whose appends fail from a certain one on.
+/// A memory store whose appends fail after a number of them.
 #[derive(Debug)]
 pub struct FailingStore {
     inner: MemoryStore,
     appends_left: Arc<AtomicU64>,
     has_failed: watch::Sender<bool>,
-    /// Permits for commits of tournaments, each of which uses one.
+    /// Permits for commits of tournaments; each commit uses one.
     pub tournament_commits: Arc<Semaphore>,
 }
 
 impl FailingStore {
-    /// A store that takes `appends` appends and fails at every later one.
+    /// Creates a store that takes `appends` appends and fails at every later one.
     pub fn after(appends: u64) -> Self {
         Self {
             inner: MemoryStore::default(),
@@ -35,8 +35,8 @@ impl FailingStore {
     }
 }
 
-fn told_to() -> StoreError {
-    StoreError::Failed("the store was told to fail".into())
+fn injected_failure() -> StoreError {
+    StoreError::Failed("injected failure".into())
 }
 
 impl Store for FailingStore {
@@ -92,12 +92,12 @@ impl Store for FailingStore {
         self.inner.import(game, summary, lines)
     }
 
-    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        self.inner.unfiled()
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.inner.without_record_file()
     }
 
-    fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.note_filed(game)
+    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.mark_record_written(game)
     }
 
     fn create_tournament(
@@ -116,7 +116,7 @@ impl Store for FailingStore {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let permit = self.tournament_commits.acquire().await;
-            permit.expect("nothing closes it").forget();
+            permit.expect("the semaphore is never closed").forget();
             let appended = self.inner.append_tournament(tournament, row, entries);
             appended.await
         }
@@ -133,9 +133,9 @@ impl Store for FailingStore {
     fn failed(&self) -> BoxFuture<'static, StoreError> {
         let mut has_failed = self.has_failed.subscribe();
         async move {
-            // The sender lives as long as the store, for whose failure this waits.
+            // The sender lives as long as the store, whose failure this waits for.
             let _ = has_failed.wait_for(|failed| *failed).await;
-            told_to()
+            injected_failure()
         }
         .boxed()
     }
@@ -166,7 +166,7 @@ impl Journal for FailingJournal {
             return self.inner.append(entries);
         }
         self.has_failed.send_replace(true);
-        ready(Err(told_to())).boxed()
+        ready(Err(injected_failure())).boxed()
     }
 
     fn finish(

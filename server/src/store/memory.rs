@@ -1,4 +1,4 @@
-//! Games in memory, for as long as the process lives.
+//! Stores games in memory until the process ends.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -8,16 +8,17 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame, lets_through};
+use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame, matches_filter};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// Finished games that are kept; older ones are forgotten.
+/// Most finished games in memory; older ones are dropped.
 pub const MAX_FINISHED_GAMES: usize = 1_000;
-/// Changes of finished games that are kept in all; the oldest games are forgotten for it.
+/// Most journal entries of finished games in memory; the oldest games are dropped.
 pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 
-/// Keeps running games, and finished ones up to [`MAX_FINISHED_GAMES`] and [`MAX_FINISHED_ENTRIES`], in memory.
+/// Stores running games in memory, and finished ones up to [`MAX_FINISHED_GAMES`] and
+/// [`MAX_FINISHED_ENTRIES`].
 #[derive(Debug, Default)]
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
@@ -29,7 +30,7 @@ struct Finished {
     games: BTreeMap<u64, FinishedGame>,
     numbers: BTreeMap<Id, u64>,
     last_number: u64,
-    /// Changes of all of them.
+    /// Journal entries of all of them.
     entries: usize,
 }
 
@@ -37,12 +38,12 @@ struct Finished {
 struct FinishedGame {
     id: Id,
     summary: v1::RecordSummary,
-    kept: StoredGame,
+    stored: StoredGame,
 }
 
 impl FinishedGame {
     fn entries(&self) -> usize {
-        match &self.kept {
+        match &self.stored {
             StoredGame::Hosted(_, entries) => entries.len(),
             StoredGame::Imported(lines) => lines.len(),
         }
@@ -50,7 +51,7 @@ impl FinishedGame {
 }
 
 impl Finished {
-    fn keep(&mut self, game: FinishedGame) {
+    fn insert(&mut self, game: FinishedGame) {
         self.last_number += 1;
         self.entries += game.entries();
         self.numbers.insert(game.id, self.last_number);
@@ -66,7 +67,7 @@ impl Finished {
 
     fn get(&self, game: Id) -> Option<&StoredGame> {
         let number = self.numbers.get(&game)?;
-        self.games.get(number).map(|game| &game.kept)
+        self.games.get(number).map(|game| &game.stored)
     }
 }
 
@@ -127,20 +128,20 @@ impl Store for MemoryStore {
         let mut finished = lock(&self.finished);
         let new = finished.get(game).is_none();
         if new {
-            finished.keep(FinishedGame {
+            finished.insert(FinishedGame {
                 id: game,
                 summary,
-                kept: StoredGame::Imported(lines),
+                stored: StoredGame::Imported(lines),
             });
         }
         ready(Ok(new)).boxed()
     }
 
-    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
 
-    fn note_filed(&self, _game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, _game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
 
@@ -198,24 +199,24 @@ impl Journal for MemoryJournal {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let entries = std::mem::take(&mut self.entries).into();
         if let Some(summary) = summary {
-            lock(&self.finished).keep(FinishedGame {
+            lock(&self.finished).insert(FinishedGame {
                 id: self.header.game_id,
                 summary: *summary,
-                kept: StoredGame::Hosted(Arc::clone(&self.header), entries),
+                stored: StoredGame::Hosted(Arc::clone(&self.header), entries),
             });
         }
         ready(Ok(())).boxed()
     }
 }
 
-/// The first `count` of these games that a filter lets through.
+/// The first `count` of these games that match a filter.
 fn listed<'a>(
     games: impl Iterator<Item = (&'a u64, &'a FinishedGame)>,
     filter: &v1::RecordFilter,
     count: usize,
 ) -> Vec<(u64, v1::RecordSummary)> {
     games
-        .filter(|(_, game)| lets_through(filter, &game.summary))
+        .filter(|(_, game)| matches_filter(filter, &game.summary))
         .take(count)
         .map(|(number, game)| (*number, game.summary.clone()))
         .collect()
@@ -224,5 +225,5 @@ fn listed<'a>(
 fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {
     finished
         .lock()
-        .expect("nothing that holds this lock can panic")
+        .expect("no code that holds this lock can panic")
 }

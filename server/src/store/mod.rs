@@ -1,5 +1,5 @@
-//! Where games are kept. One trait, awaited even where it keeps things in memory: a room tells nobody of a change before the store has
-//! taken it.
+//! Storage of games. The trait is asynchronous even in memory: a room publishes a change only after
+//! the store has committed it.
 
 mod failing;
 mod memory;
@@ -21,28 +21,28 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 
-/// Why a store could not do what it was asked, and what to do about it.
+/// Why a store failed, with advice.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StoreError {
-    /// The store failed; a commit that was under way may or may not have been made.
+    /// The store failed; a commit in progress may or may not have succeeded.
     #[error("{0}")]
     Failed(String),
-    /// There is a game or a tournament with this id. Nothing was changed, and the store has not failed.
+    /// The id of a game or tournament is taken. Nothing was changed, and the store has not failed.
     #[error("the id {0} is taken")]
     Taken(Id),
 }
 
-/// A finished game as it was kept.
+/// A finished game in the store.
 #[derive(Debug, Clone)]
 pub enum StoredGame {
-    /// A game that was hosted: its header and its journal.
+    /// A hosted game: its header and its journal.
     Hosted(Arc<GameHeader>, Arc<[Entry]>),
-    /// A game that was imported: the lines of its record.
+    /// An imported game: the lines of its record.
     Imported(Arc<[v1::RecordLine]>),
 }
 
 impl StoredGame {
-    /// The tournament it belongs to, if it is one of this server's.
+    /// Its tournament, if it belongs to one of this server's.
     pub fn tournament(&self) -> Option<TournamentGame> {
         match self {
             Self::Hosted(header, _) => header.tournament,
@@ -51,12 +51,13 @@ impl StoredGame {
     }
 }
 
-/// A part of the list of finished games, which are numbered from 1, older ones before newer ones; and the way in which it is read.
+/// A part of the list of finished games, and the order of reading. Games are numbered from 1, oldest
+/// first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// Those after the one of this number, oldest first.
+    /// The games after this number, oldest first.
     After(u64),
-    /// Those before the one of this number, newest first.
+    /// The games before this number, newest first.
     Before(u64),
 }
 
@@ -67,80 +68,82 @@ impl Part {
     pub const FROM_NEWEST: Self = Self::Before(u64::MAX);
 }
 
-/// A game whose room is to be there again after the server ended.
+/// A game whose room is restored when the server starts.
 pub struct ResumableGame {
-    /// Its header; the recorded players of its seats are left for the caller to fill in.
+    /// Its header; the caller adds the recorded players of its seats.
     pub header: GameHeader,
-    /// Everything that was kept of it.
+    /// Its journal so far.
     pub entries: Vec<Entry>,
-    /// What its next changes go to.
+    /// The journal for further entries.
     pub journal: Box<dyn Journal>,
-    /// Whether its end has been kept, with everything that follows from it.
+    /// Whether its end has been committed, with everything that follows from it.
     pub concluded: bool,
 }
 
-/// Keeps games.
+/// Stores games.
 pub trait Store: Send + Sync + 'static {
-    /// Whether unfinished games are still there when the server has ended, however it ended.
+    /// Whether unfinished games survive the end of the server, a crash included.
     fn outlives_server(&self) -> bool;
-    /// Whether there is space for more games than those that go on, for which some is kept free.
+    /// Whether there is space for new games besides the reserve for running ones.
     fn has_space(&self) -> bool {
         true
     }
-    /// Begins a game with its first entries, kept together or not at all; its journal goes on through what is returned.
+    /// Creates a game with its first entries, in one commit. Returns its journal.
     fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
-    /// The games that were going on when the server ended, and those that had ended since a time (milliseconds since the Unix epoch), of
-    /// which somebody may not have heard; oldest first. One that cannot be read is left as it is, and logged.
+    /// The unfinished games, and those that have ended since a time (milliseconds since the Unix epoch),
+    /// whose clients may have missed the end; oldest first. A game that cannot be read is logged and
+    /// left unchanged.
     fn resumable_games(
         &self,
         ended_since_ms: u64,
     ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>>;
     /// A finished game, or `None`.
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
-    /// At most `count` finished games that a filter lets through, of a part of the list and in its order, with their numbers.
+    /// At most `count` finished games of a part of the list that match a filter, in its order, with
+    /// their numbers.
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
     ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>>;
-    /// Keeps the record of a game that was played elsewhere. `false` if there is a game of this id.
+    /// Stores the record of a game played elsewhere. Returns `false` if the id is taken.
     fn import(
         &self,
         game: Id,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>>;
-    /// Finished games whose record has not been written to a file.
-    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
-    /// Notes that the record of a game has been written to a file.
-    fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Begins a tournament with the first part, row 0, of what moved it, kept together or not at all.
+    /// Finished games whose record is not yet written to a file.
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
+    /// Marks the record of a game as written to a file.
+    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Creates a tournament with its first entries, row 0, in one commit.
     fn create_tournament(
         &self,
         header: Arc<TournamentHeader>,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Adds to a tournament the `row`-th part, from 1, of what moved it.
+    /// Adds row `row` (from 1) to the journal of a tournament.
     fn append_tournament(
         &self,
         tournament: Id,
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// The tournaments that are not over and, of those that are, at most the `newest_over` that were made last; oldest first. One that
-    /// cannot be read is left as it is, and logged.
+    /// The tournaments that are not over, and the `newest_over` newest ones that are; oldest first. One
+    /// that cannot be read is logged and left unchanged.
     fn tournaments(
         &self,
         newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>>;
-    /// Returns when the store can keep nothing any more; until then it waits.
+    /// Waits until the store fails for good.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
-    /// Ends in good order; nothing is asked of it afterwards.
+    /// Closes the store; it must not be used afterwards.
     fn close(&self) -> BoxFuture<'_, ()>;
 }
 
@@ -150,21 +153,22 @@ impl std::fmt::Debug for dyn Store {
     }
 }
 
-/// The journal of one game that goes on.
+/// The journal of a running game.
 pub trait Journal: Send + 'static {
-    /// Adds entries, and leaves `entries` empty. When this has returned `Ok`, they are kept; after an error their fate is unknown.
+    /// Commits entries and leaves `entries` empty. After an error it is unknown whether they were
+    /// committed.
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>>;
-    /// Says that the game is over and nothing more will be added; without a summary there is nothing to make a record of.
+    /// Marks the game as over; nothing can be added afterwards. Without a summary it has no record.
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
 }
 
-/// Who had a seat: a built-in agent is itself, whatever it was called.
+/// The identity of a seat's participant: that of a built-in agent is its agent, not its display name.
 fn identity(seat: &v1::Participant) -> &String {
     match seat.built_in_agent.is_empty() {
         true => &seat.name,
@@ -172,8 +176,8 @@ fn identity(seat: &v1::Participant) -> &String {
     }
 }
 
-/// Whether a filter lets a record through.
-fn lets_through(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool {
+/// Whether a record matches a filter.
+fn matches_filter(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool {
     let unset = 0;
     (filter.state == unset || filter.state == summary.state)
         && (filter.origin == unset || filter.origin == summary.origin)

@@ -1,4 +1,4 @@
-//! What every store does alike. Each behavior is checked with games in memory and with a database.
+//! Behavior that all stores share. Each test runs with games in memory and with a database.
 
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_room::ids::SecretHash;
@@ -12,7 +12,7 @@ use super::*;
 async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
     check(&MemoryStore::default()).await;
     let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
     check(&store).await;
     store.close().await;
 }
@@ -98,13 +98,13 @@ async fn a_cursor_reaches_every_game_that_finishes_later() {
             finish(&mut second, base + 1).await;
             let page = listed(store, before).await;
             let [(name, cursor)] = page.as_slice() else {
-                panic!("not one: {page:?}");
+                panic!("not exactly one: {page:?}");
             };
             assert_eq!(*name, format!("game {}", base + 1));
             finish(&mut first, base).await;
             let page = listed(store, *cursor).await;
             let [(name, number)] = page.as_slice() else {
-                panic!("not one: {page:?}");
+                panic!("not exactly one: {page:?}");
             };
             assert_eq!(*name, format!("game {base}"));
             assert!(number > cursor);
@@ -114,7 +114,7 @@ async fn a_cursor_reaches_every_game_that_finishes_later() {
 }
 
 #[tokio::test]
-async fn a_game_id_that_is_taken_is_refused_and_the_store_goes_on() {
+async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
     with_each_store(async |store| {
         let forged = header(1, Durability::Durable);
         let import = || store.import(forged.game_id, *summary(&forged), Arc::from([]));
@@ -124,14 +124,14 @@ async fn a_game_id_that_is_taken_is_refused_and_the_store_goes_on() {
         assert!(refused.await.is_err(), "the id is taken");
         assert!(store.failed().now_or_never().is_none(), "no failure");
 
-        // What is committed together with the refused game is committed.
+        // Commands in the same transaction as the refused one are committed.
         let others = (2..9).map(|game| created(store, game, Durability::Durable));
         let refused = store.create(header(1, Durability::Durable), vec![entry()]);
         let (mut journals, refused) = futures::join!(futures::future::join_all(others), refused);
         assert!(refused.is_err());
         finish(&mut journals[0], 2).await;
         let game = store.finished(Id([2; 16])).await.expect("readable");
-        assert!(game.is_some(), "the store goes on");
+        assert!(game.is_some(), "the store keeps working");
         assert_eq!(import().await, Ok(false));
         let taken = store.import(Id([2; 16]), *summary(&forged), Arc::from([]));
         assert_eq!(taken.await, Ok(false));

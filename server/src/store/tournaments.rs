@@ -1,41 +1,42 @@
-//! What a tournament is kept as: its header, and everything that moved it. Where its games stand is kept with the games. The form on disk
-//! belongs to the store that writes one; here are the values.
+//! The stored values of a tournament: its header and the entries of its journal. Games are stored as
+//! games. The encoding belongs to the store that needs one.
 
 use chefshat_proto::v1;
 use chefshat_tournament::Change;
 
 use chefshat_room::ids::{Id, SecretHash};
 
-/// Everything about a tournament that stands before anybody joins.
+/// The header of a tournament, which exists before anybody joins.
 #[derive(Debug, Clone)]
 pub struct TournamentHeader {
     /// The tournament.
     pub id: Id,
-    /// What it is, every field set.
+    /// The settings, every field set.
     pub settings: v1::TournamentSettings,
-    /// When it was made, milliseconds since the Unix epoch.
+    /// When it was created, milliseconds since the Unix epoch.
     pub created_at_ms: u64,
     /// The join code, in its normal form.
     pub join_code: String,
-    /// The owner's token, hashed.
+    /// The hash of the owner token.
     pub owner: SecretHash,
-    /// What games that are dealt alike are dealt from.
+    /// The seed of games with shared deals.
     pub deal_secret: [u8; 32],
 }
 
-/// One thing that moved a tournament.
+/// An entry of a tournament's journal.
 #[derive(Debug, Clone)]
 pub enum TournamentEntry {
     /// A change of its core.
     Change(Change),
-    /// Somebody joined; the ticket, hashed.
+    /// A participant joined.
     Ticket {
         /// Number of the participant, whose change came before.
         participant: usize,
-        /// The hash.
+        /// The hash of its ticket.
         ticket: SecretHash,
     },
-    /// A game was given a room, before that was made. A later one of the same game takes the place of an earlier.
+    /// A game was assigned a room, before the room is created. A later entry for the same game replaces
+    /// an earlier one.
     Placed {
         /// Number of the game in the tournament.
         game: usize,
@@ -47,19 +48,19 @@ pub enum TournamentEntry {
 }
 
 impl TournamentEntry {
-    /// Whether the tournament is over with it.
+    /// Whether it ends the tournament.
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Change(Change::Finished | Change::Closed))
     }
 }
 
-/// A tournament as it was kept.
+/// A tournament in the store.
 #[derive(Debug, Clone)]
 pub struct StoredTournament {
     /// Its header.
     pub header: TournamentHeader,
-    /// Everything that moved it, in order.
+    /// The entries of its journal, in order.
     pub entries: Vec<TournamentEntry>,
-    /// Rows that this took.
+    /// Number of rows of the journal.
     pub rows: u64,
 }

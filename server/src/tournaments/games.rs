@@ -1,6 +1,6 @@
-//! The games of a tournament and their rooms: a game that is called is given a room, its participants are told where it is, and when it has
-//! ended what came of it is read from the store, so that it counts once, whenever the server ended in between. When games are called and what
-//! counts is the core's.
+//! The games of a tournament and their rooms: a called game is assigned a room, its participants are
+//! notified, and after its end its result is read from the store, so that it counts exactly once even
+//! if the server restarts in between. The core decides when games are called and what counts.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
 impl Task {
-    /// Gives a game a room, which is made when that is kept.
+    /// Assigns a room to a game. The room is created once that is committed.
     pub(super) fn place(&mut self, game: usize) {
         let (room_id, game_id) = (Id::random(), Id::random());
         if let Some(deal) = self.state.core.games()[game].deal {
@@ -37,8 +37,8 @@ impl Task {
         });
     }
 
-    /// Takes in what came of games that have ended.
-    pub(super) async fn look_at_games(&mut self) -> Result<(), StoreError> {
+    /// Reads the results of games that have ended.
+    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
         let playing: Vec<usize> = self.state.core.playing().collect();
         for game in playing {
             if self.unmade.contains(&game) {
@@ -58,7 +58,7 @@ impl Task {
                     let change = self.state.core.ended(game, ended);
                     self.fold_all(change.into_iter().collect());
                 }
-                // The server ended before the room was made, or with it: nothing was played that could count.
+                // The server ended before the room was created, or together with it: nothing that counts was played.
                 None if !self.rooms.is_shutting_down() => self.place(game),
                 None => {}
             }
@@ -66,20 +66,20 @@ impl Task {
         Ok(())
     }
 
-    /// What came of a game whose room is over or gone; `None` if nothing did, and that was nobody's fault.
+    /// The result of a game whose room is over or gone; `None` if it must be played again.
     async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
-        // A record with this id that was imported is not the tournament's game.
+        // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.hosted.id())
         };
-        if let Some(kept) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
+        if let Some(stored) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
             let told = tokio::task::spawn_blocking(move || {
-                let lines = convert::lines_of(&kept);
+                let lines = convert::lines_of(&stored);
                 (outcome::outcome(&lines), abort_reason(&lines))
             });
             let (outcome, reason) = told
                 .await
-                .map_err(|error| StoreError::Failed(format!("a record was not read: {error}")))?;
+                .map_err(|error| StoreError::Failed(format!("reading a record failed: {error}")))?;
             return Ok(match (outcome, reason) {
                 (Ok(outcome), _) => Some(Ended::Played {
                     shifts: outcome.shifts,
@@ -100,12 +100,12 @@ impl Task {
         };
         Ok(match described.abort_reason() {
             v1::AbortReason::Shutdown => None,
-            // Who was there when it was given up is not known any more.
+            // The participants present at that time are unknown.
             _ if !self.seen.contains(&game) => None,
             _ => {
                 let seats = self.state.core.games()[game].seats.clone();
-                let away = described.seats.iter().zip(seats);
-                let missing = away
+                let disconnected = described.seats.iter().zip(seats);
+                let missing = disconnected
                     .filter(|(seat, _)| !seat.connected)
                     .map(|(_, participant)| participant)
                     .collect();
@@ -114,7 +114,7 @@ impl Task {
         })
     }
 
-    /// Makes the rooms of games that were called, and tells their participants.
+    /// Creates the rooms of called games and notifies their participants.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
         if self.unmade.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
             return Ok(());
@@ -134,13 +134,13 @@ impl Task {
                     self.has_changed = true;
                     self.call(game);
                 }
-                // It gets other ids.
+                // It gets new ids.
                 Err(CreateError::Store(StoreError::Taken(id))) => {
                     warn!(tournament = %self.hosted.id(), %id, "the id of a game is taken");
                     self.place(game);
                 }
                 Err(CreateError::Store(error)) => return Err(error),
-                // When the server is back, the game is given a room anew.
+                // When the server is restarted, the game is assigned a new room.
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
                 Err(error) => {
                     if self.retry.replace(retry()).is_none() {
@@ -152,7 +152,7 @@ impl Task {
         Ok(())
     }
 
-    /// Tells the participants of a game that are connected where it is played.
+    /// Notifies the connected participants of a game of its room.
     fn call(&mut self, game: usize) {
         let Some((room, _)) = self.state.placed.get(&game).copied() else {
             return;
@@ -164,12 +164,12 @@ impl Task {
             }
             let connection = self.connections.get(participant);
             if connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room))) {
-                self.away(*participant);
+                self.disconnected(*participant);
             }
         }
     }
 
-    /// The room of a game.
+    /// The settings of the room of a game.
     fn new_room(&self, number: usize) -> NewRoom {
         let state = &self.state;
         let game = &state.core.games()[number];
@@ -239,7 +239,7 @@ fn retry() -> Instant {
     Instant::now() + TOURNAMENT_RETRY
 }
 
-/// Whether a participant has a seat of its own in a game.
+/// Whether a participant has its own seat in a game.
 pub(super) fn plays_itself(game: &Game, participant: usize) -> bool {
     game.seats.contains(&participant) && !game.forfeited.contains(&participant)
 }

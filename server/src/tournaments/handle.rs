@@ -1,4 +1,4 @@
-//! One tournament as services reach it: what it shows of itself, and a handle to the task that moves it. What happens when is the task's.
+//! The handle of one tournament: what others can read of it, and messages to its task.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -16,30 +16,31 @@ use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 
-/// What a stream is told that is attached to a participant.
+/// A message to a stream that is attached to a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Call {
-    /// Its game is to be played in this room.
+    /// Its game is played in this room.
     Seat(Id),
-    /// A newer connection has the participant.
+    /// A newer connection has taken over the participant.
     Superseded,
     /// The tournament is over.
     Over,
 }
 
-/// The way to a stream that is attached to a participant.
+/// A stream that is attached to a participant.
 #[derive(Clone)]
 pub struct Connection {
     /// Number of the participant's attachment on the stream.
     pub handle: u32,
-    /// Takes what the participant is told.
+    /// Sends the participant's calls.
     pub calls: mpsc::Sender<(u32, Call)>,
-    /// The stream.
+    /// Cancels the stream.
     pub outbox: Arc<Outbox>,
 }
 
 impl Connection {
-    /// Tells the stream; `false` if it is gone, or has not taken what it was told before: then it is ended, so that its client comes anew.
+    /// Sends a call; `false` if the stream is gone or too many calls wait. In the latter case the stream
+    /// is ended, so that its client reconnects.
     pub(super) fn call(&self, call: Call) -> bool {
         let told = self.calls.try_send((self.handle, call)).is_ok();
         if !told {
@@ -49,18 +50,18 @@ impl Connection {
     }
 }
 
-/// Asks to take part.
+/// A request to join.
 #[derive(Debug)]
 pub struct Entry {
-    /// Name to show.
+    /// Display name.
     pub name: String,
-    /// What joins.
+    /// Kind of participant.
     pub kind: ParticipantKind,
-    /// Games it can play at a time.
+    /// Most games it can play at a time.
     pub max_games: usize,
-    /// Declares that it remembers nothing.
+    /// Declares that it is stateless.
     pub stateless: bool,
-    /// Identifies the request when it is repeated.
+    /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
 }
 
@@ -80,7 +81,7 @@ impl Entry {
 /// Why a participant cannot join.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JoinRefusal {
-    /// By the rules of the tournament.
+    /// The rules of the tournament refuse it.
     #[error(transparent)]
     Rules(#[from] JoinProblem),
     /// The request id was used for another participant.
@@ -90,7 +91,7 @@ pub enum JoinRefusal {
     RequestIdUsed,
 }
 
-/// The tournament moves no more: the server ends.
+/// The tournament's task has stopped because the server ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped;
 
@@ -102,20 +103,21 @@ pub(super) enum Message {
     Left(usize, u64),
 }
 
-/// The state of a tournament. Its task has one with pending changes; the handle has one with committed changes alone, for readers.
+/// The state of a tournament. Its task has one with pending changes; the handle has one with only
+/// committed changes, for readers.
 #[derive(Debug, Clone)]
 pub(super) struct TournamentState {
     pub(super) core: Tournament,
-    /// Tickets of participants, hashed; built-in ones have none.
+    /// Hashed tickets of participants; built-in ones have none.
     pub(super) tickets: BTreeMap<usize, SecretHash>,
-    /// Rooms and games that games of the tournament are or were played in.
+    /// Rooms and game ids of the tournament's games.
     pub(super) placed: BTreeMap<usize, (Id, Id)>,
-    /// Numbers of the connections that have participants now.
+    /// Ids of the connections that have participants now.
     pub(super) connected: BTreeMap<usize, u64>,
 }
 
 impl TournamentState {
-    /// The state before anybody has joined.
+    /// The initial state.
     pub(super) fn new(core: Tournament) -> Self {
         Self {
             core,
@@ -133,7 +135,7 @@ impl TournamentState {
             .map(|(participant, _)| *participant)
     }
 
-    /// The answer to a request that was answered before; `None` if it is new.
+    /// The answer to an earlier request with the same id; `None` if the request is new.
     pub(super) fn joined_before(
         &self,
         entry: &Entry,
@@ -164,7 +166,7 @@ impl TournamentState {
         }
     }
 
-    /// Notes the connection that a participant has now, if any. Connections are not part of the journal.
+    /// Sets or clears the connection of a participant. Connections are not part of the journal.
     pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
         match connection {
             Some(number) => drop(self.connected.insert(participant, number)),
@@ -173,7 +175,7 @@ impl TournamentState {
         self.core.set_present(participant, connection.is_some());
     }
 
-    /// All deals that games share.
+    /// All deals that several games share.
     pub(super) fn deals(&self) -> BTreeSet<u32> {
         let games = self.core.games().iter();
         games.filter_map(|game| game.deal).collect()
@@ -185,16 +187,16 @@ impl TournamentState {
 pub struct TournamentHandle {
     pub(super) header: TournamentHeader,
     pub(super) plan: TournamentPlan,
-    /// With committed changes alone.
+    /// The state with only committed changes.
     pub(super) committed: Mutex<TournamentState>,
     pub(super) mailbox: mpsc::Sender<Message>,
-    /// Counts what has happened.
+    /// Counts changes.
     pub(super) changes: watch::Sender<u64>,
     pub(super) shown: Shown,
 }
 
 impl TournamentHandle {
-    /// Which tournament.
+    /// Its id.
     pub fn id(&self) -> Id {
         self.header.id
     }
@@ -216,10 +218,10 @@ impl TournamentHandle {
         self.committed().participant_of(&SecretHash::of(secret))
     }
 
-    /// Takes part; gives the participant's number and its ticket.
+    /// Joins; returns the participant's number and its ticket.
     ///
     /// # Errors
-    /// The server ends, or (inside) why it cannot.
+    /// The server ends, or (inner result) the request is refused.
     pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinRefusal>, Stopped> {
         // A repeated request is answered in every state of the tournament.
         let repeated = entry.request_id.and_then(|_| {
@@ -235,14 +237,14 @@ impl TournamentHandle {
         }
     }
 
-    /// Begins.
+    /// Starts it.
     ///
     /// # Errors
-    /// The server ends, or (inside) why it cannot.
+    /// The server ends, or (inner result) it cannot start.
     pub async fn begin(&self) -> Result<Result<(), BeginProblem>, Stopped> {
         match self.ask(Message::Begin).await {
             Err(Stopped) if self.is_over() => Ok(Err(BeginProblem::Started)),
-            begun => begun,
+            started => started,
         }
     }
 
@@ -257,7 +259,7 @@ impl TournamentHandle {
         }
     }
 
-    /// Attaches a stream to a participant; `number` is the connection's own.
+    /// Attaches a stream to a participant; `number` is the id of the connection.
     pub async fn enter(&self, participant: usize, number: u64, connection: Connection) {
         let message = Message::Enter(participant, number, connection);
         if let Err(mpsc::error::SendError(Message::Enter(_, _, connection))) =
@@ -266,15 +268,15 @@ impl TournamentHandle {
         {
             connection.call(Call::Over);
         }
-        // Otherwise the server ends, and the stream with it.
+        // On failure the server ends, and the stream with it.
     }
 
-    /// Whether this connection is the one that has the participant.
+    /// Whether this is the newest connection of the participant.
     pub fn is_newest(&self, participant: usize, number: u64) -> bool {
         self.committed().connected.get(&participant) == Some(&number)
     }
 
-    /// The stream with this number has left a participant.
+    /// Detaches the stream with this number from a participant.
     pub async fn left(&self, participant: usize, number: u64) {
         let _ = self.mailbox.send(Message::Left(participant, number)).await;
     }
@@ -292,27 +294,27 @@ impl TournamentHandle {
         self.plan.kinds.is_empty() || self.plan.kinds.contains(&kind)
     }
 
-    /// Counts what has happened.
+    /// Counts changes.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
     }
 
-    /// Whether it has ended, one way or the other.
+    /// Whether it is finished or closed.
     pub fn is_over(&self) -> bool {
         self.committed().core.state().is_over()
     }
 
-    /// The tournament as everybody sees it.
+    /// The public view of the tournament.
     pub fn describe(&self) -> v1::Tournament {
         self.described(&self.committed().core)
     }
 
-    /// The same without its participants.
+    /// The public view without participants.
     pub fn describe_briefly(&self) -> v1::Tournament {
         self.outlined(&self.committed().core)
     }
 
-    /// A tournament that stood so, as everybody sees it.
+    /// The public view of a state of the tournament.
     pub(super) fn described(&self, core: &Tournament) -> v1::Tournament {
         v1::Tournament {
             participants: convert::tournament_participants(core),
@@ -324,7 +326,7 @@ impl TournamentHandle {
         let state = core.state();
         let mut settings = self.header.settings.clone();
         if !state.is_over() {
-            // Who knows it could work out the draws to come.
+            // With the seed, the coming draws could be computed.
             settings.draw_seed.clear();
             settings.deal_seed.clear();
         }
@@ -342,14 +344,14 @@ impl TournamentHandle {
         }
     }
 
-    /// Its games from the one with this number on, with what has come of them; at most `most`.
+    /// At most `most` of its games from this number on, with their results.
     pub fn games(&self, from: usize, most: usize) -> Vec<v1::TournamentGame> {
         let state = self.committed();
         let numbers = (from..state.core.games().len()).take(most);
         numbers.map(|number| self.game(&state, number)).collect()
     }
 
-    /// One of its games, with what has come of it.
+    /// One of its games, with its result.
     pub(super) fn game(&self, state: &TournamentState, number: usize) -> v1::TournamentGame {
         let game = &state.core.games()[number];
         let placed = state.placed.get(&number).copied();
@@ -362,12 +364,13 @@ impl TournamentHandle {
         self.plan.deal_seed.is_none()
     }
 
-    /// What `look` makes of the tournament.
+    /// Reads the committed state of the core.
     pub fn look<T>(&self, look: impl FnOnce(&Tournament) -> T) -> T {
         look(&self.committed().core)
     }
 
-    /// Closes the rooms of games that go on although the tournament is over: it was closed, perhaps just before the server ended.
+    /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just before
+    /// the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
         let placed: Vec<Id> = (self.committed().placed.values())
             .map(|(room, _)| *room)
@@ -389,7 +392,7 @@ impl TournamentHandle {
         }
     }
 
-    /// Of some deals, withholds what could tell those that are still to be played, and gives free the others.
+    /// Withholds the records of these deals that are still to be played, and releases the others.
     pub(super) fn withhold(&self, deals: &BTreeSet<u32>, rooms: &Rooms) {
         let state = self.committed();
         let over = state.core.state().is_over();
@@ -399,18 +402,18 @@ impl TournamentHandle {
         }
     }
 
-    /// The id of the games that are dealt alike.
+    /// The id of the series of games with this deal.
     pub(super) fn series(&self, deal: u32) -> Id {
         let hash = self.of_deal(b"chefshat.v1 series", deal);
         Id(std::array::from_fn(|index| hash[index]))
     }
 
-    /// The server's part of the seed of the games that are dealt alike.
+    /// The server's part of the seed of games with this deal.
     pub(super) fn server_seed(&self, deal: u32) -> [u8; 32] {
         self.of_deal(b"chefshat.v1 deal", deal)
     }
 
-    /// The seed of a game whose deals the owner fixed.
+    /// The seed of a game whose deals the owner has set.
     pub(super) fn game_seed(&self, number: usize, deal: Option<u32>) -> Option<[u8; 32]> {
         let seed = self.plan.deal_seed?;
         let number = u64::try_from(number).unwrap_or(u64::MAX);
@@ -425,7 +428,7 @@ impl TournamentHandle {
     }
 
     pub(super) fn committed(&self) -> MutexGuard<'_, TournamentState> {
-        (self.committed.lock()).expect("nothing that holds this lock can panic")
+        (self.committed.lock()).expect("no code that holds this lock can panic")
     }
 
     async fn ask<T>(

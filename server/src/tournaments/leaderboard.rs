@@ -1,6 +1,7 @@
-//! The ratings of all who have played a rated game on this server, worked out from the summaries of its games. They are worked out anew when
-//! somebody asks and games have ended since, but not more often than [`LEADERBOARD_AGE`] and [`LEADERBOARD_PART`] allow: all summaries are read
-//! each time, since ratings go by when games ended, which is not the order in which the store has them.
+//! The ratings of all participants of rated games on this server, computed from the summaries of its
+//! games. They are recomputed on request if games have ended since, as often as [`LEADERBOARD_AGE`]
+//! and [`LEADERBOARD_SHARE`] allow: all summaries are read each time, because ratings follow the order
+//! in which games ended, which is not the order of the store.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,15 +13,15 @@ use chefshat_record::outcome::Identity;
 use chefshat_tournament::ratings::Ratings;
 use tokio::time::Instant;
 
-use super::shared::{NotWorkedOut, Shared};
-use crate::config::{LEADERBOARD_AGE, LEADERBOARD_PART};
+use super::shared::{ComputeError, Shared};
+use crate::config::{LEADERBOARD_AGE, LEADERBOARD_SHARE};
 use crate::rooms::Rooms;
 use crate::store::{Part, Store, StoreError};
 
 /// Summaries read at a time.
 const PAGE: usize = 1_000;
 
-/// A rated game: when it ended, its id, and who took which place.
+/// A rated game: when it ended, its id, and the places of its participants.
 type RatedGame = (u64, String, Vec<(Identity, u32)>);
 
 /// The leaderboard of a server.
@@ -30,27 +31,27 @@ pub struct Leaderboard {
     known: Shared<Board>,
 }
 
-/// Ratings that were worked out.
+/// Computed ratings.
 #[derive(Debug)]
 struct Board {
     ratings: Arc<Ratings<Identity>>,
-    /// Games that had ended before.
+    /// Number of games that had ended before.
     ended: u64,
-    /// When they had been worked out, and how long that took.
+    /// When they were computed, and how long that took.
     at: Instant,
     took: Duration,
 }
 
 impl Board {
-    /// Whether it can be shown when so many games have ended.
-    fn serves(&self, ended: u64) -> bool {
-        let rest = LEADERBOARD_AGE.max(self.took * LEADERBOARD_PART);
+    /// Whether it is still valid after this number of ended games.
+    fn is_current(&self, ended: u64) -> bool {
+        let rest = LEADERBOARD_AGE.max(self.took * LEADERBOARD_SHARE);
         self.ended == ended || self.at.elapsed() < rest
     }
 }
 
 impl Leaderboard {
-    /// The leaderboard of the games of these rooms' store.
+    /// Creates the leaderboard of the games in these rooms' store.
     pub fn new(rooms: Arc<Rooms>) -> Self {
         Self {
             rooms,
@@ -58,16 +59,16 @@ impl Leaderboard {
         }
     }
 
-    /// The ratings as they are now, or were a moment ago.
+    /// The current ratings, at most a moment old.
     ///
     /// # Errors
-    /// The store's.
-    pub async fn ratings(&self) -> Result<Arc<Ratings<Identity>>, NotWorkedOut> {
+    /// The store failed.
+    pub async fn ratings(&self) -> Result<Arc<Ratings<Identity>>, ComputeError> {
         let rooms = Arc::clone(&self.rooms);
         let work = async move {
             let (began, ended) = (Instant::now(), rooms.ended());
             let games = rated_games(rooms.store().as_ref()).await?;
-            let folding = tokio::task::spawn_blocking(move || folded(games));
+            let folding = tokio::task::spawn_blocking(move || restored(games));
             Ok(Board {
                 ratings: Arc::new(folding.await?),
                 ended,
@@ -76,7 +77,10 @@ impl Leaderboard {
             })
         };
         let ended = self.rooms.ended();
-        let board = self.known.get(|board| board.serves(ended), work).await?;
+        let board = self
+            .known
+            .get(|board| board.is_current(ended), work)
+            .await?;
         Ok(Arc::clone(&board.ratings))
     }
 }
@@ -106,17 +110,17 @@ async fn rated_games(store: &dyn Store) -> Result<Vec<RatedGame>, StoreError> {
 }
 
 /// The ratings after these games, in the order in which they ended.
-fn folded(mut games: Vec<RatedGame>) -> Ratings<Identity> {
+fn restored(mut games: Vec<RatedGame>) -> Ratings<Identity> {
     games.sort_by(|one, other| (one.0, &one.1).cmp(&(other.0, &other.1)));
     let mut ratings = Ratings::default();
     for (_, _, placed) in &games {
-        // Those that tell nothing were left out before.
+        // Games without information were left out before.
         let _ = ratings.fold(placed);
     }
     ratings
 }
 
-/// Who took which place in a game that is rated; `None` if it is not.
+/// The places in a rated game; `None` if it is not rated.
 fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
     let replayed = |seat: &v1::Participant| seat.built_in_agent == BuiltInAgent::REPLAY;
     if summary.substituted || summary.seats.iter().any(replayed) {
@@ -128,7 +132,7 @@ fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
     let placed: BTreeMap<Identity, u32> = (summary.seats.iter())
         .map(|seat| Some((Identity::of(seat), *places.get(&seat.seat)?)))
         .collect::<Option<_>>()?;
-    // Who had more than one seat stands there once.
+    // A participant with more than one seat is listed once.
     let all_differ = placed.len() == summary.seats.len();
     (all_differ && placed.len() >= 2).then(|| placed.into_iter().collect())
 }
@@ -147,20 +151,20 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_board_serves_until_games_have_ended_and_it_has_its_age() {
+    async fn a_board_is_valid_until_it_is_old_and_games_have_ended() {
         let board = board(3, Duration::ZERO);
-        assert!(board.serves(3) && board.serves(4));
+        assert!(board.is_current(3) && board.is_current(4));
         tokio::time::advance(LEADERBOARD_AGE).await;
-        assert!(board.serves(3));
-        assert!(!board.serves(4));
+        assert!(board.is_current(3));
+        assert!(!board.is_current(4));
     }
 
     #[tokio::test(start_paused = true)]
-    async fn one_that_took_long_serves_long() {
+    async fn a_board_that_took_long_is_valid_for_longer() {
         let board = board(3, LEADERBOARD_AGE);
-        tokio::time::advance(LEADERBOARD_AGE * (LEADERBOARD_PART - 1)).await;
-        assert!(board.serves(4));
+        tokio::time::advance(LEADERBOARD_AGE * (LEADERBOARD_SHARE - 1)).await;
+        assert!(board.is_current(4));
         tokio::time::advance(LEADERBOARD_AGE).await;
-        assert!(!board.serves(4));
+        assert!(!board.is_current(4));
     }
 }

@@ -1,5 +1,5 @@
-//! The tournaments of a server: making them, finding them, going on with them after the server ended. Who plays whom and what counts is
-//! decided in `chefshat_tournament`; a tournament is moved by its `task`.
+//! The tournaments of a server: creates, finds and resumes them. `chefshat_tournament` decides
+//! pairings and results; `task` runs one tournament.
 
 mod games;
 mod handle;
@@ -21,7 +21,7 @@ use tracing::{error, info};
 
 pub use handle::{Call, Connection, Entry, JoinRefusal, Stopped, TournamentHandle};
 pub use leaderboard::Leaderboard;
-pub use shared::NotWorkedOut;
+pub use shared::ComputeError;
 
 use crate::clock::since_epoch_ms;
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
@@ -35,25 +35,25 @@ use shown::Shown;
 use table::Table;
 use task::{Stop, Task};
 
-/// Why no tournament was made.
+/// Why a tournament was not created.
 #[derive(Debug, thiserror::Error)]
 pub enum CreateProblem {
-    /// It cannot be held so.
+    /// A setting is invalid.
     #[error(transparent)]
     Settings(#[from] SettingsProblem),
     /// The limit of tournaments is reached.
-    #[error("the server holds {0} tournaments that are not over; close one or try later")]
+    #[error("the server has {0} tournaments that are not over; close one or try later")]
     TooMany(usize),
-    /// The request id was used for a tournament with other content.
+    /// The request id was used for another tournament.
     #[error("this request id was used to create another tournament; draw a new one")]
     RequestIdUsed,
-    /// The server takes no new tournaments.
-    #[error("the server is shutting down and takes no new tournaments")]
+    /// The server is shutting down.
+    #[error("the server is shutting down and accepts no new tournaments")]
     ShuttingDown,
-    /// There is no space for more games.
-    #[error("the server's disk is nearly full; what is left is kept for games that go on")]
+    /// The disk has no space for more games.
+    #[error("the server's disk is nearly full; the rest is reserved for running games")]
     DiskNearlyFull,
-    /// The store refused.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
@@ -70,7 +70,7 @@ pub struct Tournaments {
 }
 
 impl Tournaments {
-    /// No tournaments yet. A shutdown waits for what `tracker` tracks.
+    /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
     pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         Arc::new(Self {
             rooms,
@@ -81,7 +81,7 @@ impl Tournaments {
         })
     }
 
-    /// Makes a tournament; gives its owner's token with it.
+    /// Creates a tournament. Returns it with its owner token.
     ///
     /// # Errors
     /// See [`CreateProblem`].
@@ -100,7 +100,7 @@ impl Tournaments {
         }
         let owner = request.map_or_else(|| Token::random(Id::random()), |key| key.owner());
         let reservation = loop {
-            // A request that is repeated while its tournament is being created waits for that tournament.
+            // A repetition of a request whose tournament is still being created waits for it.
             let created = self.created.notified();
             if let Some(hosted) = self.get(owner.room) {
                 return match hosted.header.owner.matches(&owner.secret) {
@@ -113,62 +113,64 @@ impl Tournaments {
                 None => created.await,
             }
         };
-        // Made to the end even if whoever asked for it goes away: what is half made would be kept, and be there when the server is back.
+        // Runs to completion even if the caller is cancelled: a half-created tournament would be stored and
+        // restored with the server.
         let making = self
             .tracker
             .spawn(reservation.make(name.to_owned(), plan, core));
         making
             .await
-            .map_err(|error| StoreError::Failed(format!("a tournament was not made: {error}")))?
+            .map_err(|error| StoreError::Failed(format!("creating a tournament failed: {error}")))?
     }
 
-    /// Goes on with the tournaments of the store, and says how many were not over. The rooms must be there already.
+    /// Resumes the tournaments of the store and returns how many are not over. The rooms must be restored
+    /// already.
     ///
     /// # Errors
-    /// The store's.
+    /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
-        let mut going_on = 0;
-        for kept in self.rooms.store().tournaments(MAX_TOURNAMENTS).await? {
-            let id = kept.header.id;
-            match folded(&kept) {
+        let mut unfinished = 0;
+        for stored in self.rooms.store().tournaments(MAX_TOURNAMENTS).await? {
+            let id = stored.header.id;
+            match restored(&stored) {
                 Ok((plan, state)) => {
-                    going_on += usize::from(state.core.state() == State::Playing);
-                    self.take_up(kept.header, kept.rows, plan, state);
+                    unfinished += usize::from(state.core.state() == State::Playing);
+                    self.start_task(stored.header, stored.rows, plan, state);
                 }
                 Err(problem) => {
-                    // What it would withhold is not known.
+                    // The deals it would withhold are unknown.
                     self.rooms.withhold(id, true);
-                    error!(tournament = %id, %problem, "a tournament cannot be gone on with; it is left as it is");
+                    error!(tournament = %id, %problem, "a tournament cannot be resumed; it is left unchanged");
                 }
             }
         }
-        if going_on > 0 {
-            info!(tournaments = going_on, "tournaments go on where they stood");
+        if unfinished > 0 {
+            info!(tournaments = unfinished, "tournaments resumed");
         }
-        Ok(going_on)
+        Ok(unfinished)
     }
 
-    /// No game is called or counted any more; those that end from here on count when the server is back.
+    /// Stops calling and counting games; those that end from here on count when the server is restarted.
     pub fn stop(&self) {
         self.stop.no_more_games.cancel();
     }
 
-    /// No tournament does anything any more.
+    /// Ends the tasks of all tournaments.
     pub fn end(&self) {
         self.stop.end.cancel();
     }
 
-    /// A tournament by its id.
+    /// The tournament with this id.
     pub fn get(&self, id: Id) -> Option<Arc<TournamentHandle>> {
         self.lock().get(id).cloned()
     }
 
-    /// A tournament by its join code.
+    /// The tournament with this join code.
     pub fn by_code(&self, code: &str) -> Option<Arc<TournamentHandle>> {
         self.lock().by_code(&normal_code(code)).cloned()
     }
 
-    /// Whether a tournament has announced a game of this id.
+    /// Whether a tournament has announced a game with this id.
     pub fn has_announced(&self, game: Id) -> bool {
         let all: Vec<_> = (self.lock().earlier(None))
             .map(|(_, hosted)| Arc::clone(hosted))
@@ -179,8 +181,8 @@ impl Tournaments {
         all.iter().any(announces)
     }
 
-    /// The newest `count` tournaments in this state, or in any; or of those made before the one numbered `before`. With their numbers, newest
-    /// first.
+    /// The newest `count` tournaments in this state, or in any; only those created before number `before`,
+    /// if set. With their numbers, newest first.
     pub fn newest(
         &self,
         before: Option<u64>,
@@ -190,7 +192,7 @@ impl Tournaments {
         let is_wanted = |hosted: &TournamentHandle| {
             state.is_none_or(|state| hosted.look(Tournament::state) == state)
         };
-        // Looked at when the table is free again: each may be busy for a moment.
+        // Read after the table is unlocked: each may be busy for a moment.
         let earlier: Vec<_> = (self.lock().earlier(before))
             .map(|(number, hosted)| (number, Arc::clone(hosted)))
             .collect();
@@ -198,8 +200,8 @@ impl Tournaments {
         wanted.take(count).collect()
     }
 
-    /// Enters a tournament into the table and lets it move.
-    fn take_up(
+    /// Adds a tournament to the table and starts its task.
+    fn start_task(
         &self,
         header: TournamentHeader,
         rows: u64,
@@ -216,7 +218,7 @@ impl Tournaments {
             shown: Shown::default(),
         });
         self.lock().enter(Arc::clone(&hosted));
-        // Before anybody can ask for a record.
+        // Before any client can request a record.
         let deals = hosted.committed().deals();
         hosted.withhold(&deals, &self.rooms);
         if hosted.is_over() {
@@ -229,7 +231,7 @@ impl Tournaments {
     }
 
     fn lock(&self) -> MutexGuard<'_, Table> {
-        (self.table.lock()).expect("nothing that holds this lock can panic")
+        (self.table.lock()).expect("no code that holds this lock can panic")
     }
 }
 
@@ -278,7 +280,7 @@ impl Reservation {
             .await?;
         let mut state = TournamentState::new(core);
         entries.iter().for_each(|entry| state.apply(entry));
-        Ok((tournaments.take_up(header, 1, plan, state), owner))
+        Ok((tournaments.start_task(header, 1, plan, state), owner))
     }
 }
 
@@ -289,7 +291,8 @@ impl Drop for Reservation {
     }
 }
 
-/// The built-in participants of a tournament, each named after its agent, numbered where there are several.
+/// The built-in participants of a tournament, named after their agents, numbered if there are several
+/// of one.
 fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
     let mut entrants: Vec<Entrant> = Vec::new();
     for kind in &plan.built_in {
@@ -311,12 +314,12 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
     entrants
 }
 
-/// A tournament as it stood, from what was kept of it.
-fn folded(kept: &StoredTournament) -> Result<(TournamentPlan, TournamentState), String> {
-    let plan = convert::tournament_plan(&kept.header.settings, [0; 32])
+/// Restores the state of a stored tournament.
+fn restored(stored: &StoredTournament) -> Result<(TournamentPlan, TournamentState), String> {
+    let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
         .map_err(|problem: FieldProblem| problem.to_string())?;
     let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
     let mut state = TournamentState::new(core);
-    kept.entries.iter().for_each(|entry| state.apply(entry));
+    stored.entries.iter().for_each(|entry| state.apply(entry));
     Ok((plan, state))
 }

@@ -1,5 +1,5 @@
-//! What takes a while to work out and many ask for: it is worked out once for all who ask, and to its end even if they all go away. What it
-//! is, and how long it serves, is the affair of those who use this.
+//! Shares an expensive computation among concurrent callers. It runs to completion even if all callers
+//! are cancelled. Users decide what is computed and how long it stays valid.
 
 use std::sync::Arc;
 
@@ -7,24 +7,24 @@ use tokio::sync::Mutex;
 
 use crate::store::StoreError;
 
-/// Why something could not be worked out.
+/// Why a computation failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct NotWorkedOut(String);
+pub struct ComputeError(String);
 
-impl From<tokio::task::JoinError> for NotWorkedOut {
+impl From<tokio::task::JoinError> for ComputeError {
     fn from(error: tokio::task::JoinError) -> Self {
         Self(error.to_string())
     }
 }
 
-impl From<StoreError> for NotWorkedOut {
+impl From<StoreError> for ComputeError {
     fn from(error: StoreError) -> Self {
         Self(error.to_string())
     }
 }
 
-/// What was worked out last.
+/// The last computed value.
 #[derive(Debug)]
 pub(super) struct Shared<T>(Arc<Mutex<Option<Arc<T>>>>);
 
@@ -35,15 +35,15 @@ impl<T> Default for Shared<T> {
 }
 
 impl<T: Send + Sync + 'static> Shared<T> {
-    /// What was worked out last if that still `serves`, else what `work` makes anew. Whoever asks meanwhile waits, and is served by it if that
-    /// will do.
+    /// Returns the last value if it is still `valid`, else computes it with `work`. Concurrent callers
+    /// wait for that value and use it if it is valid for them.
     pub(super) async fn get(
         &self,
-        serves: impl FnOnce(&T) -> bool,
-        work: impl Future<Output = Result<T, NotWorkedOut>> + Send + 'static,
-    ) -> Result<Arc<T>, NotWorkedOut> {
+        is_current: impl FnOnce(&T) -> bool,
+        work: impl Future<Output = Result<T, ComputeError>> + Send + 'static,
+    ) -> Result<Arc<T>, ComputeError> {
         let mut known = Arc::clone(&self.0).lock_owned().await;
-        if let Some(value) = known.as_ref().filter(|value| serves(value)) {
+        if let Some(value) = known.as_ref().filter(|value| is_current(value)) {
             return Ok(Arc::clone(value));
         }
         let working = tokio::spawn(async move {
@@ -64,7 +64,7 @@ mod tests {
     use crate::tournaments::shared::*;
 
     #[tokio::test]
-    async fn it_is_worked_out_once_for_all_who_ask() {
+    async fn concurrent_callers_share_one_computation() {
         let shared = Shared::default();
         let times = Arc::new(AtomicU32::new(0));
         let ask = || {
@@ -81,21 +81,21 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn who_goes_away_does_not_throw_it_away() {
+    async fn a_cancelled_caller_does_not_discard_the_value() {
         let shared = Arc::new(Shared::default());
-        let (begun, go_on) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
+        let (started, go_on) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
         let asking = tokio::spawn({
-            let (shared, begun, go_on) = (shared.clone(), begun.clone(), go_on.clone());
+            let (shared, started, go_on) = (shared.clone(), started.clone(), go_on.clone());
             async move {
                 let work = async move {
-                    begun.notify_one();
+                    started.notify_one();
                     go_on.notified().await;
                     Ok(1)
                 };
                 shared.get(|_| true, work).await
             }
         });
-        begun.notified().await;
+        started.notified().await;
         asking.abort();
         assert!(asking.await.is_err());
         go_on.notify_one();
@@ -103,9 +103,9 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_fails_is_tried_again() {
+    async fn a_failed_computation_is_tried_again() {
         let shared = Shared::default();
-        let failed = async { Err(NotWorkedOut("no disk".into())) };
+        let failed = async { Err(ComputeError("no disk".into())) };
         assert!(shared.get(|_| true, failed).await.is_err());
         assert_eq!(shared.get(|_| true, async { Ok(2) }).await, Ok(Arc::new(2)));
     }

@@ -1,5 +1,6 @@
-//! What everybody is shown of a tournament that takes a while to work out: what its followers are told, and its results. Both are worked out
-//! on a copy, on threads that serve nobody, once for each change of the tournament, whoever asks how often.
+//! The public views of a tournament that are expensive to compute: updates for followers, and results.
+//! Both are computed on a copy, on blocking threads, once for each change, however often they are
+//! requested.
 
 use std::sync::Arc;
 
@@ -9,11 +10,11 @@ use chefshat_tournament::{Format, Game, GameState, State, Tournament};
 use tokio::sync::Semaphore;
 
 use super::handle::TournamentHandle;
-use super::shared::{NotWorkedOut, Shared};
+use super::shared::{ComputeError, Shared};
 use crate::config::MAX_GAMES_FOLLOWED;
 use crate::convert;
 
-/// A message about a tournament, and where that stood.
+/// A message about a tournament, and the state it shows.
 #[derive(Debug)]
 pub struct AsOf<M> {
     mark: Mark,
@@ -21,8 +22,9 @@ pub struct AsOf<M> {
     pub message: M,
 }
 
-/// Where a tournament stands, as far as that can be seen at once. The number of the last change comes a moment after the change; who was told
-/// that a tournament has begun or is over is not to be shown how it stood before.
+/// The state of a tournament as far as it can be read at once. The number of the last change follows
+/// a moment after the change; a client that knows that a tournament has started or is over must not
+/// see an earlier state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mark {
     change: u64,
@@ -32,38 +34,38 @@ struct Mark {
     over: usize,
 }
 
-/// What was shown last.
+/// The last computed messages.
 #[derive(Debug, Default)]
 pub(super) struct Shown {
-    told: Shared<AsOf<v1::FollowTournamentResponse>>,
+    follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
     results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
 }
 
 impl TournamentHandle {
-    /// What followers are told now. It is worked out when one of the `turns` is free.
+    /// The current update for followers. Computed when a permit is available.
     ///
     /// # Errors
-    /// It could not be worked out.
-    pub async fn told(
+    /// The computation failed.
+    pub async fn follower_update(
         self: &Arc<Self>,
         permits: &Arc<Semaphore>,
-    ) -> Result<Arc<AsOf<v1::FollowTournamentResponse>>, NotWorkedOut> {
-        let work = self.as_of_now(permits, Self::tell);
-        let serves = |told: &AsOf<_>| told.mark == self.mark();
-        self.shown.told.get(serves, work).await
+    ) -> Result<Arc<AsOf<v1::FollowTournamentResponse>>, ComputeError> {
+        let work = self.as_of_now(permits, Self::compute_update);
+        let is_current = |follower_update: &AsOf<_>| follower_update.mark == self.mark();
+        self.shown.follower_update.get(is_current, work).await
     }
 
-    /// The results now. They are worked out when one of the `turns` is free.
+    /// The current results. Computed when a permit is available.
     ///
     /// # Errors
-    /// They could not be worked out.
+    /// The computation failed.
     pub async fn results(
         self: &Arc<Self>,
         permits: &Arc<Semaphore>,
-    ) -> Result<Arc<AsOf<v1::GetTournamentResultsResponse>>, NotWorkedOut> {
-        let work = self.as_of_now(permits, Self::sum_up);
-        let serves = |results: &AsOf<_>| results.mark == self.mark();
-        self.shown.results.get(serves, work).await
+    ) -> Result<Arc<AsOf<v1::GetTournamentResultsResponse>>, ComputeError> {
+        let work = self.as_of_now(permits, Self::compute_results);
+        let is_current = |results: &AsOf<_>| results.mark == self.mark();
+        self.shown.results.get(is_current, work).await
     }
 
     fn mark(&self) -> Mark {
@@ -77,19 +79,19 @@ impl TournamentHandle {
         })
     }
 
-    /// What `work` makes of the tournament, on a thread that serves nobody.
+    /// Runs `work` on the tournament, on a blocking thread.
     fn as_of_now<M: Send + 'static>(
         self: &Arc<Self>,
         permits: &Arc<Semaphore>,
         work: fn(&Self) -> M,
-    ) -> impl Future<Output = Result<AsOf<M>, NotWorkedOut>> + Send + use<M> {
+    ) -> impl Future<Output = Result<AsOf<M>, ComputeError>> + Send + use<M> {
         let (hosted, permits) = (Arc::clone(self), Arc::clone(permits));
         async move {
-            // Nobody closes them; if somebody did, the work would merely not wait.
+            // The semaphore is never closed; if it were, the work would merely not wait.
             let permit = permits.acquire_owned().await.ok();
             let working = tokio::task::spawn_blocking(move || {
                 let _permit = permit;
-                // The message may show more than the mark says, but not less.
+                // The message may be newer than the mark, but not older.
                 let mark = hosted.mark();
                 let message = work(&hosted);
                 AsOf { mark, message }
@@ -98,8 +100,8 @@ impl TournamentHandle {
         }
     }
 
-    fn tell(&self) -> v1::FollowTournamentResponse {
-        // Copied and let go of: nobody waits while standings are worked out.
+    fn compute_update(&self) -> v1::FollowTournamentResponse {
+        // Copied, so that the lock is not held while standings are computed.
         let (core, games) = {
             let state = self.committed();
             let followed = followed(&state.core).into_iter();
@@ -113,7 +115,7 @@ impl TournamentHandle {
         }
     }
 
-    fn sum_up(&self) -> v1::GetTournamentResultsResponse {
+    fn compute_results(&self) -> v1::GetTournamentResultsResponse {
         let core = self.look(Tournament::clone);
         v1::GetTournamentResultsResponse {
             tournament: Some(self.described(&core)),
@@ -122,7 +124,7 @@ impl TournamentHandle {
         }
     }
 
-    /// The standings, with ratings from the tournament's rated games alone.
+    /// The standings, with ratings from only the tournament's rated games.
     fn standings(&self, core: &Tournament) -> Vec<v1::TournamentStanding> {
         let ratings = match self.is_rated() {
             true => core.ratings(),
@@ -132,9 +134,9 @@ impl TournamentHandle {
     }
 }
 
-/// The games that followers are told of, in order: of a round robin those that are being played, else those of the round. If there are more
-/// than [`MAX_GAMES_FOLLOWED`], those that are being played go before those that are over, the last of these before the first, and those that
-/// are due come last.
+/// The games in updates for followers, in order: the running games of a round robin, else the games
+/// of the round. If there are more than [`MAX_GAMES_FOLLOWED`], running games come first, then ended
+/// ones, the last before the first, then games that are due.
 fn followed(core: &Tournament) -> Vec<usize> {
     let (games, round) = (core.games(), core.round());
     let by_rounds = core.settings().format != Format::RoundRobin;

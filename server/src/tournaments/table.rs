@@ -1,4 +1,4 @@
-//! The list of the tournaments: in the order in which they were made, found by their ids and join codes. What a tournament is, and how it is
+//! The table of tournaments, in the order of their creation, with look-up by id and join code.
 //! made, is decided elsewhere.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -11,7 +11,7 @@ use chefshat_room::ids::Id;
 #[derive(Debug, Default)]
 pub(super) struct Table {
     next_number: u64,
-    /// In the order in which they were made.
+    /// In the order of their creation.
     by_number: BTreeMap<u64, Arc<TournamentHandle>>,
     numbers: HashMap<Id, u64>,
     codes: HashMap<String, u64>,
@@ -20,17 +20,17 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// A tournament by its id.
+    /// The tournament with this id.
     pub(super) fn get(&self, id: Id) -> Option<&Arc<TournamentHandle>> {
         self.by_number.get(self.numbers.get(&id)?)
     }
 
-    /// A tournament by its join code in capitals, without spaces and dashes.
+    /// The tournament with this join code, in capitals, without spaces and dashes.
     pub(super) fn by_code(&self, code: &str) -> Option<&Arc<TournamentHandle>> {
         self.by_number.get(self.codes.get(code)?)
     }
 
-    /// Those made before the one numbered `before`, or all; with their numbers, newest first.
+    /// The tournaments created before number `before`, or all; with their numbers, newest first.
     pub(super) fn earlier(
         &self,
         before: Option<u64>,
@@ -44,7 +44,7 @@ impl Table {
         self.in_creation.contains(&id)
     }
 
-    /// Reserves space for a tournament that is about to be created; `false` if there is none.
+    /// Reserves space for a tournament that will be created; `false` if the table is full.
     pub(super) fn reserve(&mut self, id: Id) -> bool {
         let open = self.by_number.values().filter(|hosted| !hosted.is_over());
         let has_space = open.count() + self.in_creation.len() < MAX_TOURNAMENTS;
@@ -54,12 +54,12 @@ impl Table {
         has_space
     }
 
-    /// Gives back the space reserved for a tournament.
+    /// Releases the space reserved for a tournament.
     pub(super) fn give_back(&mut self, id: Id) {
         self.in_creation.remove(&id);
     }
 
-    /// Adds a tournament. Those that are over are shown only as long as there is space for them.
+    /// Adds a tournament. Tournaments that are over are removed when the space is needed.
     pub(super) fn enter(&mut self, hosted: Arc<TournamentHandle>) {
         while self.by_number.len() >= MAX_TOURNAMENTS
             && let Some(number) = (self.by_number.iter())

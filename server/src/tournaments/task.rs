@@ -1,5 +1,5 @@
-//! The task that moves one tournament: it takes in who joins, comes and goes, lets the core say what follows, keeps it, and only then has
-//! anything done about it. What is done about games and their rooms is in `games`.
+//! The task of one tournament: receives messages, lets the core decide what follows, commits it, and
+//! only then acts on it. `games` acts on games and their rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -21,10 +21,10 @@ use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::{Id, Token};
 
-/// Messages that are taken before what follows from them is worked out.
+/// Messages that are processed before their consequences are computed.
 const MESSAGES_AT_A_TIME: usize = 64;
 
-/// How the tournaments of a server are stopped.
+/// Stops the tournaments of a server.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stop {
     /// Cancelled when no more games are called or counted. Participants are still seated in running games.
@@ -33,37 +33,37 @@ pub(super) struct Stop {
     pub(super) end: CancellationToken,
 }
 
-/// Moves a tournament until the server ends.
+/// Runs a tournament until the server ends.
 pub(super) struct Task {
     pub(super) hosted: Arc<TournamentHandle>,
     pub(super) rooms: Arc<Rooms>,
-    /// With pending changes; the handle's copy follows when they are committed.
+    /// The state with pending changes; the handle's copy follows when they are committed.
     pub(super) state: TournamentState,
-    /// Rows that have been kept.
+    /// Number of committed rows.
     rows: u64,
-    /// What is to be kept next.
+    /// Entries of the next commit.
     pub(super) unkept: Vec<TournamentEntry>,
-    /// Streams of participants, with the numbers of the connections.
+    /// Streams of participants, with their connection ids.
     pub(super) connections: BTreeMap<usize, (u64, Connection)>,
-    /// Games that were called and have no room yet.
+    /// Called games that have no room yet.
     pub(super) unmade: BTreeSet<usize>,
-    /// Games whose rooms were there since the server was started.
+    /// Games whose rooms have existed since the server was started.
     pub(super) seen: BTreeSet<usize>,
-    /// Deals of which it is to be looked whether they are still to be played.
+    /// Deals whose remaining games must be checked.
     deals: BTreeSet<u32>,
-    /// Whether something was seen to change that is not kept.
+    /// Whether something visible has changed that is not committed.
     pub(super) has_changed: bool,
-    /// When somebody last joined, or the server was started.
+    /// When a participant last joined, or the server was started.
     joined_at: Instant,
-    /// When rooms that could not be made are tried again.
+    /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
-    /// Answers that wait for what they promise to be kept.
+    /// Answers that wait for a commit.
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     began: Instant,
 }
 
 impl Task {
-    /// The task of a tournament of which so many rows have been kept.
+    /// Creates the task of a tournament with this number of committed rows.
     pub(super) fn new(hosted: Arc<TournamentHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
         let state = hosted.committed().clone();
         Self {
@@ -84,7 +84,7 @@ impl Task {
         }
     }
 
-    /// Moves the tournament until it is over, the server ends, or its store fails.
+    /// Runs the tournament until it is over, the server ends, or its store fails.
     pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: Stop) {
         let rooms = Arc::clone(&self.rooms);
         let mut messages = Vec::new();
@@ -133,7 +133,7 @@ impl Task {
             .min()
     }
 
-    /// When a tournament that nobody begins or joins is closed.
+    /// When a tournament that nobody starts or joins is closed.
     fn open_until(&self) -> Option<Instant> {
         let is_open = self.state.core.state() == State::Open;
         is_open.then(|| self.joined_at + TOURNAMENT_OPEN_TIME)
@@ -145,8 +145,8 @@ impl Task {
         }
     }
 
-    /// The tournament is over, and that is kept: rooms are closed that go on, and all participants are told. What else is asked is answered
-    /// by what can be seen of the tournament.
+    /// Runs once the end of the tournament is committed: closes running rooms and notifies all
+    /// participants. Later messages are answered from the committed state.
     async fn conclude(&mut self, mut inbox: mpsc::Receiver<Message>) {
         self.hosted.close_rooms(&self.rooms);
         for (_, connection) in std::mem::take(&mut self.connections).into_values() {
@@ -173,11 +173,11 @@ impl Task {
                 }));
             }
             Message::Begin(reply) => {
-                let begun = self.off_thread(|core| core.begin()).await?;
-                let begun = begun.map(|changes| self.fold_all(changes));
+                let started = self.off_thread(|core| core.begin()).await?;
+                let started = started.map(|changes| self.fold_all(changes));
                 self.replies.push(Box::new(move || {
-                    // Who asked may be gone.
-                    let _ = reply.send(begun);
+                    // The caller may have gone.
+                    let _ = reply.send(started);
                 }));
             }
             Message::Close(reply) => {
@@ -211,7 +211,7 @@ impl Task {
         Ok((participant, token))
     }
 
-    /// Closes the tournament; the rooms of its games follow when that is kept.
+    /// Closes the tournament; the rooms of its games are closed once that is committed.
     fn close(&mut self) {
         if let Some(change) = self.state.core.close() {
             self.fold(change);
@@ -227,13 +227,13 @@ impl Task {
             connection.call(Call::Over);
             return;
         }
-        // Known before it is called: a stream takes a seat only as long as it is the newest.
+        // Set before it is called: only the newest stream may take a seat.
         self.set_connection(participant, Some(number));
         let mut rooms = self.rooms_of(participant).into_iter();
         let reached = rooms.all(|room| connection.call(Call::Seat(room)));
         self.connections.insert(participant, (number, connection));
         if !reached {
-            self.away(participant);
+            self.disconnected(participant);
         }
     }
 
@@ -245,12 +245,12 @@ impl Task {
 
     fn left(&mut self, participant: usize, number: u64) {
         if (self.connections.get(&participant)).is_some_and(|(newest, _)| *newest == number) {
-            self.away(participant);
+            self.disconnected(participant);
         }
     }
 
-    /// A participant is not to be reached any more.
-    pub(super) fn away(&mut self, participant: usize) {
+    /// Handles a participant whose stream is gone.
+    pub(super) fn disconnected(&mut self, participant: usize) {
         self.connections.remove(&participant);
         self.set_connection(participant, None);
     }
@@ -267,7 +267,7 @@ impl Task {
             .collect()
     }
 
-    /// Folds a change and puts it where it will be kept.
+    /// Applies a change and adds it to the next commit.
     fn fold(&mut self, change: Change) {
         let placed = match &change {
             Change::Called { game, .. } => Some(*game),
@@ -288,7 +288,7 @@ impl Task {
         }
     }
 
-    /// Applies an entry and keeps it for the next commit.
+    /// Applies an entry and adds it to the next commit.
     pub(super) fn push(&mut self, entry: TournamentEntry) {
         self.state.apply(&entry);
         self.unkept.push(entry);
@@ -300,11 +300,12 @@ impl Task {
         }
     }
 
-    /// Does everything that follows now, and keeps it. Where there are to be no more games, what came is kept and nothing follows.
+    /// Computes and commits everything that follows now. With `no_more_games` only pending entries are
+    /// committed.
     async fn settle(&mut self, no_more_games: bool) -> Result<(), StoreError> {
         loop {
             if !no_more_games {
-                self.look_at_games().await?;
+                self.read_ended_games().await?;
                 self.follow().await?;
             }
             let moved = !self.unkept.is_empty();
@@ -334,10 +335,10 @@ impl Task {
         }
     }
 
-    /// Does what follows now. Where a round may have to be drawn it is worked out elsewhere.
+    /// Computes what follows now. A draw of a round runs on another thread.
     async fn follow(&mut self) -> Result<(), StoreError> {
         let now_ms = self.now_ms();
-        // With nothing being played a round may be due, which takes a while to draw.
+        // If no game is running, a round may be due, which takes a while to draw.
         let core = &self.state.core;
         let may_draw = match core.state() {
             State::Open => core.settings().start_when_joined.is_some(),
@@ -363,14 +364,15 @@ impl Task {
         }
     }
 
-    /// What `work` makes of the tournament, on a thread that serves nobody. Nobody else moves it meanwhile.
+    /// Runs `work` on the tournament's core, on a blocking thread. It cannot change meanwhile.
     async fn off_thread<T: Send + 'static>(
         &self,
         work: impl FnOnce(Tournament) -> T + Send + 'static,
     ) -> Result<T, StoreError> {
         let core = self.state.core.clone();
         let working = tokio::task::spawn_blocking(move || work(core));
-        (working.await).map_err(|error| StoreError::Failed(format!("a draw was not made: {error}")))
+        (working.await)
+            .map_err(|error| StoreError::Failed(format!("drawing a round failed: {error}")))
     }
 }
 

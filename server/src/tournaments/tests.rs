@@ -1,4 +1,4 @@
-//! Making tournaments.
+//! Creating, joining and restoring tournaments.
 
 use futures::FutureExt as _;
 
@@ -7,7 +7,7 @@ use crate::config::ServerConfig;
 use crate::store::{SqliteStore, Store};
 
 #[tokio::test]
-async fn a_tournament_is_made_to_its_end_though_nobody_waits_for_it() {
+async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = SqliteStore::open(folder.path()).await.expect("a new one");
     let store: Arc<dyn Store> = Arc::new(store);
@@ -22,25 +22,25 @@ async fn a_tournament_is_made_to_its_end_though_nobody_waits_for_it() {
         format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
         ..Default::default()
     };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("it can be held");
-    // Whoever asked goes away while it is being kept.
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    // The caller is cancelled during the commit.
     let asked = tournaments.create("Coppa", plan, None).now_or_never();
-    assert!(asked.is_none(), "it takes a while");
+    assert!(asked.is_none(), "the commit takes a while");
     tournaments.end();
     tracker.close();
     tracker.wait().await;
 
     let made = tournaments.newest(None, None, 9);
     let [(_, hosted)] = made.as_slice() else {
-        panic!("not one: {made:?}");
+        panic!("not exactly one: {made:?}");
     };
     let found = tournaments.get(hosted.id()).expect("found by its id");
     assert_eq!(found.id(), hosted.id());
     let code = hosted.join_code().to_lowercase();
     let found = tournaments.by_code(&code).expect("found by its code");
     assert_eq!(found.id(), hosted.id());
-    let kept = store.tournaments(0).await.expect("readable");
-    assert_eq!(kept.len(), 1);
+    let stored = store.tournaments(0).await.expect("readable");
+    assert_eq!(stored.len(), 1);
     assert!(tournaments.get(Id::random()).is_none());
     assert!(tournaments.by_code("").is_none());
 }
@@ -77,7 +77,7 @@ async fn readers_see_only_committed_changes() {
     let commits = Arc::clone(&store.tournament_commits);
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
     let tournaments = Tournaments::new(rooms, TaskTracker::new());
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
     let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
@@ -86,18 +86,18 @@ async fn readers_see_only_committed_changes() {
         let hosted = Arc::clone(&hosted);
         async move { hosted.join(entrant("Ada")).await }
     });
-    // The task of the tournament has taken the message and waits for the commit.
+    // The task of the tournament has received the message and waits for the commit.
     for _ in 0..100 {
         tokio::task::yield_now().await;
     }
     assert!(!joining.is_finished());
     let shown = hosted.describe().participants.len();
-    assert_eq!(shown, 4, "what is not committed is not shown");
+    assert_eq!(shown, 4, "uncommitted changes are not visible");
     commits.add_permits(1);
     joining
         .await
         .expect("no panic")
-        .expect("it runs")
+        .expect("the task runs")
         .expect("joined");
     assert_eq!(hosted.describe().participants.len(), 5);
 }
@@ -116,16 +116,20 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
         let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
         Tournaments::new(rooms, TaskTracker::new())
     };
-    // There is no space for a room: the game has its id, and waits.
+    // No room can be created: the game has its id, and waits.
     let tournaments = start(0);
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
     let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
     let mut changes = hosted.changes();
-    hosted.begin().await.expect("it runs").expect("it begins");
+    hosted
+        .begin()
+        .await
+        .expect("the task runs")
+        .expect("it can start");
     let forged = loop {
         match hosted.games(0, 1).pop().map(|game| game.game_id) {
             Some(game_id) if !game_id.is_empty() => break game_id,
-            _ => changes.changed().await.expect("the tournament is there"),
+            _ => changes.changed().await.expect("the tournament exists"),
         }
     };
     let game = Id::parse(&forged).expect("an id");
@@ -150,10 +154,13 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     let hosted = tournaments.get(id).expect("restored");
     let mut changes = hosted.changes();
     while !hosted.is_over() {
-        changes.changed().await.expect("the tournament is there");
+        changes.changed().await.expect("the tournament exists");
     }
     let games = hosted.games(0, 9);
-    assert!(store.failed().now_or_never().is_none(), "the store goes on");
+    assert!(
+        store.failed().now_or_never().is_none(),
+        "the store keeps working"
+    );
     assert!(!games.is_empty());
     for game in games {
         assert_eq!(game.state(), v1::TournamentGameState::Counted);
@@ -171,7 +178,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
         let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
         Tournaments::new(rooms, TaskTracker::new())
     };
-    let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
     let request = RequestKey::new([1; 32], b"content");
     let ada = || Entry {
         request_id: Some([2; 32]),
@@ -187,10 +194,14 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     assert!(matches!(refused, Err(CreateProblem::RequestIdUsed)));
 
     let (first, second) = tokio::join!(hosted.join(ada()), hosted.join(ada()));
-    let joined = first.expect("it runs").expect("joined");
-    assert_eq!(second.expect("it runs").expect("joined"), joined);
-    hosted.begin().await.expect("it runs").expect("it begins");
-    assert_eq!(hosted.join(ada()).await.expect("it runs"), Ok(joined));
+    let joined = first.expect("the task runs").expect("joined");
+    assert_eq!(second.expect("the task runs").expect("joined"), joined);
+    hosted
+        .begin()
+        .await
+        .expect("the task runs")
+        .expect("it can start");
+    assert_eq!(hosted.join(ada()).await.expect("the task runs"), Ok(joined));
     tournaments.end();
 
     let tournaments = start();
@@ -201,13 +212,13 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
         .expect("there");
     assert!(again == owner && hosted.is_owner(&owner.word()));
     assert_eq!(tournaments.newest(None, None, 9).len(), 1);
-    assert_eq!(hosted.join(ada()).await.expect("it runs"), Ok(joined));
+    assert_eq!(hosted.join(ada()).await.expect("the task runs"), Ok(joined));
     assert_eq!(hosted.participant_of(&joined.1.secret), Some(joined.0));
     let bo = Entry {
         name: "Bo".into(),
         ..ada()
     };
-    let refused = hosted.join(bo).await.expect("it runs");
+    let refused = hosted.join(bo).await.expect("the task runs");
     assert_eq!(refused, Err(JoinRefusal::RequestIdUsed));
     assert_eq!(hosted.describe().participants.len(), 5);
 }

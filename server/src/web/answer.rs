@@ -1,5 +1,5 @@
-//! What a browser is answered: the file that its address names, else the document itself, which knows all pages; how long it may keep
-//! that; and what the page may do there. Where the files come from is not known here.
+//! Answers a browser: with the file named by the path, else with the document, which knows all pages.
+//! Sets the headers for caching and content security.
 
 use bytes::Bytes;
 use http::{HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
@@ -9,24 +9,24 @@ use http::{HeaderMap, HeaderName, HeaderValue, Method, Request, Response, Status
 pub(super) struct File {
     /// Its media type.
     pub(super) media_type: String,
-    /// Changes when its bytes change.
+    /// A hash of its content.
     pub(super) hash: String,
-    /// What is in it.
+    /// Its content.
     pub(super) bytes: Bytes,
 }
 
-/// The document, which draws the page that the address names.
+/// The document, which draws the page named by the path.
 const DOCUMENT: &str = "index.html";
-/// Under this every file has a name that changes with what is in it.
+/// Names of files in this folder change with their content.
 const ASSETS: &str = "assets/";
-/// Said where the page is not built in.
+/// The answer if the page is not built in.
 const ABSENT: &[u8] = include_bytes!("absent.html");
 
-/// Kept for a year, and not asked for again.
-const KEEP: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
-/// Kept, but asked for again each time whether it is still right.
-const ASK_AGAIN: HeaderValue = HeaderValue::from_static("no-cache");
-/// The page takes everything from its own server, sends nothing elsewhere, and is shown in no page of another.
+/// Cached for a year, without revalidation.
+const IMMUTABLE: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
+/// Cached, but revalidated each time.
+const REVALIDATE: HeaderValue = HeaderValue::from_static("no-cache");
+/// The page loads everything from its own server, sends nothing elsewhere, and cannot be framed.
 const RULES: [(HeaderName, HeaderValue); 3] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -44,7 +44,7 @@ const RULES: [(HeaderName, HeaderValue); 3] = [
     ),
 ];
 
-/// The answer to a GET or HEAD, out of the files that `find` knows by name.
+/// The answer to a GET or HEAD request; `find` looks up files by name.
 pub(super) fn answer<B>(
     find: impl Fn(&str) -> Option<File>,
     request: &Request<B>,
@@ -78,7 +78,7 @@ fn chosen<B>(find: impl Fn(&str) -> Option<File>, request: &Request<B>) -> Respo
             ABSENT,
         );
     };
-    // Beside a file that gains by it lies a compressed twin.
+    // Files that compress well have a compressed twin.
     let packed = (accepts_gzip(request.headers()))
         .then(|| find(&format!("{name}.gz")))
         .flatten();
@@ -89,7 +89,10 @@ fn chosen<B>(find: impl Fn(&str) -> Option<File>, request: &Request<B>) -> Respo
     );
     let mut response = Response::new(Bytes::new());
     let headers = response.headers_mut();
-    headers.insert(header::CACHE_CONTROL, if asset { KEEP } else { ASK_AGAIN });
+    headers.insert(
+        header::CACHE_CONTROL,
+        if asset { IMMUTABLE } else { REVALIDATE },
+    );
     headers.insert(header::VARY, header::ACCEPT_ENCODING.into());
     headers.insert(header::ETAG, word(&tag));
     let known = (request.headers().get(header::IF_NONE_MATCH))
@@ -115,7 +118,7 @@ fn plain(status: StatusCode, media_type: &'static str, text: &'static [u8]) -> R
     response
 }
 
-/// Whether the browser says that it can unpack gzip.
+/// Whether the browser accepts gzip.
 fn accepts_gzip(headers: &HeaderMap) -> bool {
     let offered = headers.get_all(header::ACCEPT_ENCODING).iter();
     offered
@@ -166,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn every_address_is_a_page_but_an_asset_is_there_or_not() {
+    fn every_path_is_a_page_but_assets_must_exist() {
         for (path, status, body) in [
             ("/", 200, "document"),
             ("/rooms/0123", 200, "document"),
@@ -198,10 +201,13 @@ mod tests {
     }
 
     #[test]
-    fn what_never_changes_is_kept_and_the_document_is_asked_for_again() {
-        assert_eq!(get("/assets/a-1.js", &[]).headers()["cache-control"], KEEP);
+    fn assets_are_immutable_and_the_document_is_revalidated() {
+        assert_eq!(
+            get("/assets/a-1.js", &[]).headers()["cache-control"],
+            IMMUTABLE
+        );
         let document = get("/", &[]);
-        assert_eq!(document.headers()["cache-control"], ASK_AGAIN);
+        assert_eq!(document.headers()["cache-control"], REVALIDATE);
         let tag = document.headers()["etag"].to_str().expect("text");
         let again = get("/tournaments", &[(header::IF_NONE_MATCH, tag)]);
         assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
@@ -209,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn who_can_unpack_gets_less() {
+    fn browsers_that_accept_gzip_get_the_compressed_file() {
         for (accepted, packed) in [
             ("gzip", true),
             ("br, gzip;q=0.5", true),
@@ -230,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_has_the_length_and_no_body() {
+    fn the_answer_to_head_has_a_length_and_no_body() {
         let request = Request::head("/").body(()).expect("a request");
         let response = answer(built, &request);
         assert_eq!(response.headers()["content-length"], "8");
@@ -238,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_build_the_answer_says_how_to_get_one() {
+    fn the_answer_without_a_build_says_how_to_build() {
         let request = Request::get("/").body(()).expect("a request");
         let response = answer(|_| None, &request);
         assert_eq!(response.status(), StatusCode::SERVICE_UNAVAILABLE);

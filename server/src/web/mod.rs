@@ -1,6 +1,7 @@
-//! The page for people: the built browser client (`clients/web`), given out on the port that gRPC has too. All calls of gRPC are POST, so
-//! whatever is GET is for the page. A release carries the files in itself; a debug build reads them when they are asked for, so that the page
-//! can be worked on beside a running server. Which files there are and what is in them is decided by `clients/web/vite.config.ts`.
+//! The page for people: serves the built browser client (`clients/web`) on the port of gRPC. All gRPC
+//! calls are POST, so every GET is for the page. A release embeds the files; a debug build reads them
+//! on each request, so that the page can be edited while a server runs.
+//! `clients/web/vite.config.ts` decides which files there are.
 
 mod answer;
 
@@ -26,7 +27,7 @@ pub fn is_built_in() -> bool {
     find("index.html").is_some()
 }
 
-/// A built file; none for the hidden ones, which are the source tree's own.
+/// A built file; `None` for hidden ones, which belong to the source tree.
 fn find(name: &str) -> Option<File> {
     if name.starts_with('.') {
         return None;
@@ -86,7 +87,7 @@ where
 
 fn is_for_page<B>(request: &Request<B>) -> bool {
     let asks = matches!(*request.method(), Method::GET | Method::HEAD);
-    // A call with the wrong method is answered by those who know calls.
+    // The services answer a call with a wrong method.
     let calls = (request.headers().get(header::CONTENT_TYPE))
         .is_some_and(|media_type| media_type.as_bytes().starts_with(b"application/grpc"));
     asks && !calls

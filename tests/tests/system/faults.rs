@@ -240,7 +240,7 @@ async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
     patiently("decisions", regulars.ledger.reaches(50)).await;
     let mut other = other_program(folder.path()).await;
     execute(&mut other, "BEGIN IMMEDIATE").await;
-    let advice = "another program has had games.sqlite3 locked for more than 10 s";
+    let advice = "another program has kept games.sqlite3 locked for more than 10 s";
     assert_failed(&server.ended().await, advice);
     execute(&mut other, "ROLLBACK").await;
     other.close().await.expect("it is closed");
@@ -275,7 +275,7 @@ async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
     let server = launch.start().await.expect("it starts");
     let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
     let ended = server.ended().await;
-    assert_failed(&ended, "the disk does not read or write as it should");
+    assert_failed(&ended, "the disk fails to read or write");
     assert!(regulars.ledger.count() > 20, "in mid-game");
     let log = std::fs::read_to_string(log).expect("strace wrote it");
     assert!(log.contains("(INJECTED)"), "{log}");

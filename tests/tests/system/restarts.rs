@@ -196,7 +196,7 @@ async fn a_stop_puts_durable_games_down_and_aborts_the_others() {
         }
         let more = regulars.ledger.count() + 20;
         patiently("decisions", regulars.ledger.reaches(more)).await;
-        server.ask_to_stop().await;
+        server.request_stop().await;
         for seat in &mut seats {
             let reason = loop {
                 match seat.next().await {

@@ -21,7 +21,7 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let game_id = created.room.expect("a room").game_id;
     let mut seats = attach_all(&server, &tickets).await;
-    server.ask_to_stop();
+    server.request_stop();
     for seat in &mut seats {
         let reason = loop {
             match seat.next().await {
@@ -68,7 +68,7 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
         .expect("health is answered")
         .into_inner();
     assert_eq!(status.status(), ServingStatus::Serving);
-    server.ask_to_stop();
+    server.request_stop();
     // The room that waited is aborted at once; from then on the shutdown is under way.
     let waiting = waiting.room.expect("a room").room_id;
     while client
@@ -116,7 +116,7 @@ async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
     let room_id = created.room.expect("a room").room_id;
     let deaf = narrow_spectator(&server, room_id).await;
     play_out(&server, tickets).await;
-    server.ask_to_stop();
+    server.request_stop();
     server.stop().await;
     drop(deaf);
 }

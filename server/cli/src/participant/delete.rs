@@ -205,7 +205,7 @@ async fn held(
     if !names.contains(&name) {
         return Ok(None);
     }
-    let kept = database.sat_down(game).await?;
+    let kept = database.seated_names(game).await?;
     Ok(pseudonym_of(name, &names, &kept).cloned())
 }
 

@@ -53,21 +53,21 @@ pub(super) struct Reader {
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
     next_handle: u32,
     pub(super) next_called: u32,
-    /// Calls of tournaments to participants of this stream.
+    /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
     /// Whether unspecified delivery means with decisions (Play) or at once (Watch).
     with_decisions: bool,
 }
 
-/// What a reader does next.
+/// The next input of a reader.
 enum Next {
     Message(Option<Result<v1::PlayRequest, Status>>),
     Call(u32, Call),
 }
 
 impl Reader {
-    /// The reader of a stream whose responses go into `outbox`.
+    /// Creates the reader of a stream whose responses go into `outbox`.
     pub(super) fn new(
         rooms: &Arc<Rooms>,
         tournaments: &Arc<Tournaments>,
@@ -89,7 +89,7 @@ impl Reader {
         }
     }
 
-    /// Reads requests until the stream ends. `failure` is set if they break off or break a rule.
+    /// Reads requests until the stream ends. Sets `failure` if they break off or break a rule.
     pub(super) async fn read(
         mut self,
         mut requests: Streaming<v1::PlayRequest>,
@@ -101,7 +101,7 @@ impl Reader {
                 if outbox.poll_hung_up(context) {
                     return Poll::Ready(Next::Message(None));
                 }
-                // The sender is the reader's own: there is always one.
+                // The reader has a sender itself, so the channel never closes.
                 if let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context) {
                     return Poll::Ready(Next::Call(handle, call));
                 }
@@ -120,13 +120,13 @@ impl Reader {
                     break Err(status(
                         Code::InvalidArgument,
                         "TOO_MANY_COMMANDS",
-                        format!("a message holds at most {MAX_COMMANDS_PER_MESSAGE} commands"),
+                        format!("a message contains at most {MAX_COMMANDS_PER_MESSAGE} commands"),
                         [("field", "commands")],
                     ));
                 }
                 Ok(Some(request)) => {
                     for command in request.commands {
-                        self.obey(command, arrived).await;
+                        self.execute(command, arrived).await;
                     }
                 }
                 Ok(None) => break Ok(()),
@@ -143,7 +143,7 @@ impl Reader {
         });
     }
 
-    async fn obey(&mut self, command: v1::SeatCommand, arrived: Instant) {
+    async fn execute(&mut self, command: v1::SeatCommand, arrived: Instant) {
         let handle = command.handle;
         let action = match command.command {
             Some(Command::Attach(attach)) => return self.attach(attach).await,
@@ -157,7 +157,7 @@ impl Reader {
             },
             Some(Command::Resume(_)) => SeatAction::Resume,
             None => {
-                let problem = FieldProblem::new("command", "say what the seat does");
+                let problem = FieldProblem::new("command", "set a command");
                 return self.refuse_field(handle, 0, "COMMAND_MISSING", &problem);
             }
         };
@@ -199,7 +199,7 @@ impl Reader {
                 self.seats.insert(handle, bound);
             }
             Ok(None) => self.refuse(handle, request_id, &ticket_unknown()),
-            // A seat that is refused is given up by its agent; a stream that ends so is opened again until the room is back.
+            // An agent gives up a refused seat, but reopens a stream that ends with this error.
             Err(RoomGone) => self.outbox.end(StreamEnd::RoomGone),
         }
     }
@@ -273,7 +273,7 @@ impl Reader {
         }
         if let Some(bound) = self.participants.remove(&handle) {
             let requested = v1::DetachReason::Requested.into();
-            self.tell(handle, Update::Detached(v1::Detached { reason: requested }));
+            self.send_update(handle, Update::Detached(v1::Detached { reason: requested }));
             bound.leave().await;
         }
     }
@@ -292,11 +292,11 @@ impl Reader {
     }
 
     pub(super) fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
-        self.tell(handle, Update::Refused(refused(request_id, refusal)));
+        self.send_update(handle, Update::Refused(refused(request_id, refusal)));
     }
 
     /// Sends an update; `false` if the client does not read its stream.
-    pub(super) fn tell(&self, handle: u32, update: Update) -> bool {
+    pub(super) fn send_update(&self, handle: u32, update: Update) -> bool {
         let mut updates = Updates::default();
         updates.add(handle, update);
         self.outbox.push(&mut updates, None, None)
@@ -308,16 +308,16 @@ pub(super) fn too_many_seats() -> Status {
         Code::ResourceExhausted,
         "TOO_MANY_SEATS",
         format!(
-            "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach those that are over, or open another"
+            "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach seats of ended games, or open another stream"
         ),
         [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
     )
 }
 
-/// First handle of the seats that the server attaches by itself.
+/// First handle of seats that the server attaches.
 pub(super) const FIRST_CALLED: u32 = 1 << 31;
 
-/// Numbers of connections of participants.
+/// Ids of connections of participants.
 static CONNECTIONS: AtomicU64 = AtomicU64::new(1);
 
 /// A participant of a tournament that is attached to a stream.
@@ -325,7 +325,7 @@ pub(super) struct BoundParticipant {
     tournament: Arc<TournamentHandle>,
     participant: usize,
     connection: u64,
-    /// The request that attached it. Its options hold for its seats too.
+    /// The request that attached it. Its options apply to its seats too.
     attach: v1::Attach,
 }
 
@@ -355,8 +355,8 @@ impl Reader {
             tournament_id: tournament.id().to_string(),
             participant: convert::number(participant),
         });
-        if !self.tell(handle, entered) {
-            // Who does not read what it is told is not entered.
+        if !self.send_update(handle, entered) {
+            // A client that does not read its stream is not attached.
             return;
         }
         let connection = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
@@ -375,7 +375,7 @@ impl Reader {
         tournament.enter(participant, connection, way).await;
     }
 
-    /// Carries out a call of a tournament.
+    /// Executes a call of a tournament.
     pub(super) async fn follow_call(&mut self, handle: u32, call: Call) {
         match call {
             Call::Seat(room) => self.take_seat(handle, room).await,
@@ -398,7 +398,7 @@ impl Reader {
             request_id: 0,
             ..bound.attach.clone()
         };
-        // A seat that the client attached by itself with the same ticket stays where it is.
+        // A seat that the client attached with the same ticket stays attached.
         let is_there = (self.seats.values()).any(|seat| {
             seat.secret == ticket.secret && seat.room.id() == room && !seat.is_detached()
         });
@@ -415,25 +415,25 @@ impl Reader {
         }
         let handle = self.next_called;
         self.next_called = self.next_called.wrapping_add(1).max(FIRST_CALLED);
-        // Otherwise the game ended before its seat was taken: there is nothing left to play.
+        // Otherwise the game ended before its seat was attached: there is nothing left to play.
         if let Ok(Some(bound)) = self.bind(attach, handle, Some(ticket)).await {
             self.seats.insert(handle, bound);
         }
     }
 
-    /// Detaches a participant from this stream. Its seats stay.
+    /// Detaches a participant from this stream. Its seats stay attached.
     fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
         if self.participants.remove(&handle).is_some() {
             let reason = reason.into();
             let mut last = Updates::default();
             last.add(handle, Update::Detached(v1::Detached { reason }));
-            // There is one for each participant: it has its place even in an outbox that is full.
+            // At most one for each participant: even a full outbox has space for it.
             self.outbox.push_last(&mut last);
         }
     }
 }
 
-/// The action of a seat that answers.
+/// The action for an answer.
 pub(super) fn answer_action(answer: v1::Answer) -> SeatAction {
     let annotations = convert::annotations_from_proto(answer.annotations);
     SeatAction::Answer(Answer {
@@ -444,10 +444,10 @@ pub(super) fn answer_action(answer: v1::Answer) -> SeatAction {
     })
 }
 
-/// The action of a seat that expresses something.
+/// The action for an expression.
 ///
 /// # Errors
-/// The field that is out of its range.
+/// A field is out of its range.
 pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {
     Ok(SeatAction::Express {
         record_only: expression.record_only,

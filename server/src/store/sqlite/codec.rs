@@ -1,27 +1,27 @@
-//! Encoding and decoding of what can be large, such as a complete journal or an imported record: on threads that serve nobody, a few at
-//! a time.
+//! Encodes and decodes large data, such as a complete journal or an imported record, on blocking
+//! threads, a few at a time.
 
 use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
-use crate::config::MAX_RECORDS_IN_HAND;
+use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::store::StoreError;
 
-/// Lines or entries that are encoded or decoded where they are: handing them to another thread would take longer.
+/// Most lines or entries that are processed in place: moving them to another thread would take longer.
 const FEW_PIECES: usize = 64;
 
-/// Runs work on blocking threads, at most [`MAX_RECORDS_IN_HAND`] pieces at a time.
+/// Runs work on blocking threads, at most [`MAX_CONCURRENT_RECORDS`] pieces at a time.
 #[derive(Clone)]
 pub(super) struct Codec(Arc<Semaphore>);
 
 impl Codec {
     pub(super) fn new() -> Self {
-        Self(Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)))
+        Self(Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)))
     }
 
-    /// Runs `work`, which encodes or decodes `pieces` lines or entries. A few are done where they are. The work holds its permit even if the
-    /// caller is cancelled.
+    /// Runs `work`, which encodes or decodes `pieces` lines or entries. A few run in place. The work
+    /// holds its permit even if the caller is cancelled.
     pub(super) async fn run<T: Send + 'static>(
         &self,
         pieces: usize,
@@ -31,7 +31,7 @@ impl Codec {
             return Ok(work());
         }
         let permit = Arc::clone(&self.0).acquire_owned().await;
-        let permit = permit.expect("nothing closes the semaphore");
+        let permit = permit.expect("the semaphore is never closed");
         let working = tokio::task::spawn_blocking(move || {
             let _permit = permit;
             work()

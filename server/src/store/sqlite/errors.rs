@@ -1,13 +1,13 @@
-//! What SQLite's errors mean for the person who runs the server, and what there is to do.
+//! Explains SQLite's errors to the person who runs the server, with advice.
 
 use std::time::Duration;
 
 /// Name of the database in the data directory.
 pub(super) const FILE: &str = "games.sqlite3";
-/// How long a database that another program has locked is waited for.
+/// How long to wait for a database that another program has locked.
 pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(10);
 
-/// SQLite's primary result codes that are told apart.
+/// SQLite's primary result codes that have their own advice.
 const BUSY: i32 = 5;
 const LOCKED: i32 = 6;
 const READ_ONLY: i32 = 8;
@@ -27,25 +27,21 @@ pub(super) fn has_code(error: &sqlx::Error, code: i32) -> bool {
     primary_code(error) == Some(code)
 }
 
-/// An error in words, with what to do about it.
+/// Explains an error, with advice.
 pub(super) fn explain(error: &sqlx::Error) -> String {
     let advice = match primary_code(error) {
         Some(FULL) => "the disk is full: free some space",
         Some(BUSY | LOCKED) => {
             let seconds = BUSY_LIMIT.as_secs();
             return format!(
-                "another program has had {FILE} locked for more than {seconds} s: end that program, then start the server again ({error})"
+                "another program has kept {FILE} locked for more than {seconds} s: end that program, then start the server again ({error})"
             );
         }
-        Some(READ_ONLY) => {
-            "the file or its folder may not be written: give the server the right to"
-        }
-        Some(IO_ERROR) => {
-            "the disk does not read or write as it should: check the disk and its free space"
-        }
-        Some(CORRUPT) => "the database is damaged: put back a copy of it",
+        Some(READ_ONLY) => "the file or its folder is not writable: change its permissions",
+        Some(IO_ERROR) => "the disk fails to read or write: check the disk and its free space",
+        Some(CORRUPT) => "the database is damaged: restore a backup",
         Some(CANNOT_OPEN) => {
-            "the file cannot be opened: check that its folder is there and may be written"
+            "the file cannot be opened: check that its folder exists and is writable"
         }
         _ => return format!("the database failed: {error}"),
     };

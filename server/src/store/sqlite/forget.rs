@@ -1,5 +1,6 @@
-//! Taking a participant out of the database: one transaction over everything in which the name stands. Journals are rewritten row by row, so
-//! that every game still folds. The records' files are not known here.
+//! Removes a participant from the database: one transaction over everything that contains the name.
+//! Journals are rewritten row by row, so every game still folds. The files of records are not
+//! handled here.
 
 use std::path::Path;
 
@@ -19,41 +20,41 @@ use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry};
 
-/// The database of a data directory while somebody is taken out of it: no server has the directory meanwhile.
+/// The database of a data directory while a participant is removed. No server has it open meanwhile.
 pub struct Forgetting(Opened);
 
-/// What was taken out of the database.
+/// What was removed from the database.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Forgotten {
-    /// Games in which the name stood.
+    /// Games that contained the name.
     pub games: u64,
-    /// Tournaments in which it stood.
+    /// Tournaments that contained the name.
     pub tournaments: u64,
-    /// What was changed in the games.
+    /// The changes in the games.
     pub taken_out: TakenOut,
-    /// Numbers of the games whose record had been written to a file, which is to be written anew.
+    /// Numbers of the games whose record file must be rewritten.
     filed: Vec<i64>,
 }
 
-/// Why somebody cannot be taken out; nothing was changed.
+/// Why a participant cannot be removed; nothing was changed.
 #[derive(Debug, thiserror::Error)]
 pub enum ForgetError {
-    /// A game with the name goes on.
+    /// A game with the name is not over.
     #[error(
         "{0:?} has a seat in a game that is not over; nothing was changed: start the server, let the game end or close its room, stop the server"
     )]
-    GameGoesOn(String),
-    /// A tournament with the name goes on.
+    GameRunning(String),
+    /// A tournament with the name is not over.
     #[error(
         "{0:?} takes part in a tournament that is not over; nothing was changed: start the server, let it end or close it, stop the server"
     )]
-    TournamentGoesOn(String),
-    /// Something that was kept cannot be read.
+    TournamentRunning(String),
+    /// Stored data cannot be read.
     #[error("{what} cannot be read: {problem}; nothing was changed")]
     Unreadable {
-        /// What.
+        /// The data.
         what: String,
-        /// Why.
+        /// The reason.
         problem: String,
     },
     /// The database failed.
@@ -71,12 +72,13 @@ impl Forgetting {
     /// Opens the database of a data directory.
     ///
     /// # Errors
-    /// It cannot be used, or a server uses it.
+    /// The directory cannot be used, or a server uses it.
     pub async fn open(data_dir: &Path) -> Result<Self, open::OpenError> {
         open::open(data_dir).await.map(Self)
     }
 
-    /// Takes somebody out. The records of the games stand as not yet written: after a crash the server writes them when it next starts.
+    /// Removes a participant. Marks the records of the games as unwritten: after a crash the server
+    /// writes them at its next start.
     ///
     /// # Errors
     /// See [`ForgetError`].
@@ -108,7 +110,7 @@ impl Forgetting {
         Ok(forgotten)
     }
 
-    /// The name at a seat of a game that is over; none of a built-in agent, or of a game that is not here.
+    /// The name at a seat of a finished game; `None` for a built-in agent or an unknown game.
     ///
     /// # Errors
     /// The database failed.
@@ -123,11 +125,12 @@ impl Forgetting {
         Ok(name)
     }
 
-    /// The names of those who sat down in a game that was hosted, in order, whether they stayed or not; nobody's if it is not here.
+    /// The names of the participants who sat down in a hosted game, in order, whether they stayed or
+    /// not; empty if the game is unknown.
     ///
     /// # Errors
     /// The database failed, or the game's journal cannot be read.
-    pub async fn sat_down(&mut self, game: Id) -> Result<Vec<String>, ForgetError> {
+    pub async fn seated_names(&mut self, game: Id) -> Result<Vec<String>, ForgetError> {
         let row = sqlx::query("SELECT number, last_row FROM games WHERE game_id = $1")
             .bind(game.0.as_slice())
             .fetch_optional(&mut self.0.writer)
@@ -148,8 +151,8 @@ impl Forgetting {
         Ok(names)
     }
 
-    /// Notes that the records have been written anew, and writes the database anew, so that nothing of what was there before is left in parts
-    /// of it that are not used any more, or in the log of writes. This takes as much space on the disk as the database has.
+    /// Marks the records as written and compacts the database, so that unused pages and the write-ahead
+    /// log contain nothing of the participant. This needs as much free disk space as the database has.
     ///
     /// # Errors
     /// The database failed.
@@ -168,7 +171,7 @@ impl Forgetting {
     }
 }
 
-/// Takes somebody out of one game.
+/// Removes a participant from one game.
 async fn forget_game(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
@@ -193,7 +196,7 @@ async fn forget_game(
         return Ok(taken_out);
     }
     if game.get::<i64, _>("state") == 0 {
-        return Err(ForgetError::GameGoesOn(who.name.clone()));
+        return Err(ForgetError::GameRunning(who.name.clone()));
     }
     if let Some(header) = game.get::<Option<Vec<u8>>, _>("header") {
         let mut header = form::header_from_bytes(&header).map_err(unreadable)?;
@@ -225,7 +228,8 @@ async fn forget_game(
     Ok(taken_out)
 }
 
-/// The journal of a game, by rows in order. They are read one by one, with [`entries_of`]: a long game is much larger then.
+/// The rows of a game's journal, in order. They are decoded one by one with [`entries_of`], because a
+/// long decoded game is much larger.
 async fn journal_of(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
@@ -241,7 +245,7 @@ async fn journal_of(
                  WHERE journal.row < own.row AND journal.game = $2)
              SELECT row, entries FROM own ORDER BY row"
         }
-        // It goes on: where its last row stands is not known.
+        // The game is not over: the position of its last row is unknown.
         None => "SELECT row, entries FROM journal WHERE $1 IS NULL AND game = $2 ORDER BY row",
     })
     .bind(last_row)
@@ -251,7 +255,7 @@ async fn journal_of(
     Ok(rows)
 }
 
-/// What a row of a journal holds.
+/// The entries of a row of a journal.
 fn entries_of(row: &SqliteRow) -> Result<Vec<Entry>, ForgetError> {
     let mut entries = Vec::new();
     form::read_entries(row.get("entries"), &mut entries).map_err(|problem| {
@@ -264,7 +268,7 @@ fn entries_of(row: &SqliteRow) -> Result<Vec<Entry>, ForgetError> {
     Ok(entries)
 }
 
-/// Takes somebody out of the journal of a game, of which only the rows that change are written.
+/// Removes a participant from the journal of a game; writes only the rows that change.
 async fn forget_journal(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
@@ -323,7 +327,7 @@ fn forget_entries(entries: &mut Vec<Entry>, own: &mut OwnSeats, who: &Pseudonym)
     out
 }
 
-/// Takes somebody out of the tournaments; out of how many.
+/// Removes a participant from the tournaments. Returns how many changed.
 async fn forget_tournaments(
     connection: &mut SqliteConnection,
     who: &Pseudonym,
@@ -387,7 +391,7 @@ async fn forget_tournament(
         }
     }
     if is_in_it && !over {
-        return Err(ForgetError::TournamentGoesOn(who.name.clone()));
+        return Err(ForgetError::TournamentRunning(who.name.clone()));
     }
     Ok(is_in_it)
 }

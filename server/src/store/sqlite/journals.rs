@@ -1,4 +1,4 @@
-//! The journals that rooms write through, and the way of their orders to the writer.
+//! The journals that rooms write to, and the queue of write commands.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -15,7 +15,7 @@ use super::writer::{Pending, Row, WriteCommand};
 use crate::store::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// The way to the writer.
+/// The queue of the writer.
 #[derive(Clone)]
 pub(super) struct WriteQueue {
     pub(super) queue: mpsc::Sender<Pending>,
@@ -24,27 +24,27 @@ pub(super) struct WriteQueue {
 }
 
 impl WriteQueue {
-    /// A number for a row of the journal.
+    /// Takes the next row number of the journal.
     fn new_row(&self) -> i64 {
         self.next_row.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// The least number that a row can have from now on.
+    /// The lowest number that a row can still get.
     fn first_row(&self) -> i64 {
         self.next_row.load(Ordering::Relaxed)
     }
 
-    /// Gives an order and waits until it is kept.
-    pub(super) async fn give(&self, order: WriteCommand) -> Result<(), StoreError> {
+    /// Sends a command and waits until it is committed.
+    pub(super) async fn send(&self, command: WriteCommand) -> Result<(), StoreError> {
         let gone = || StoreError::Failed("the database is closed".into());
-        let (reply, kept) = oneshot::channel();
-        let order = self.queue.send((order, reply));
-        order.await.map_err(|_| gone())?;
-        kept.await.map_err(|_| gone())?
+        let (reply, committed) = oneshot::channel();
+        let command = self.queue.send((command, reply));
+        command.await.map_err(|_| gone())?;
+        committed.await.map_err(|_| gone())?
     }
 }
 
-/// The journal of a game that outlives the server.
+/// The journal of a game that survives the server.
 pub(super) struct DurableJournal {
     pub(super) number: i64,
     pub(super) position: i64,
@@ -54,7 +54,7 @@ pub(super) struct DurableJournal {
 }
 
 impl DurableJournal {
-    /// Begins the game, with its first row if there are entries.
+    /// Creates the game, with its first row if there are entries.
     pub(super) async fn begin(
         &mut self,
         header: &GameHeader,
@@ -69,7 +69,7 @@ impl DurableJournal {
             first_row,
             first,
         };
-        self.orders.give(create).await
+        self.orders.send(create).await
     }
 
     /// Its next row.
@@ -94,7 +94,7 @@ impl Journal for DurableJournal {
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         let row = self.next_row(entries);
-        self.orders.give(WriteCommand::Append(row)).boxed()
+        self.orders.send(WriteCommand::Append(row)).boxed()
     }
 
     fn finish(
@@ -102,9 +102,9 @@ impl Journal for DurableJournal {
         summary: Option<Box<v1::RecordSummary>>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         self.orders
-            .give(WriteCommand::Finish {
+            .send(WriteCommand::Finish {
                 number: self.number,
-                // Only an aborted game can end before anything was dealt.
+                // Only an aborted game can end before the deal.
                 state: v1::RoomState::Aborted.into(),
                 last_row: self.last_row,
                 summary,
@@ -113,7 +113,7 @@ impl Journal for DurableJournal {
     }
 }
 
-/// The journal of a game that is kept when it is over.
+/// The journal of a game that is stored when it ends.
 pub(super) struct EphemeralJournal {
     pub(super) number: i64,
     pub(super) header: Arc<GameHeader>,
@@ -153,8 +153,8 @@ impl Journal for EphemeralJournal {
                 entries,
                 summary,
             };
-            match self.orders.give(game).await {
-                // The game has been played all the same; the record that was there first stays.
+            match self.orders.send(game).await {
+                // The game has been played all the same; the record that was stored first stays.
                 Err(StoreError::Taken(_)) => {
                     error!(game = %game_id, "another record has the id of this game; the game is not stored");
                     Ok(())

@@ -1,5 +1,5 @@
-//! Games in an SQLite database, which outlives the server. Opening is in `open`, reading in `reader`, writing in `journals` and `writer`, the
-//! form of what is kept in `form`; here is the store that they make up.
+//! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer` write,
+//! `form` encodes; this file joins them into a store.
 
 mod codec;
 mod errors;
@@ -38,11 +38,12 @@ use journals::{DurableJournal, EphemeralJournal, WriteQueue};
 use reader::Reader;
 use writer::{TournamentRow, WriteCommand};
 
-/// Space on the disk that is left to games that go on: new ones are refused before it is used. Of a small disk this is a share.
+/// Disk space reserved for running games: new ones are refused when only this is left. On a small disk
+/// the reserve is a share of its size.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
 const RESERVE_SHARE: u64 = 50;
 
-/// Keeps games in the database of a data directory.
+/// Stores games in the database of a data directory.
 pub struct SqliteStore {
     data_dir: PathBuf,
     reader: Reader,
@@ -52,12 +53,12 @@ pub struct SqliteStore {
     numbers: Arc<AtomicI64>,
     writing: Mutex<Option<JoinHandle<()>>>,
     closed: Arc<AtomicBool>,
-    /// Holds the data directory for this process.
+    /// Locks the data directory for this process.
     _lock: File,
 }
 
 impl SqliteStore {
-    /// Opens the database of a data directory, `games.sqlite3`; makes it if there is none.
+    /// Opens the database of a data directory, `games.sqlite3`; creates it if it is missing.
     ///
     /// # Errors
     /// The directory cannot be used; nothing was changed in it.
@@ -106,7 +107,7 @@ impl Store for SqliteStore {
                 let reserve = MAX_RESERVE_BYTES.min(disk.f_blocks * disk.f_frsize / RESERVE_SHARE);
                 disk.f_bavail * disk.f_frsize >= reserve
             }
-            // A disk that says nothing of itself is tried.
+            // If the free space is unknown, try.
             Err(_) => true,
         }
     }
@@ -181,7 +182,7 @@ impl Store for SqliteStore {
                 record,
                 summary: Box::new(summary),
             };
-            match self.orders.give(import).await {
+            match self.orders.send(import).await {
                 Ok(()) => Ok(true),
                 Err(StoreError::Taken(_)) => Ok(false),
                 Err(error) => Err(error),
@@ -190,12 +191,14 @@ impl Store for SqliteStore {
         .boxed()
     }
 
-    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        self.reader.unfiled().boxed()
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.reader.without_record_file().boxed()
     }
 
-    fn note_filed(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.orders.give(WriteCommand::Filed { game_id }).boxed()
+    fn mark_record_written(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.orders
+            .send(WriteCommand::RecordWritten { game_id })
+            .boxed()
     }
 
     fn create_tournament(
@@ -207,7 +210,7 @@ impl Store for SqliteStore {
             header: form::tournament_to_bytes(&header),
             first: TournamentRow::new(header.id, 0, &entries),
         };
-        self.orders.give(order).boxed()
+        self.orders.send(order).boxed()
     }
 
     fn append_tournament(
@@ -218,7 +221,7 @@ impl Store for SqliteStore {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let row = TournamentRow::new(tournament, row, &entries);
         self.orders
-            .give(WriteCommand::TournamentEntries(row))
+            .send(WriteCommand::TournamentEntries(row))
             .boxed()
     }
 
@@ -252,17 +255,17 @@ impl Store for SqliteStore {
         async move {
             self.closed.store(true, Ordering::Release);
             self.reader.pool.close().await;
-            // A writer that has failed says so elsewhere; here it is only waited for.
-            let _ = self.orders.give(WriteCommand::Close).await;
+            // A failed writer is reported elsewhere; here it is only awaited.
+            let _ = self.orders.send(WriteCommand::Close).await;
             let writing = self
                 .writing
                 .lock()
-                .expect("nothing that holds this lock can panic")
+                .expect("no code that holds this lock can panic")
                 .take();
             if let Some(writing) = writing
                 && let Err(error) = writing.await
             {
-                error!(%error, "the writer of the database did not end in good order");
+                error!(%error, "the writer of the database did not close cleanly");
             }
         }
         .boxed()

@@ -1,5 +1,5 @@
-//! Opening the database: that it is ours, that nobody else has it, that this version knows its form. What is not so is refused before
-//! anything is written.
+//! Opens the database: checks that it is ours, that no other process uses it, and that this version
+//! can read it. Refuses it otherwise, before anything is written.
 
 use std::fs::File;
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -15,15 +15,15 @@ use sqlx::{Connection as _, SqlSafeStr as _};
 use super::errors::{BUSY_LIMIT, FILE, explain, has_code};
 use crate::store::StoreError;
 
-/// Name of the file that is locked while a server has the data directory.
+/// The file that a server locks while it uses the data directory.
 const LOCK_FILE: &str = "games.lock";
-/// What tells our databases from those of other programs: `PRAGMA application_id` of the first migration.
+/// Identifies our databases: `PRAGMA application_id` of the first migration.
 const APPLICATION_ID: i64 = 0x4368_4874;
-/// Connections that read.
+/// Connections for reading.
 const READERS: u32 = 4;
-/// Statements that a connection keeps prepared.
+/// Prepared statements per connection.
 const STATEMENTS: usize = 64;
-/// The migrations, oldest first. Once released, one is never changed.
+/// The migrations, oldest first. A released one never changes.
 const MIGRATIONS: [(i64, &str, &str); 3] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (
@@ -33,7 +33,7 @@ const MIGRATIONS: [(i64, &str, &str); 3] = [
     ),
     (3, "listed", include_str!("migrations/0003_listed.sql")),
 ];
-/// SQLite's codes for a file that is no database, and for one that is damaged.
+/// SQLite's codes for a file that is not a database, and for a damaged one.
 const NOT_A_DATABASE: i32 = 26;
 const CORRUPT: i32 = 11;
 
@@ -45,20 +45,20 @@ pub enum OpenError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Another server has it.
+    /// Another server uses it.
     #[error("another chefshat server uses {0}; stop it, or choose another folder with --data-dir")]
     InUse(PathBuf),
-    /// The file is no database of ours.
+    /// The file is not a database of ours.
     #[error(
         "{0} is not a database of chefshat; nothing was changed: move it away, or choose another folder with --data-dir"
     )]
     NotOurs(PathBuf),
     /// The database is damaged.
     #[error(
-        "{0} is damaged ({1}); nothing was changed: put back a copy of it, or move it away to begin anew (records lie in records/)"
+        "{0} is damaged ({1}); nothing was changed: restore a backup, or move it away to start with an empty database (records are in records/)"
     )]
     Damaged(PathBuf, String),
     /// The database was written by a newer version.
@@ -66,7 +66,7 @@ pub enum OpenError {
         "{0} was written by a newer version of chefshat; nothing was changed: use that version, or choose another folder with --data-dir"
     )]
     Newer(PathBuf),
-    /// Anything else.
+    /// Any other error.
     #[error("{0}: {1}")]
     Other(PathBuf, String),
 }
@@ -75,11 +75,11 @@ pub enum OpenError {
 pub(super) struct Opened {
     pub(super) writer: SqliteConnection,
     pub(super) readers: SqlitePool,
-    /// Locked as long as it is open.
+    /// Locked while it is open.
     pub(super) lock: File,
 }
 
-/// Opens the database of a data directory, which is made if there is none.
+/// Opens the database of a data directory; creates it if it is missing.
 pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
     let path = data_dir.join(FILE);
     let lock = lock(data_dir)?;
@@ -98,7 +98,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
         }
     };
     if path.metadata().is_ok_and(|metadata| metadata.len() > 0) {
-        // Looked at before anything is set: setting the journal mode writes.
+        // Checked before any setting: setting the journal mode writes.
         let mut looking = SqliteConnection::connect_with(&options.clone().read_only(true))
             .await
             .map_err(failed)?;
@@ -110,7 +110,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
             .fetch_one(&mut looking)
             .await
             .map_err(failed)?;
-        // A server that died in its very first moments leaves a database with nothing in it.
+        // A server that died right at its first start leaves an empty database.
         if id != APPLICATION_ID
             && tables > 0
             && !only_migrations(&mut looking).await.map_err(failed)?
@@ -140,7 +140,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
             }
             error => OpenError::Other(path.clone(), error.to_string()),
         })?;
-    // Games that were given up before anything was dealt leave nothing behind.
+    // Games that were abandoned before the deal leave nothing behind.
     for forgotten in [
         "WITH RECURSIVE forgotten (row) AS (
              SELECT last_row FROM games WHERE state <> 0 AND summary IS NULL
@@ -166,7 +166,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
     })
 }
 
-/// Whether there is nothing but what the first migration makes before it is complete.
+/// Whether the database contains nothing but an incomplete first migration.
 async fn only_migrations(connection: &mut SqliteConnection) -> Result<bool, sqlx::Error> {
     let others: i64 = sqlx::query_scalar(
         "SELECT count(*) FROM sqlite_schema WHERE tbl_name <> '_sqlx_migrations'",
@@ -193,7 +193,7 @@ fn migrations() -> Migrator {
     )
 }
 
-/// Takes the data directory for this process. The system gives it back when the process ends, however it ends.
+/// Locks the data directory for this process. The system unlocks it when the process ends.
 fn lock(data_dir: &Path) -> Result<File, OpenError> {
     let path = data_dir.join(LOCK_FILE);
     let io = |source| OpenError::Io {
@@ -214,18 +214,20 @@ fn lock(data_dir: &Path) -> Result<File, OpenError> {
     }
 }
 
-/// Refuses a database of which only the log of writes is left: opened, it would begin anew, and what is in the log would be gone.
+/// Refuses a database of which only the write-ahead log is left: opening it would create an empty one
+/// and lose the log.
 fn check_log(path: &Path) -> Result<(), OpenError> {
     let length = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
     let log = path.with_extension("sqlite3-wal");
     if length(path) == 0 && length(&log) > 0 {
-        let problem = format!("it is empty or gone, but {} is there", log.display());
+        let problem = format!("it is empty or missing, but {} exists", log.display());
         return Err(OpenError::Damaged(path.to_path_buf(), problem));
     }
     Ok(())
 }
 
-/// Makes the database file, if there is none, so that nobody else can read it: it holds the seeds of games that go on.
+/// Creates the database file, if it is missing, unreadable for other users: it contains the seeds of
+/// running games.
 fn make_private(path: &Path) -> Result<(), OpenError> {
     File::options()
         .create(true)

@@ -1,4 +1,4 @@
-//! Reading the database. It goes over connections of its own, which cannot write, and never waits for the writer.
+//! Reads the database over its own connections, which cannot write and never wait for the writer.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,10 +19,11 @@ use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// Games that had ended of which the rooms are there again; the last ones, since of earlier ones everybody has heard.
-const MOST_ENDED: i64 = 256;
+/// Most ended games whose rooms are restored: the newest ones, because clients know the end of older
+/// ones.
+const MAX_ENDED: i64 = 256;
 
-/// The query for a list of finished games: the condition that their numbers meet, the order in which they come.
+/// The query for a list of finished games, with the condition on their numbers and the order.
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
@@ -41,14 +42,14 @@ macro_rules! list_query {
     };
 }
 
-/// Reads what is kept.
+/// Reads stored games.
 pub(super) struct Reader {
     pub(super) pool: SqlitePool,
     pub(super) codec: Codec,
 }
 
 impl Reader {
-    /// See `Store::left`.
+    /// See `Store::resumable_games`.
     pub(super) async fn resumable_games(
         &self,
         ended_since_ms: u64,
@@ -64,11 +65,11 @@ impl Reader {
              ORDER BY number",
         )
         .bind(i64::try_from(ended_since_ms).unwrap_or(i64::MAX))
-        .bind(MOST_ENDED)
+        .bind(MAX_ENDED)
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
-        let mut going_on = self.going_on().await?;
+        let mut running_journals = self.running_journals().await?;
         let mut left = Vec::with_capacity(games.len());
         for row in games {
             let number: i64 = row.get(0);
@@ -76,7 +77,9 @@ impl Reader {
             let header = check_form(row.get(1)).and_then(|()| header_of(&row));
             let read = match concluded {
                 true => self.journal(number, row.get(4)).await?,
-                false => going_on.remove(&number).unwrap_or(Ok(Read::default())),
+                false => running_journals
+                    .remove(&number)
+                    .unwrap_or(Ok(Read::default())),
             };
             match header.and_then(|header| Ok((header, read?))) {
                 Ok((header, read)) => left.push(ResumableGame {
@@ -91,7 +94,7 @@ impl Reader {
                     header,
                 }),
                 Err(problem) => {
-                    error!(number, %problem, "a game cannot be read; it is left as it is");
+                    error!(number, %problem, "a game cannot be read; it is left unchanged");
                 }
             }
         }
@@ -149,7 +152,7 @@ impl Reader {
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
-        let mut kept = Vec::with_capacity(tournaments.len());
+        let mut stored = Vec::with_capacity(tournaments.len());
         for row in tournaments {
             let number: i64 = row.get(0);
             let parts: Vec<Vec<u8>> = sqlx::query_scalar(
@@ -171,22 +174,22 @@ impl Reader {
                 });
             }
             match header.and_then(|header| Ok((header, entries?))) {
-                Ok((header, entries)) => kept.push(StoredTournament {
+                Ok((header, entries)) => stored.push(StoredTournament {
                     header,
                     entries,
                     rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),
                 }),
                 Err(problem) => {
-                    error!(number, %problem, "a tournament cannot be read; it is left as it is");
+                    error!(number, %problem, "a tournament cannot be read; it is left unchanged");
                 }
             }
         }
-        Ok(kept)
+        Ok(stored)
     }
 
-    /// The journals of all games that go on, by the games' numbers; inside, why one cannot be read. They are found by looking through all
-    /// that was kept since the oldest of them began.
-    async fn going_on(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
+    /// The journals of all running games, by game number; the inner result says why one cannot be read.
+    /// Reads everything stored since the oldest of them was created.
+    async fn running_journals(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
         let mut rows = sqlx::query(
             "SELECT row, position, entries, game FROM journal
              WHERE row >= (SELECT min(first_row) FROM games WHERE state = 0)
@@ -206,7 +209,8 @@ impl Reader {
         Ok(journals)
     }
 
-    /// The journal of a game that has ended, from its last row back to its first; inside, why it cannot be read.
+    /// The journal of a finished game, found from its last row back to its first; the inner result says
+    /// why it cannot be read.
     async fn journal(
         &self,
         number: i64,
@@ -274,8 +278,8 @@ impl Reader {
             .collect()
     }
 
-    /// See `Store::unfiled`.
-    pub(super) async fn unfiled(&self) -> Result<Vec<Id>, StoreError> {
+    /// See `Store::without_record_file`.
+    pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
         let ids: Vec<Vec<u8>> = sqlx::query_scalar(
             "SELECT game_id FROM games WHERE filed = 0 AND summary IS NOT NULL ORDER BY number",
         )
@@ -287,7 +291,7 @@ impl Reader {
     }
 }
 
-/// A journal as it was read.
+/// A decoded journal.
 #[derive(Default)]
 struct Read {
     entries: Vec<Entry>,
@@ -296,7 +300,7 @@ struct Read {
 }
 
 impl Read {
-    /// Adds the next row: its number, its position, its entries.
+    /// Adds the next row: its number, position and entries.
     fn add(&mut self, row: &SqliteRow) -> Result<(), Unreadable> {
         if row.get::<i64, _>(1) != self.rows {
             let gap = format!("a part of its journal is missing at {}", self.rows);
@@ -323,7 +327,7 @@ fn check_form(form: i64) -> Result<(), Unreadable> {
     if form == FORM {
         Ok(())
     } else {
-        let problem = format!("it is kept in form {form}; this version knows form {FORM}");
+        let problem = format!("it has encoding {form}; this version reads encoding {FORM}");
         Err(Unreadable(problem))
     }
 }

@@ -1,4 +1,4 @@
-//! The database: what is kept is found again. Folders and files that cannot be used are in `opening`.
+//! The database returns what was stored. `opening` tests folders and files that cannot be used.
 
 mod forget;
 mod lists;
@@ -161,11 +161,11 @@ fn shown(value: &impl std::fmt::Debug) -> String {
 }
 
 async fn opened(folder: &Path) -> SqliteStore {
-    SqliteStore::open(folder).await.expect("the folder is fine")
+    SqliteStore::open(folder).await.expect("a usable folder")
 }
 
 #[tokio::test]
-async fn a_game_that_goes_on_is_found_as_it_was_left() {
+async fn an_unfinished_game_resumes_where_it_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let header = Arc::new(header(1, Durability::Durable));
     let entries = entries();
@@ -173,11 +173,11 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
     let mut journal = store
         .create(Arc::clone(&header), Vec::new())
         .await
-        .expect("kept");
-    // In parts, as a room hands them over.
+        .expect("committed");
+    // In parts, as a room commits them.
     for part in entries.chunks(3) {
         let mut part = part.to_vec();
-        journal.append(&mut part).await.expect("kept");
+        journal.append(&mut part).await.expect("committed");
         assert!(part.is_empty());
     }
     // The process dies: nothing is closed.
@@ -197,13 +197,16 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
             .is_none(),
         "it is not finished"
     );
-    // It goes on where it stood, and ends.
+    // It resumes and ends.
     let more = vec![entries[3].clone()];
-    game.journal.append(&mut more.clone()).await.expect("kept");
+    game.journal
+        .append(&mut more.clone())
+        .await
+        .expect("committed");
     game.journal
         .finish(Some(summary(&header)))
         .await
-        .expect("kept");
+        .expect("committed");
     store.close().await;
     drop(store);
     let store = opened(folder.path()).await;
@@ -214,23 +217,35 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
             .expect("readable")
             .is_empty()
     );
-    let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(StoredGame::Hosted(kept, journal)) = kept else {
-        panic!("not kept: {kept:?}");
+    let stored = store.finished(header.game_id).await.expect("readable");
+    let Some(StoredGame::Hosted(stored, journal)) = stored else {
+        panic!("not stored: {stored:?}");
     };
-    assert_eq!(shown(&*kept), shown(&*header));
+    assert_eq!(shown(&*stored), shown(&*header));
     assert_eq!(shown(&journal.to_vec()), shown(&[entries, more].concat()));
     let ended_at_ms = summary(&header).ended_at_ms;
     let left = store.resumable_games(ended_at_ms).await.expect("readable");
-    assert_eq!(left.len(), 1, "it is still shown for a while");
+    assert_eq!(left.len(), 1, "it is still resumable for a while");
     assert!(left[0].concluded);
-    assert_eq!(store.unfiled().await.expect("readable"), [header.game_id]);
-    store.note_filed(header.game_id).await.expect("kept");
-    assert!(store.unfiled().await.expect("readable").is_empty());
+    assert_eq!(
+        store.without_record_file().await.expect("readable"),
+        [header.game_id]
+    );
+    store
+        .mark_record_written(header.game_id)
+        .await
+        .expect("committed");
+    assert!(
+        store
+            .without_record_file()
+            .await
+            .expect("readable")
+            .is_empty()
+    );
 }
 
 #[tokio::test]
-async fn a_game_begins_with_its_first_entries() {
+async fn a_game_is_created_with_its_first_entries() {
     for durability in [Durability::Durable, Durability::Ephemeral] {
         let folder = tempfile::tempdir().expect("a folder");
         let header = Arc::new(header(1, durability));
@@ -238,25 +253,28 @@ async fn a_game_begins_with_its_first_entries() {
         let (first, rest) = entries.split_at(2);
         let store = opened(folder.path()).await;
         let begun = store.create(Arc::clone(&header), first.to_vec()).await;
-        let mut journal = begun.expect("kept");
+        let mut journal = begun.expect("committed");
         if durability == Durability::Durable {
-            // The process might die here: no game is there without them.
+            // After a crash here, no game is without its first entries.
             let left = store.resumable_games(u64::MAX).await.expect("readable");
             assert_eq!(left.len(), 1);
             assert_eq!(shown(&left[0].entries), shown(&first.to_vec()));
         }
-        journal.append(&mut rest.to_vec()).await.expect("kept");
-        journal.finish(Some(summary(&header))).await.expect("kept");
-        let kept = store.finished(header.game_id).await.expect("readable");
-        let Some(StoredGame::Hosted(_, journal)) = kept else {
-            panic!("not kept: {kept:?}");
+        journal.append(&mut rest.to_vec()).await.expect("committed");
+        journal
+            .finish(Some(summary(&header)))
+            .await
+            .expect("committed");
+        let stored = store.finished(header.game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(_, journal)) = stored else {
+            panic!("not stored: {stored:?}");
         };
         assert_eq!(shown(&journal.to_vec()), shown(&entries));
     }
 }
 
 #[tokio::test]
-async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
+async fn an_ephemeral_game_is_stored_only_when_it_ends() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Ephemeral));
@@ -272,17 +290,20 @@ async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
             .expect("readable")
             .is_empty()
     );
-    journal.finish(Some(summary(&header))).await.expect("kept");
-    let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(StoredGame::Hosted(_, journal)) = kept else {
-        panic!("not kept: {kept:?}");
+    journal
+        .finish(Some(summary(&header)))
+        .await
+        .expect("committed");
+    let stored = store.finished(header.game_id).await.expect("readable");
+    let Some(StoredGame::Hosted(_, journal)) = stored else {
+        panic!("not stored: {stored:?}");
     };
     assert_eq!(shown(&journal.to_vec()), shown(&entries()));
 }
 
 #[tokio::test]
 async fn many_rooms_share_the_writer() {
-    // More than one statement takes, and no round number.
+    // More than fit one statement, and not a round number.
     const ROOMS: u8 = 201;
     let folder = tempfile::tempdir().expect("a folder");
     let store = Arc::new(opened(folder.path()).await);
@@ -290,9 +311,9 @@ async fn many_rooms_share_the_writer() {
         let store = Arc::clone(&store);
         tokio::spawn(async move {
             let header = Arc::new(header(room, Durability::Durable));
-            let mut journal = store.create(header, Vec::new()).await.expect("kept");
+            let mut journal = store.create(header, Vec::new()).await.expect("committed");
             for entry in entries() {
-                journal.append(&mut vec![entry]).await.expect("kept");
+                journal.append(&mut vec![entry]).await.expect("committed");
             }
         })
     });
@@ -307,7 +328,7 @@ async fn many_rooms_share_the_writer() {
 }
 
 #[tokio::test]
-async fn an_imported_game_is_kept_once() {
+async fn an_imported_game_is_stored_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = header(1, Durability::Durable);
@@ -323,13 +344,13 @@ async fn an_imported_game_is_kept_once() {
         },
     ]);
     let import = || store.import(header.game_id, *summary(&header), Arc::clone(&lines));
-    // Somebody asks, and goes away before it is answered; others ask meanwhile.
+    // One caller is cancelled before the answer; others call at the same time.
     assert!(import().now_or_never().is_none());
     let answers = tokio::join!(import(), import());
-    assert_eq!(answers, (Ok(false), Ok(false)), "the first was kept");
+    assert_eq!(answers, (Ok(false), Ok(false)), "the first was stored");
     assert!(
         store.failed().now_or_never().is_none(),
-        "that is no failure"
+        "a taken id is not a failure"
     );
     let listed = (store.list(&v1::RecordFilter::default(), Part::FROM_OLDEST, 9)).await;
     let listed = listed.expect("readable");
@@ -341,11 +362,11 @@ async fn an_imported_game_is_kept_once() {
     let listed = store.list(&hosted_here, Part::FROM_OLDEST, 9).await;
     let listed = listed.expect("readable");
     assert!(listed.is_empty());
-    let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(StoredGame::Imported(kept)) = kept else {
-        panic!("not kept: {kept:?}");
+    let stored = store.finished(header.game_id).await.expect("readable");
+    let Some(StoredGame::Imported(stored)) = stored else {
+        panic!("not stored: {stored:?}");
     };
-    assert_eq!(kept, lines);
+    assert_eq!(stored, lines);
     assert!(
         store
             .resumable_games(u64::MAX)
@@ -356,16 +377,16 @@ async fn an_imported_game_is_kept_once() {
 }
 
 #[tokio::test]
-async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
+async fn an_unreadable_game_is_left_unchanged_and_others_resume() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     for game in 1..=4 {
         let mut journal = store
             .create(Arc::new(header(game, Durability::Durable)), Vec::new())
             .await
-            .expect("kept");
+            .expect("committed");
         for entry in entries() {
-            journal.append(&mut vec![entry]).await.expect("kept");
+            journal.append(&mut vec![entry]).await.expect("committed");
         }
     }
     store.close().await;
@@ -373,16 +394,16 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
     let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
     let mut connection = SqliteConnection::connect_with(&options)
         .await
-        .expect("it opens");
+        .expect("a connection");
     for damage in [
         "UPDATE journal SET entries = x'ff' WHERE game = 1 AND position = 2",
         "DELETE FROM journal WHERE game = 2 AND position = 4",
         "UPDATE games SET form = 99 WHERE number = 4",
     ] {
-        let changed = connection.execute(damage).await.expect("it is done");
+        let changed = connection.execute(damage).await.expect("executed");
         assert_eq!(changed.rows_affected(), 1, "{damage}");
     }
-    connection.close().await.expect("it closes");
+    connection.close().await.expect("closed");
     let store = opened(folder.path()).await;
     let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
     let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
@@ -390,7 +411,7 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
 }
 
 #[tokio::test]
-async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
+async fn a_missing_part_of_a_finished_game_is_detected() {
     let rows = i64::try_from(entries().len()).expect("few");
     for missing in [0, rows / 2, rows - 1] {
         let folder = tempfile::tempdir().expect("a folder");
@@ -402,45 +423,48 @@ async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
                 store
                     .create(Arc::clone(header), Vec::new())
                     .await
-                    .expect("kept"),
+                    .expect("committed"),
             );
         }
-        // The rows of the two lie among each other.
+        // The rows of the two games alternate.
         for entry in entries() {
             for journal in &mut journals {
                 let mut entry = vec![entry.clone()];
-                journal.append(&mut entry).await.expect("kept");
+                journal.append(&mut entry).await.expect("committed");
             }
         }
         for (journal, header) in journals.iter_mut().zip(&headers) {
-            journal.finish(Some(summary(header))).await.expect("kept");
+            journal
+                .finish(Some(summary(header)))
+                .await
+                .expect("committed");
         }
         store.close().await;
         drop(store);
         let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
         let mut connection = SqliteConnection::connect_with(&options)
             .await
-            .expect("it opens");
+            .expect("a connection");
         sqlx::query("DELETE FROM journal WHERE game = 1 AND position = $1")
             .bind(missing)
             .execute(&mut connection)
             .await
-            .expect("it is done");
-        connection.close().await.expect("it closes");
+            .expect("executed");
+        connection.close().await.expect("closed");
         let store = opened(folder.path()).await;
         let error = store.finished(headers[0].game_id).await.expect_err("a gap");
         assert!(error.to_string().contains("missing"), "{error}");
-        let kept = store.finished(headers[1].game_id).await.expect("readable");
-        let Some(StoredGame::Hosted(_, journal)) = kept else {
-            panic!("not kept: {kept:?}");
+        let stored = store.finished(headers[1].game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(_, journal)) = stored else {
+            panic!("not stored: {stored:?}");
         };
         assert_eq!(shown(&journal.to_vec()), shown(&entries()));
     }
 }
 
-/// What this form looks like for good: games that were kept by any version since must be readable by every later one.
+/// The encoding never changes: games stored by any version must be readable by every later one.
 #[test]
-fn the_form_of_what_is_kept_does_not_change() {
+fn the_encoding_of_stored_data_does_not_change() {
     let header = header(1, Durability::Durable);
     let mut journal = Vec::new();
     for entry in entries() {
@@ -463,7 +487,7 @@ fn the_form_of_what_is_kept_does_not_change() {
 }
 
 #[test]
-fn what_has_come_to_the_form_since_is_read_back_too() {
+fn fields_added_later_are_read_back() {
     let header = GameHeader {
         called: BTreeMap::from([(2, "Greta".to_owned())]),
         policy: Policy::default(),

@@ -1,7 +1,8 @@
-//! The one writer of the database. Rooms hand it what they want kept and wait; it takes all that has come meanwhile into one transaction,
-//! so that many rooms share one sync of the disk. While a transaction is being synced, the next one gathers: nobody waits for others to
-//! come. A transaction is mostly rows of the journal and nothing else; those are written by one call, because every call goes to the
-//! database's own thread and back.
+//! The only writer of the database. Rooms send it commands and wait; it executes all waiting commands
+//! in one transaction, so that many rooms share one sync of the disk. While a transaction is synced,
+//! the next one gathers: no command waits for others to arrive. Most transactions are rows of the
+//! journal only; those are written by one call, because every call goes to the database's own thread
+//! and back.
 
 use std::collections::BTreeMap;
 
@@ -19,35 +20,36 @@ use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 
-/// WriteQueue that wait for the writer.
+/// Commands that may wait for the writer.
 pub(super) const QUEUE: usize = 1_024;
-/// WriteQueue in one transaction.
-const MOST_IN_ONE: usize = 1_024;
-/// Rows of the journal that one statement takes at most. There are only these, so that few statements need to be known.
+/// Most commands in one transaction.
+const MAX_COMMANDS_PER_TRANSACTION: usize = 1_024;
+/// Numbers of rows that one statement inserts. There are only these, so that few statements need to be
+/// prepared.
 const ROWS: [usize; 5] = [1, 4, 16, 32, 64];
 
-/// Something to be kept.
+/// A command to the writer.
 pub(super) enum WriteCommand {
-    /// A game begins.
+    /// Creates a game.
     Create {
         number: i64,
         game_id: Id,
         header: Vec<u8>,
-        /// Its rows come from here on.
+        /// Lowest number of its rows.
         first_row: i64,
-        /// The first of them, if it begins with one.
+        /// Its first row, if there is one.
         first: Option<Row>,
     },
-    /// A game goes on.
+    /// Adds a row to a game.
     Append(Row),
-    /// A game is over.
+    /// Ends a game.
     Finish {
         number: i64,
         state: i32,
         last_row: Option<i64>,
         summary: Option<Box<v1::RecordSummary>>,
     },
-    /// A game that was kept in memory until it was over.
+    /// Stores a game that was only in memory until it ended.
     Whole {
         number: i64,
         game_id: Id,
@@ -56,45 +58,45 @@ pub(super) enum WriteCommand {
         entries: Vec<u8>,
         summary: Box<v1::RecordSummary>,
     },
-    /// A game that was played elsewhere.
+    /// Stores a game that was played elsewhere.
     Import {
         number: i64,
         game_id: Id,
         record: Vec<u8>,
         summary: Box<v1::RecordSummary>,
     },
-    /// The record of a game has been written to a file.
-    Filed { game_id: Id },
-    /// A tournament begins.
+    /// Marks the record of a game as written to a file.
+    RecordWritten { game_id: Id },
+    /// Creates a tournament.
     Tournament {
         header: Vec<u8>,
         first: TournamentRow,
     },
-    /// A tournament goes on.
+    /// Adds a row to a tournament.
     TournamentEntries(TournamentRow),
-    /// Nothing more will be ordered.
+    /// No command follows.
     Close,
 }
 
 /// A row of the journal.
 pub(super) struct Row {
-    /// Its number, in the order of all games' rows, or nearly so.
+    /// Its number, nearly in the order of all games' rows.
     pub(super) number: i64,
     pub(super) game: i64,
     /// Its number in its game, from 0.
     pub(super) position: i64,
-    /// The number of the game's row before it.
+    /// The number of the game's previous row.
     pub(super) previous: Option<i64>,
     pub(super) entries: Vec<u8>,
 }
 
-/// What moved a tournament, kept at a time.
+/// A row of a tournament's journal.
 pub(super) struct TournamentRow {
     id: Id,
     /// Its number in its tournament, from 0.
     position: i64,
     entries: Vec<u8>,
-    /// Whether the tournament is over with it.
+    /// Whether it ends the tournament.
     over: bool,
 }
 
@@ -109,11 +111,11 @@ impl TournamentRow {
     }
 }
 
-/// An order and whom to tell when it is kept.
+/// A command and the sender of its result.
 pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>);
 
-/// Keeps what is ordered until nobody can order any more. After the first failure it keeps nothing: what became of the transaction that
-/// failed is not known.
+/// Executes commands until all senders are gone. After the first failure it executes none: the
+/// outcome of the failed transaction is unknown.
 ///
 /// `last_listed` is the highest number in the list of finished games.
 pub(super) async fn run(
@@ -124,14 +126,19 @@ pub(super) async fn run(
 ) {
     let mut pending = Vec::new();
     let mut open = true;
-    while open && orders.recv_many(&mut pending, MOST_IN_ONE).await > 0 {
+    while open
+        && orders
+            .recv_many(&mut pending, MAX_COMMANDS_PER_TRANSACTION)
+            .await
+            > 0
+    {
         open = !pending
             .iter()
             .any(|(order, _)| matches!(order, WriteCommand::Close));
         let failure = failed.borrow().clone();
         let kept = match failure {
             Some(failure) => Err(failure),
-            None => keep(&mut connection, &mut pending, &mut last_listed)
+            None => commit(&mut connection, &mut pending, &mut last_listed)
                 .await
                 .map_err(|cause| {
                     let failure = StoreError::Failed(explain(&cause));
@@ -147,31 +154,31 @@ pub(super) async fn run(
                     .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),
                 Err(failure) => Err(failure.clone()),
             };
-            // The room may be gone.
+            // The room may have gone.
             let _ = reply.send(answer);
         }
     }
-    // What is in the write-ahead log is as safe as what is in the database: closing only tidies up.
+    // The write-ahead log is as safe as the database: closing only tidies up.
     if let Err(cause) = connection.close().await {
-        error!(%cause, "the database was not closed in good order");
+        error!(%cause, "closing the database failed");
     }
 }
 
 /// Commits commands; returns those that were refused because their id is taken, by their index.
-async fn keep(
+async fn commit(
     connection: &mut SqliteConnection,
     pending: &mut [Pending],
     last_listed: &mut i64,
 ) -> sqlx::Result<BTreeMap<usize, Id>> {
     let written = write(connection, pending, last_listed).await;
     if written.is_err() {
-        // The transaction is given up in any case, at the latest when the file is opened again.
+        // The transaction is rolled back in any case, at the latest when the file is opened again.
         let _ = connection.execute("ROLLBACK").await;
     }
     written
 }
 
-/// Writes orders in one transaction.
+/// Writes commands in one transaction.
 async fn write(
     connection: &mut SqliteConnection,
     pending: &mut [Pending],
@@ -183,7 +190,7 @@ async fn write(
     if !rows_alone {
         connection.execute("BEGIN IMMEDIATE").await?;
     }
-    // A game has one order at a time, so that those of different kinds may go in any order.
+    // A game has at most one command at a time, so commands of different kinds may run in any order.
     for (index, (order, _)) in pending.iter_mut().enumerate() {
         match order {
             WriteCommand::Append(row) => rows.push(row),
@@ -290,7 +297,7 @@ async fn write(
                 }
             }
             WriteCommand::TournamentEntries(row) => move_tournament(connection, row).await?,
-            WriteCommand::Filed { game_id } => {
+            WriteCommand::RecordWritten { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
                     .bind(game_id.0.as_slice())
                     .execute(&mut *connection)
@@ -300,7 +307,7 @@ async fn write(
     }
     let begin = if rows_alone { "BEGIN IMMEDIATE; " } else { "" };
     rows.sort_by_key(|row| row.number);
-    // Nothing but places for values is put into the text.
+    // The text only has placeholders for values.
     let text = format!("{begin}{}COMMIT", insert(rows.len()));
     let mut query = sqlx::query(AssertSqlSafe(text));
     for row in rows {
@@ -315,8 +322,9 @@ async fn write(
     Ok(taken)
 }
 
-/// Statements that put so many rows into the journal. Places of the last one for which there is no row are left empty, which SQLite reads
-/// as NULL. Should one fail, the whole transaction is given up: there need be no notes on how to undo the statement alone.
+/// Statements that insert this number of rows into the journal. Unused placeholders of the last one
+/// stay unbound, which SQLite reads as NULL. If one fails, the whole transaction is rolled back, so
+/// SQLite need not keep an undo log for the statement.
 fn insert(mut rows: usize) -> String {
     let mut text = String::new();
     while rows > 0 {
@@ -378,7 +386,7 @@ async fn move_tournament(
     Ok(())
 }
 
-/// Writes how a game ended and by what it is found, and enters it into the list of finished games.
+/// Writes the end and the search fields of a game, and adds it to the list of finished games.
 async fn summarise(
     connection: &mut SqliteConnection,
     number: i64,

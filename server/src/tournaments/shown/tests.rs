@@ -1,4 +1,4 @@
-//! What everybody is shown of a tournament: how often it is worked out, and how large it can become.
+//! How often public views of a tournament are computed, and how large they can become.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -16,11 +16,11 @@ use crate::config::MAX_NAME_CHARS;
 use crate::tournaments::handle::TournamentState;
 use chefshat_room::ids::{Id, Token};
 
-/// What standard gRPC clients take, bytes.
-const STANDARD_LIMIT: usize = 4 * 1024 * 1024;
+/// Default message limit of gRPC clients, bytes.
+const DEFAULT_MESSAGE_LIMIT: usize = 4 * 1024 * 1024;
 
 impl TournamentHandle {
-    /// A tournament with so many built-in agents that nobody moves.
+    /// A tournament with this number of built-in agents, without a task.
     pub(crate) fn for_tests(participants: usize) -> Arc<Self> {
         Self::with_settings(
             participants,
@@ -36,10 +36,10 @@ impl TournamentHandle {
             max_participants: convert::number(participants.max(2)),
             ..settings
         };
-        let plan = convert::tournament_plan(&settings, [1; 32]).expect("it can be held");
-        let mut core = Tournament::new(plan.core.clone()).expect("it can be held");
+        let plan = convert::tournament_plan(&settings, [1; 32]).expect("valid settings");
+        let mut core = Tournament::new(plan.core.clone()).expect("valid settings");
         for number in 0..participants {
-            // As long as a name can be.
+            // The longest allowed name.
             let digits = format!("{number:04}");
             let long = "🍕".repeat(MAX_NAME_CHARS - digits.len());
             core.fold(&Change::Joined(Entrant {
@@ -74,9 +74,9 @@ impl TournamentHandle {
         })
     }
 
-    fn begun(self: Arc<Self>) -> Arc<Self> {
-        let begun = self.look(Tournament::begin).expect("there are enough");
-        for change in begun {
+    fn started(self: Arc<Self>) -> Arc<Self> {
+        let started = self.look(Tournament::begin).expect("there are enough");
+        for change in started {
             self.committed().core.fold(&change);
         }
         self
@@ -93,7 +93,7 @@ impl TournamentHandle {
         }
     }
 
-    /// Ends all games that were called.
+    /// Ends all called games.
     fn end_games(&self) {
         let mut moving = self.committed();
         let playing: Vec<usize> = moving.core.playing().collect();
@@ -114,32 +114,32 @@ impl TournamentHandle {
     }
 }
 
-fn turns() -> Arc<Semaphore> {
+fn test_permits() -> Arc<Semaphore> {
     Arc::new(Semaphore::new(1))
 }
 
 #[tokio::test]
-async fn what_is_shown_is_worked_out_once_for_each_change() {
-    let (hosted, permits) = (TournamentHandle::for_tests(8), turns());
-    let told = hosted.told(&permits).await.expect("it is worked out");
-    let results = hosted.results(&permits).await.expect("they are worked out");
-    let same = hosted.told(&permits).await.expect("it is worked out");
-    assert!(Arc::ptr_eq(&told, &same));
-    let same = hosted.results(&permits).await.expect("they are worked out");
+async fn views_are_computed_once_for_each_change() {
+    let (hosted, permits) = (TournamentHandle::for_tests(8), test_permits());
+    let follower_update = hosted.follower_update(&permits).await.expect("computed");
+    let results = hosted.results(&permits).await.expect("computed");
+    let same = hosted.follower_update(&permits).await.expect("computed");
+    assert!(Arc::ptr_eq(&follower_update, &same));
+    let same = hosted.results(&permits).await.expect("computed");
     assert!(Arc::ptr_eq(&results, &same));
     hosted.changes.send_modify(|count| *count += 1);
-    let other = hosted.told(&permits).await.expect("it is worked out");
-    assert!(!Arc::ptr_eq(&told, &other));
-    // Who was told that it has begun before the change was counted is shown no less.
-    let hosted = hosted.begun();
-    let begun = hosted.results(&permits).await.expect("they are worked out");
-    let state = begun.message.tournament.as_ref().map(|it| it.state());
+    let other = hosted.follower_update(&permits).await.expect("computed");
+    assert!(!Arc::ptr_eq(&follower_update, &other));
+    // A client that was told of the start before the change was counted sees no earlier state.
+    let hosted = hosted.started();
+    let started = hosted.results(&permits).await.expect("computed");
+    let state = started.message.tournament.as_ref().map(|it| it.state());
     assert_eq!(state, Some(v1::TournamentState::Playing));
 }
 
 #[tokio::test]
-async fn who_asks_waits_for_a_turn_and_holds_no_lock() {
-    let (hosted, permits) = (TournamentHandle::for_tests(8), turns());
+async fn computing_waits_for_a_permit_without_holding_a_lock() {
+    let (hosted, permits) = (TournamentHandle::for_tests(8), test_permits());
     let taken = Arc::clone(&permits)
         .acquire_owned()
         .await
@@ -148,12 +148,12 @@ async fn who_asks_waits_for_a_turn_and_holds_no_lock() {
     assert!(futures::poll!(&mut asking).is_pending());
     assert_eq!(hosted.describe().participants.len(), 8);
     drop(taken);
-    let results = asking.await.expect("they are worked out");
+    let results = asking.await.expect("computed");
     assert_eq!(results.message.standings.len(), 8);
 }
 
 #[test]
-fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
+fn followers_receive_the_running_games_and_the_last_ones() {
     let hosted = TournamentHandle::with_settings(
         64,
         v1::TournamentSettings {
@@ -163,9 +163,9 @@ fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
             ..v1::TournamentSettings::default()
         },
     )
-    .begun();
+    .started();
     hosted.call_games();
-    let first = hosted.tell().games;
+    let first = hosted.compute_update().games;
     assert_eq!(first.len(), MAX_GAMES_FOLLOWED);
     let in_state = |games: &[v1::TournamentGame], state| {
         let numbers = games.iter().filter(|game| game.state() == state);
@@ -178,10 +178,10 @@ fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
         hosted.end_games();
         hosted.call_games();
     }
-    let told = hosted.tell();
+    let follower_update = hosted.compute_update();
     let playing: Vec<u32> = hosted.look(|core| core.playing().map(convert::number).collect());
     assert_eq!(
-        in_state(&told.games, v1::TournamentGameState::Playing),
+        in_state(&follower_update.games, v1::TournamentGameState::Playing),
         playing
     );
     let counted: Vec<u32> = hosted.look(|core| {
@@ -192,19 +192,20 @@ fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
     assert_eq!(counted.len(), 640);
     let shown = MAX_GAMES_FOLLOWED - playing.len();
     assert_eq!(
-        in_state(&told.games, v1::TournamentGameState::Counted),
+        in_state(&follower_update.games, v1::TournamentGameState::Counted),
         counted[counted.len() - shown..]
     );
-    assert!(told.games.is_sorted_by_key(|game| game.game));
+    assert!(follower_update.games.is_sorted_by_key(|game| game.game));
     assert!(
-        told.games
+        follower_update
+            .games
             .iter()
             .all(|game| !game.room_id.is_empty() || game.calls == 0)
     );
 }
 
 #[test]
-fn of_a_round_robin_followers_are_told_what_is_being_played() {
+fn followers_of_a_round_robin_receive_the_running_games() {
     let hosted = TournamentHandle::with_settings(
         8,
         v1::TournamentSettings {
@@ -213,20 +214,20 @@ fn of_a_round_robin_followers_are_told_what_is_being_played() {
             ..v1::TournamentSettings::default()
         },
     )
-    .begun();
+    .started();
     hosted.call_games();
     hosted.end_games();
     hosted.call_games();
-    let games = hosted.tell().games;
+    let games = hosted.compute_update().games;
     assert_eq!(games.len(), 3);
     let playing = v1::TournamentGameState::Playing;
     assert!(games.iter().all(|game| game.state() == playing));
 }
 
 #[test]
-fn no_message_outgrows_what_standard_clients_take() {
+fn no_message_exceeds_the_default_limit_of_clients() {
     let hosted = TournamentHandle::for_tests(MAX_PARTICIPANTS);
-    let mut results = hosted.sum_up();
+    let mut results = hosted.compute_results();
     for standing in &mut results.standings {
         *standing = v1::TournamentStanding {
             place: u32::MAX,
@@ -251,7 +252,7 @@ fn no_message_outgrows_what_standard_clients_take() {
         };
     }
     assert_eq!(results.standings.len(), MAX_PARTICIPANTS);
-    // Once a game has counted there is one for each two neighbours.
+    // Once a game has counted, there is one for each two neighbours.
     let pair = v1::OrderConfidence {
         upper: u32::MAX,
         lower: u32::MAX,
@@ -262,7 +263,7 @@ fn no_message_outgrows_what_standard_clients_take() {
     };
     results.confidence = vec![pair; MAX_PARTICIPANTS - 1];
     let size = results.encoded_len();
-    assert!(size < STANDARD_LIMIT, "{size} bytes of results");
+    assert!(size < DEFAULT_MESSAGE_LIMIT, "{size} bytes of results");
     let seat = v1::TournamentGameSeat {
         participant: u32::MAX,
         forfeited: true,
@@ -291,11 +292,11 @@ fn no_message_outgrows_what_standard_clients_take() {
         rated: true,
         shifts: u32::MAX,
     };
-    let told = v1::FollowTournamentResponse {
+    let follower_update = v1::FollowTournamentResponse {
         games: vec![game; MAX_GAMES_FOLLOWED],
         standings: results.standings,
-        ..hosted.tell()
+        ..hosted.compute_update()
     };
-    let size = told.encoded_len();
-    assert!(size < STANDARD_LIMIT, "{size} bytes for a follower");
+    let size = follower_update.encoded_len();
+    assert!(size < DEFAULT_MESSAGE_LIMIT, "{size} bytes for a follower");
 }

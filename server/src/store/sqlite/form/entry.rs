@@ -99,7 +99,7 @@ struct ExpressedForm {
     expression: Vec<u8>,
 }
 
-/// The numbers that stand for kinds, sources and reasons. What has a number keeps it.
+/// The numbers of kinds, sources and reasons. A released number never changes.
 const KINDS: [(u32, ParticipantKind); 3] = [
     (1, ParticipantKind::Agent),
     (2, ParticipantKind::Human),
@@ -124,13 +124,13 @@ const REASONS: [(u32, AbortReason); 5] = [
 fn number_of<T: PartialEq>(table: &[(u32, T)], value: &T) -> u32 {
     (table.iter().find(|(_, known)| known == value))
         .map(|(number, _)| *number)
-        .expect("every value has its number")
+        .expect("every value has a number")
 }
 
 fn value_of<T: Copy>(table: &[(u32, T)], number: u32, what: &str) -> Result<T, Unreadable> {
     (table.iter().find(|(known, _)| *known == number))
         .map(|(_, value)| *value)
-        .ok_or_else(|| Unreadable::new(format!("{number} is no {what} that this version knows")))
+        .ok_or_else(|| Unreadable::new(format!("{number} is not a known {what}")))
 }
 
 /// Adds an entry to a blob of entries.
@@ -178,13 +178,13 @@ pub(in crate::store::sqlite) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         change: Some(change),
     }
     .encode_length_delimited(out)
-    .expect("a vector takes what is put in");
+    .expect("a vector grows as needed");
 }
 
-/// Reads the entries of a blob, to the end of `entries`.
+/// Appends the entries of a blob to `entries`.
 ///
 /// # Errors
-/// The first thing that makes no sense.
+/// The first invalid entry.
 pub(in crate::store::sqlite) fn read_entries(
     mut bytes: &[u8],
     entries: &mut Vec<Entry>,
@@ -193,7 +193,7 @@ pub(in crate::store::sqlite) fn read_entries(
         let form = EntryForm::decode_length_delimited(&mut bytes)?;
         let change = form
             .change
-            .ok_or_else(|| Unreadable::new("an entry of a kind that this version does not know"))?;
+            .ok_or_else(|| Unreadable::new("an entry has an unknown kind"))?;
         entries.push(Entry {
             at: Duration::from_micros(form.at_us),
             change: change_from(change)?,
@@ -248,5 +248,5 @@ fn seat(number: u32) -> Result<Seat, Unreadable> {
         .ok()
         .filter(|index| *index < chefshat_engine::MAX_SEATS)
         .map(Seat::new)
-        .ok_or_else(|| Unreadable::new(format!("{number} is no seat")))
+        .ok_or_else(|| Unreadable::new(format!("{number} is not a seat")))
 }

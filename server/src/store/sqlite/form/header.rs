@@ -1,4 +1,4 @@
-//! What stood about a game before it began.
+//! The header of a game.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,7 @@ struct HeaderForm {
     series: Vec<u8>,
 }
 
-/// A header as a blob.
+/// Encodes a header.
 pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
     let (server_seed, nonce, fixed_game_seed) = match header.seed {
         SeedPlan::Committed { server_seed, nonce } => {
@@ -85,10 +85,10 @@ pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> 
     .encode_to_vec()
 }
 
-/// Reads a header.
+/// Decodes a header.
 ///
 /// # Errors
-/// What makes no sense in it.
+/// An invalid field.
 pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
     let field = |problem: FieldProblem| Unreadable(problem.to_string());
@@ -103,7 +103,7 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
         rules_version: form.rules_version,
         policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
         fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
-        // Not looked at again: what is kept stays readable, whichever names are taken later.
+        // Not checked again: stored games stay readable even if the rules for names change.
         called: (form.seats.into_iter().enumerate())
             .filter(|(_, seat)| !seat.name.is_empty())
             .map(|(seat, config)| (seat, config.name))

@@ -1,6 +1,7 @@
-//! The form in which headers and journals stand in the database: protocol buffers of their own, so that neither a change of the engine's
-//! types nor one of the protocol's messages touches what was kept. Fields are only ever added. Messages of the protocol that are the same
-//! for good (rule sets, policies, annotations, expressions) are kept as they are.
+//! The encoding of headers and journals in the database: separate protocol buffers, so that stored
+//! games do not depend on the engine's types or the protocol's messages. Fields are only ever added.
+//! Messages of the protocol that never change (rule sets, policies, annotations, expressions) are
+//! stored as they are.
 
 mod entry;
 mod header;
@@ -17,10 +18,10 @@ pub(super) use tournament::{
     tournament_to_bytes,
 };
 
-/// Version of the form.
+/// Version of the encoding.
 pub(super) const FORM: i64 = 1;
 
-/// Why something that was kept cannot be read.
+/// Why stored data cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct Unreadable(pub(super) String);
@@ -37,20 +38,20 @@ impl From<prost::DecodeError> for Unreadable {
     }
 }
 
-/// The lines of an imported game as a blob.
+/// Encodes the lines of an imported game.
 pub(super) fn lines_to_bytes(lines: &[v1::RecordLine]) -> Vec<u8> {
     let mut out = Vec::new();
     for line in lines {
         line.encode_length_delimited(&mut out)
-            .expect("a vector takes what is put in");
+            .expect("a vector grows as needed");
     }
     out
 }
 
-/// Reads the lines of an imported game.
+/// Decodes the lines of an imported game.
 ///
 /// # Errors
-/// What is no line.
+/// An invalid line.
 pub(super) fn lines_from_bytes(mut bytes: &[u8]) -> Result<Vec<v1::RecordLine>, Unreadable> {
     let mut lines = Vec::new();
     while !bytes.is_empty() {
@@ -62,7 +63,7 @@ pub(super) fn lines_from_bytes(mut bytes: &[u8]) -> Result<Vec<v1::RecordLine>, 
 fn action(number: u32) -> Result<ActionId, Unreadable> {
     u16::try_from(number)
         .map(ActionId::new)
-        .map_err(|_| Unreadable::new(format!("{number} is no action")))
+        .map_err(|_| Unreadable::new(format!("{number} is not an action")))
 }
 
 fn array<const N: usize>(bytes: &[u8], what: &str) -> Result<[u8; N], Unreadable> {

@@ -1,4 +1,4 @@
-//! Tournaments: headers and what moved them.
+//! Headers and journals of tournaments.
 
 use chefshat_agents::AgentKind;
 use chefshat_proto::v1;
@@ -91,7 +91,8 @@ struct DrawnForm {
     byes: Vec<u64>,
 }
 
-/// A number and participants: a game and those who are not there, or a table (without a number) and who sits there.
+/// A number and participants: a game and its absent participants, or a table (without a number) and
+/// its participants.
 #[derive(Clone, PartialEq, Message)]
 struct GameForm {
     #[prost(uint64, tag = "1")]
@@ -148,7 +149,7 @@ struct SeatForm {
     performance_score: f64,
 }
 
-/// A header as a blob.
+/// Encodes a header.
 pub(in crate::store::sqlite) fn tournament_to_bytes(header: &TournamentHeader) -> Vec<u8> {
     HeaderForm {
         id: header.id.0.to_vec(),
@@ -161,10 +162,10 @@ pub(in crate::store::sqlite) fn tournament_to_bytes(header: &TournamentHeader) -
     .encode_to_vec()
 }
 
-/// Reads a header.
+/// Decodes a header.
 ///
 /// # Errors
-/// What makes no sense in it.
+/// An invalid field.
 pub(in crate::store::sqlite) fn tournament_from_bytes(
     bytes: &[u8],
 ) -> Result<TournamentHeader, Unreadable> {
@@ -179,30 +180,29 @@ pub(in crate::store::sqlite) fn tournament_from_bytes(
     })
 }
 
-/// Entries as a blob.
+/// Encodes entries.
 pub(in crate::store::sqlite) fn tournament_entries_to_bytes(
     entries: &[TournamentEntry],
 ) -> Vec<u8> {
     let mut out = Vec::new();
     for entry in entries {
         let kind = Some(kind_of(entry));
-        (EntryForm { kind }.encode_length_delimited(&mut out))
-            .expect("a vector takes what is put in");
+        (EntryForm { kind }.encode_length_delimited(&mut out)).expect("a vector grows as needed");
     }
     out
 }
 
-/// Reads entries.
+/// Decodes entries.
 ///
 /// # Errors
-/// What makes no sense in them.
+/// An invalid entry.
 pub(in crate::store::sqlite) fn tournament_entries_from_bytes(
     mut bytes: &[u8],
 ) -> Result<Vec<TournamentEntry>, Unreadable> {
     let mut entries = Vec::new();
     while !bytes.is_empty() {
         let form = EntryForm::decode_length_delimited(&mut bytes)?;
-        let kind = (form.kind).ok_or_else(|| Unreadable::new("an entry says nothing"))?;
+        let kind = (form.kind).ok_or_else(|| Unreadable::new("an entry is empty"))?;
         entries.push(entry_of(kind)?);
     }
     Ok(entries)
@@ -325,7 +325,9 @@ fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
             2 => EntrantKind::Human,
             3 => EntrantKind::Robot,
             kind => {
-                return Err(Unreadable::new(format!("{kind} is no kind of participant")));
+                return Err(Unreadable::new(format!(
+                    "{kind} is not a kind of participant"
+                )));
             }
         },
         built_in: match form.built_in.as_str() {

@@ -1,4 +1,5 @@
-//! Taking somebody out of the database. What becomes of whole games and their files is tested with the command line.
+//! Removing a participant from the database. The tests of the command line cover whole games and
+//! their files.
 
 use chefshat_record::pseudonym::Pseudonym;
 
@@ -6,7 +7,7 @@ use super::*;
 use crate::store::Forgetting;
 
 #[tokio::test]
-async fn who_sat_down_is_known_whether_they_stayed_or_not() {
+async fn participants_who_sat_down_are_listed_whether_they_stayed_or_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Durable));
@@ -26,23 +27,35 @@ async fn who_sat_down_is_known_whether_they_stayed_or_not() {
         change: Change::Vacated(Seat::new(1)),
     };
     let created = store.create(Arc::clone(&header), vec![seated("Ana"), left]);
-    let mut journal = created.await.expect("kept");
-    journal.append(&mut vec![seated("Bo")]).await.expect("kept");
-    journal.finish(Some(summary(&header))).await.expect("kept");
+    let mut journal = created.await.expect("committed");
+    journal
+        .append(&mut vec![seated("Bo")])
+        .await
+        .expect("committed");
+    journal
+        .finish(Some(summary(&header)))
+        .await
+        .expect("committed");
     drop(journal);
     store.close().await;
     drop(store);
 
     let mut database = Forgetting::open(folder.path()).await.expect("free");
-    let sat_down = database.sat_down(header.game_id).await.expect("readable");
-    assert_eq!(sat_down, ["Ana", "Bo"]);
+    let seated_names = database
+        .seated_names(header.game_id)
+        .await
+        .expect("readable");
+    assert_eq!(seated_names, ["Ana", "Bo"]);
     let who = Pseudonym {
         name: "Ana".into(),
         pseudonym: "X".into(),
     };
     assert_eq!(database.forget(&who).await.expect("over").games, 1);
-    let sat_down = database.sat_down(header.game_id).await.expect("readable");
-    assert_eq!(sat_down, ["X", "Bo"]);
-    let nowhere = database.sat_down(Id([9; 16])).await.expect("readable");
+    let seated_names = database
+        .seated_names(header.game_id)
+        .await
+        .expect("readable");
+    assert_eq!(seated_names, ["X", "Bo"]);
+    let nowhere = database.seated_names(Id([9; 16])).await.expect("readable");
     assert!(nowhere.is_empty());
 }

@@ -13,18 +13,21 @@ async fn lists_are_filtered_and_paged() {
         let mut journal = store
             .create(Arc::clone(&header), Vec::new())
             .await
-            .expect("kept");
-        journal.finish(Some(summary(&header))).await.expect("kept");
+            .expect("committed");
+        journal
+            .finish(Some(summary(&header)))
+            .await
+            .expect("committed");
     }
-    let unheard_of = {
+    let abandoned = {
         let mut journal = store
             .create(Arc::new(header(6, Durability::Durable)), Vec::new())
             .await
-            .expect("kept");
-        // Nothing was dealt in it: there is no record.
+            .expect("committed");
+        // Nothing was dealt in it, so it has no record.
         journal.finish(None).await
     };
-    unheard_of.expect("kept");
+    abandoned.expect("committed");
     let filter = v1::RecordFilter::default;
     let robot = v1::ParticipantKind::Robot.into();
     let human = v1::ParticipantKind::Human.into();
@@ -52,7 +55,7 @@ async fn lists_are_filtered_and_paged() {
             9,
             vec![4],
         ),
-        // A built-in agent is itself, whatever it was called.
+        // A built-in agent is found by its agent, not by its display name.
         (
             v1::RecordFilter {
                 participant: "name of 4".into(),
@@ -134,9 +137,9 @@ async fn lists_are_filtered_and_paged() {
         let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
         assert_eq!(numbers, expected, "{filter:?}");
         for (number, summary) in listed {
-            assert!(crate::store::lets_through(&filter, &summary), "{number}");
+            assert!(crate::store::matches_filter(&filter, &summary), "{number}");
         }
-        // The other way round the same come, whole or page by page.
+        // In reverse order the same games come, whole or page by page.
         let all = store.list(&filter, Part::FROM_OLDEST, 9).await;
         let backwards: Vec<u64> = (all.expect("readable").iter().rev())
             .map(|(number, _)| *number)

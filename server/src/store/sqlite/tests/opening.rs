@@ -1,22 +1,26 @@
-//! Opening a data folder: what cannot be used is refused and left as it is, what is not wanted any more goes.
+//! Opening a data folder: unusable ones are refused and left unchanged, obsolete data is removed.
 
 use super::*;
 
 #[tokio::test]
-async fn what_cannot_be_used_is_refused_and_left_as_it_is() {
+async fn unusable_files_are_refused_and_left_unchanged() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join(super::super::errors::FILE);
     let refusal = async |what: &str| {
-        let before = std::fs::read(&file).expect("it is there");
+        let before = std::fs::read(&file).expect("the file exists");
         let refused = SqliteStore::open(folder.path()).await;
-        let error = refused.err().unwrap_or_else(|| panic!("{what} was taken"));
-        assert_eq!(std::fs::read(&file).expect("still there"), before, "{what}");
+        let error = refused.err().unwrap_or_else(|| panic!("{what} was opened"));
+        assert_eq!(
+            std::fs::read(&file).expect("the file still exists"),
+            before,
+            "{what}"
+        );
         error
     };
 
     std::fs::write(
         &file,
-        "no database at all, and long enough to be taken for one".repeat(9),
+        "not a database at all, but as long as one".repeat(13),
     )
     .expect("written");
     let error = refusal("a text").await;
@@ -54,7 +58,7 @@ async fn what_cannot_be_used_is_refused_and_left_as_it_is() {
     assert!(matches!(error, OpenError::Newer(_)), "{error}");
     assert!(error.to_string().contains("newer version"), "{error}");
 
-    // The first page is whole, so that it is known as ours; what it points to is not there.
+    // The first page is intact, so the file is recognised; the pages it refers to are missing.
     let mut bytes = std::fs::read(&file).expect("readable");
     bytes.truncate(4_096);
     bytes.resize(8 * 4_096, 0xa5);
@@ -64,13 +68,13 @@ async fn what_cannot_be_used_is_refused_and_left_as_it_is() {
 }
 
 #[tokio::test]
-async fn a_database_of_which_only_the_log_is_left_is_not_begun_anew() {
+async fn a_database_with_only_its_log_left_is_not_recreated() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Durable));
-    let mut journal = store.create(header, Vec::new()).await.expect("kept");
-    journal.append(&mut entries()).await.expect("kept");
-    // The process dies with most of what it kept in the log of writes.
+    let mut journal = store.create(header, Vec::new()).await.expect("committed");
+    journal.append(&mut entries()).await.expect("committed");
+    // The process dies with most of its data in the write-ahead log.
     let copy = tempfile::tempdir().expect("a folder");
     for name in ["games.sqlite3", "games.sqlite3-wal"] {
         std::fs::copy(folder.path().join(name), copy.path().join(name)).expect("copied");
@@ -79,22 +83,22 @@ async fn a_database_of_which_only_the_log_is_left_is_not_begun_anew() {
     let log = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
     assert!(!log.is_empty());
     let refused = SqliteStore::open(copy.path()).await;
-    let error = refused.err().expect("it is damaged");
+    let error = refused.err().expect("a damaged database");
     assert!(matches!(error, OpenError::Damaged(..)), "{error}");
     let left = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
     assert_eq!(left, log);
 }
 
 #[tokio::test]
-async fn what_was_given_up_before_a_deal_leaves_nothing_behind() {
+async fn games_abandoned_before_the_deal_leave_nothing_behind() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     for game in 1..=2 {
         let header = Arc::new(header(game, Durability::Durable));
-        let mut journal = store.create(header, Vec::new()).await.expect("kept");
-        journal.append(&mut entries()).await.expect("kept");
+        let mut journal = store.create(header, Vec::new()).await.expect("committed");
+        journal.append(&mut entries()).await.expect("committed");
         if game == 1 {
-            journal.finish(None).await.expect("kept");
+            journal.finish(None).await.expect("committed");
         }
     }
     store.close().await;
@@ -116,11 +120,11 @@ async fn what_was_given_up_before_a_deal_leaves_nothing_behind() {
 }
 
 #[tokio::test]
-async fn one_server_has_a_folder_at_a_time() {
+async fn only_one_server_can_use_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let first = opened(folder.path()).await;
     let second = SqliteStore::open(folder.path()).await;
-    let error = second.err().expect("it is in use");
+    let error = second.err().expect("the folder is in use");
     assert!(matches!(error, OpenError::InUse(_)), "{error}");
     first.close().await;
     drop(first);

@@ -1,4 +1,4 @@
-//! Tournaments: what is kept of them is found again, in a form that stays readable.
+//! Stored tournaments are read back, and their encoding stays readable.
 
 use chefshat_tournament::{Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult};
 
@@ -23,7 +23,7 @@ fn cup(number: u8) -> TournamentHeader {
 }
 
 /// One entry of every kind.
-fn moved() -> Vec<TournamentEntry> {
+fn every_entry() -> Vec<TournamentEntry> {
     let entrant = Entrant {
         name: "Bruna".into(),
         kind: EntrantKind::Robot,
@@ -110,36 +110,36 @@ fn shown(value: &impl std::fmt::Debug) -> String {
 }
 
 #[tokio::test]
-async fn what_was_kept_of_tournaments_is_found_again_in_order() {
+async fn stored_tournaments_are_read_back_in_order() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let store = SqliteStore::open(folder.path()).await.expect("it opens");
-    let entries = moved();
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    let entries = every_entry();
     let (first, rest) = entries.split_at(5);
     for (number, begins_with) in [(7, &[][..]), (3, first)] {
         let header = Arc::new(cup(number));
         let made = store.create_tournament(header, begins_with.to_vec());
-        made.await.expect("it is kept");
+        made.await.expect("committed");
     }
-    let kept = store.append_tournament(Id([3; 16]), 1, rest.to_vec());
-    kept.await.expect("it is kept");
+    let stored = store.append_tournament(Id([3; 16]), 1, rest.to_vec());
+    stored.await.expect("committed");
     store.close().await;
     drop(store);
-    let store = SqliteStore::open(folder.path()).await.expect("it opens");
-    let found = store.tournaments(9).await.expect("it reads");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    let found = store.tournaments(9).await.expect("readable");
     assert_eq!(found.len(), 2);
     assert_eq!(shown(&found[0].header), shown(&cup(7)));
     assert_eq!((found[0].rows, found[0].entries.len()), (1, 0));
     assert_eq!(shown(&found[1].header), shown(&cup(3)));
     assert_eq!(found[1].rows, 2);
-    assert_eq!(shown(&found[1].entries), shown(&moved()));
+    assert_eq!(shown(&found[1].entries), shown(&every_entry()));
 }
 
 #[test]
-fn the_form_of_tournaments_stays_readable() {
+fn the_encoding_of_tournaments_stays_readable() {
     let written = format!(
         "{}\n{}\n",
         hex::encode(form::tournament_to_bytes(&cup(3))),
-        hex::encode(form::tournament_entries_to_bytes(&moved()))
+        hex::encode(form::tournament_entries_to_bytes(&every_entry()))
     );
     assert_eq!(written, include_str!("../fixtures/tournament1.hex"));
     let (first, second) = written.split_once('\n').expect("two lines");
@@ -148,17 +148,17 @@ fn the_form_of_tournaments_stays_readable() {
     assert_eq!(shown(&read), shown(&cup(3)));
     let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
     let read = form::tournament_entries_from_bytes(&bytes).expect("readable");
-    assert_eq!(shown(&read), shown(&moved()));
+    assert_eq!(shown(&read), shown(&every_entry()));
     for end in 1..bytes.len() {
-        // Half of an entry is no entry; what was cut between two reads as fewer.
+        // Half an entry is an error; a cut between two entries reads as fewer entries.
         if let Ok(read) = form::tournament_entries_from_bytes(&bytes[..end]) {
-            assert!(read.len() < moved().len());
+            assert!(read.len() < every_entry().len());
         }
     }
 }
 
 #[test]
-fn a_game_remembers_its_tournament() {
+fn a_game_keeps_the_id_of_its_tournament() {
     for series in [None, Some(Id([5; 16]))] {
         let game = TournamentGame {
             tournament: Id([6; 16]),
@@ -174,9 +174,9 @@ fn a_game_remembers_its_tournament() {
 }
 
 #[tokio::test]
-async fn of_tournaments_that_are_over_the_newest_are_found() {
+async fn only_the_newest_ended_tournaments_are_read() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
     let change = TournamentEntry::Change;
     let ends = [
         (1, Some(Change::Finished)),
@@ -190,11 +190,11 @@ async fn of_tournaments_that_are_over_the_newest_are_found() {
         let header = Arc::new(cup(number));
         let begun = vec![change(Change::Begun { rounds: 1 })];
         let made = store.create_tournament(header, begun);
-        made.await.expect("it is kept");
-        // The end is not the last thing that is kept at once with it.
+        made.await.expect("committed");
+        // The end is not the last entry of its commit.
         let last = end.into_iter().chain([Change::Voided { game: 0 }]);
-        let kept = store.append_tournament(id, 1, last.map(change).collect());
-        kept.await.expect("it is kept");
+        let stored = store.append_tournament(id, 1, last.map(change).collect());
+        stored.await.expect("committed");
     }
     for (newest_over, expected) in [
         (0, &[2, 5][..]),
@@ -203,9 +203,9 @@ async fn of_tournaments_that_are_over_the_newest_are_found() {
         (9, &[1, 2, 3, 4, 5]),
         (usize::MAX, &[1, 2, 3, 4, 5]),
     ] {
-        let found = store.tournaments(newest_over).await.expect("it reads");
-        let numbers: Vec<u8> = found.iter().map(|kept| kept.header.id.0[0]).collect();
+        let found = store.tournaments(newest_over).await.expect("readable");
+        let numbers: Vec<u8> = found.iter().map(|stored| stored.header.id.0[0]).collect();
         assert_eq!(numbers, expected, "{newest_over}");
-        assert!(found.iter().all(|kept| kept.rows == 2));
+        assert!(found.iter().all(|stored| stored.rows == 2));
     }
 }
