@@ -1,5 +1,6 @@
-//! The updates that wait for one stream. Rooms put updates in; the stream takes out everything that is ready as one message, so that a busy
-//! client with many seats receives batches. Bounded: a subscriber learns that there is no space, and again when there is.
+//! The updates queued for one stream. Rooms push updates; the stream takes everything that is ready as
+//! one message, so that a busy client with many seats receives batches. It is bounded: a subscriber
+//! learns when there is no space, and again when there is.
 
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -14,12 +15,14 @@ use tokio::time::Instant;
 use crate::clock::RoomClock;
 use crate::wire::Updates;
 
-/// Most that may wait in an outbox, counted in updates and events.
+/// Capacity of an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
-/// Most that goes into one message, counted in updates and events. Bounds a message to well below the 4 MiB that gRPC clients accept.
+/// Capacity of a message, counted in updates and events. It keeps messages well below the 4 MiB that
+/// gRPC clients accept by default.
 pub const MESSAGE_CAPACITY: usize = 4_096;
 
-/// Notes when a decision request was handed to the transport. Shared by the outbox that stamps and the room that reads.
+/// Records when a decision request was handed to the transport. Shared by the outbox, which sets it, and
+/// the room, which reads it.
 #[derive(Debug)]
 pub struct HandStamp {
     clock: RoomClock,
@@ -28,7 +31,7 @@ pub struct HandStamp {
 }
 
 impl HandStamp {
-    /// A stamp by the clock of a room.
+    /// Creates a stamp that uses the clock of a room.
     pub fn new(clock: RoomClock) -> Arc<Self> {
         Arc::new(Self {
             clock,
@@ -36,12 +39,12 @@ impl HandStamp {
         })
     }
 
-    /// Forgets the last decision: a new one is about to be sent.
+    /// Clears the stamp before a new request is sent.
     pub fn clear(&self) {
         self.micros.store(0, Ordering::Release);
     }
 
-    /// When the decision was handed over, since the room was created.
+    /// When the request was handed over, since the creation of the room.
     pub fn get(&self) -> Option<std::time::Duration> {
         let micros = self.micros.load(Ordering::Acquire).checked_sub(1)?;
         Some(std::time::Duration::from_micros(micros))
@@ -56,9 +59,9 @@ impl HandStamp {
     }
 }
 
-/// Something that waits to hear that an outbox has space again.
+/// A subscriber that waits for space in an outbox.
 pub trait OnSpace: Send + Sync {
-    /// Called when the stream has taken something out.
+    /// Called when the stream has taken updates.
     fn space(&self);
 }
 
@@ -67,27 +70,27 @@ pub trait OnSpace: Send + Sync {
 pub enum StreamEnd {
     /// Everything has been sent.
     Complete,
-    /// The server shuts down.
+    /// The server is shutting down.
     ShuttingDown,
-    /// The store failed, and the server stops.
+    /// The store failed, and the server is stopping.
     StoreFailed,
     /// A room on the stream is gone.
     RoomGone,
     /// A spectator did not keep up.
     SpectatorTooSlow,
-    /// Calls to games of tournaments were not taken.
+    /// Calls to games of tournaments were not read.
     CallsNotTaken,
-    /// The requests of the stream broke off or broke a rule. Their reader knows why.
+    /// The requests of the stream broke off or broke a rule; their reader has the reason.
     RequestsFailed,
 }
 
-/// The updates that wait for one stream.
+/// The updates queued for one stream.
 pub struct Outbox {
     waiting: Mutex<Waiting>,
     waker: AtomicWaker,
-    /// Notified when the client has gone away.
+    /// Notified when the client has gone.
     gone: Notify,
-    hung_up: AtomicBool,
+    reading_stopped: AtomicBool,
     reader: AtomicWaker,
 }
 
@@ -96,14 +99,14 @@ struct Waiting {
     weight: usize,
     stamps: Vec<Arc<HandStamp>>,
     wanting_space: Vec<Arc<dyn OnSpace>>,
-    /// Taken by the stream, once.
+    /// The end of the stream, taken once.
     end: Option<StreamEnd>,
     ended: bool,
     abandoned: bool,
 }
 
 impl Outbox {
-    /// An empty outbox and the stream that empties it.
+    /// Creates an empty outbox and its stream.
     pub fn new() -> (Arc<Self>, OutboxStream) {
         let outbox = Arc::new(Self {
             waiting: Mutex::new(Waiting {
@@ -117,14 +120,14 @@ impl Outbox {
             }),
             waker: AtomicWaker::new(),
             gone: Notify::new(),
-            hung_up: AtomicBool::new(false),
+            reading_stopped: AtomicBool::new(false),
             reader: AtomicWaker::new(),
         });
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
 
-    /// Puts updates in; `stamp` is set when they are handed over. If there is no space for them, nothing is put in, `updates` stays as it was,
-    /// and `on_space` is called when there is space again.
+    /// Queues updates; `stamp` is set when they are handed over. If they do not fit, nothing is queued,
+    /// `updates` is unchanged, and `on_space` is called when there is space again.
     pub fn push(
         &self,
         updates: &mut Updates,
@@ -138,7 +141,7 @@ impl Outbox {
             return true;
         }
         if waiting.weight > 0 && waiting.weight + weight > OUTBOX_CAPACITY {
-            // A subscriber that tries again and again waits once.
+            // A subscriber that tries several times is notified once.
             if let Some(on_space) = on_space
                 && !(waiting.wanting_space.iter()).any(|other| Arc::ptr_eq(other, on_space))
             {
@@ -154,7 +157,7 @@ impl Outbox {
         true
     }
 
-    /// Puts in the last updates of a subscriber, whether or not there is space.
+    /// Queues the last updates of a subscriber, even if there is no space.
     pub fn push_last(&self, updates: &mut Updates) {
         let mut waiting = self.lock();
         if !waiting.abandoned {
@@ -165,7 +168,7 @@ impl Outbox {
         self.waker.wake();
     }
 
-    /// Ends the stream once everything that waits has been taken. Only the first end counts.
+    /// Ends the stream after everything queued has been taken. Only the first end counts.
     pub fn end(&self, end: StreamEnd) {
         let mut waiting = self.lock();
         if !waiting.ended {
@@ -176,7 +179,7 @@ impl Outbox {
         self.waker.wake();
     }
 
-    /// Ends the stream now and drops what waits.
+    /// Ends the stream now and drops everything queued.
     pub fn cut(&self, end: StreamEnd) {
         let mut waiting = self.lock();
         waiting.updates = Updates::default();
@@ -187,22 +190,22 @@ impl Outbox {
         self.waker.wake();
     }
 
-    /// Asks the reader of the stream's requests to stop.
-    pub fn hang_up(&self) {
-        self.hung_up.store(true, Ordering::Release);
+    /// Tells the reader of the stream's requests to stop.
+    pub fn stop_reading(&self) {
+        self.reading_stopped.store(true, Ordering::Release);
         self.reader.wake();
     }
 
-    /// Whether the reader of the stream's requests is to stop: it was asked to, or the client has gone away. If not, it is woken when it is.
-    /// Costs no lock, because it is asked with every message.
-    pub fn poll_hung_up(&self, context: &Context<'_>) -> bool {
-        if !self.hung_up.load(Ordering::Acquire) {
+    /// Whether the reader of the stream's requests must stop: it was told to, or the client has gone. If
+    /// not, its task is woken when it must. Takes no lock, because it is called for every message.
+    pub fn poll_reading_stopped(&self, context: &Context<'_>) -> bool {
+        if !self.reading_stopped.load(Ordering::Acquire) {
             self.reader.register(context.waker());
         }
-        self.hung_up.load(Ordering::Acquire)
+        self.reading_stopped.load(Ordering::Acquire)
     }
 
-    /// Waits until the client has gone away.
+    /// Waits until the client has gone.
     pub async fn abandoned(&self) {
         loop {
             let gone = self.gone.notified();
@@ -213,7 +216,7 @@ impl Outbox {
         }
     }
 
-    /// Whether the client has gone away and nothing put in here will ever be read.
+    /// Whether the client has gone and nothing in here will be read.
     pub fn is_abandoned(&self) -> bool {
         self.lock().abandoned
     }
@@ -221,7 +224,7 @@ impl Outbox {
     fn lock(&self) -> MutexGuard<'_, Waiting> {
         self.waiting
             .lock()
-            .expect("nothing that holds this lock can panic")
+            .expect("no code that holds this lock can panic")
     }
 }
 
@@ -231,7 +234,7 @@ impl std::fmt::Debug for Outbox {
     }
 }
 
-/// The stream that empties an outbox: all that is ready, at each poll.
+/// The stream of an outbox: each poll takes everything that is ready.
 #[derive(Debug)]
 pub struct OutboxStream {
     outbox: Arc<Outbox>,
@@ -259,7 +262,7 @@ impl Stream for OutboxStream {
             waiting.weight -= updates.weight();
             updates
         };
-        // A decision that stays behind for the next message is stamped a little early; its agent has that much more time.
+        // A decision that is left for the next message is stamped a little early; its agent gains that time.
         if !waiting.stamps.is_empty() {
             let now = Instant::now();
             for stamp in waiting.stamps.drain(..) {
@@ -284,7 +287,7 @@ impl Drop for OutboxStream {
         waiting.stamps = Vec::new();
         waiting.wanting_space = Vec::new();
         drop(waiting);
-        self.outbox.hang_up();
+        self.outbox.stop_reading();
         self.outbox.gone.notify_waiters();
     }
 }
@@ -308,7 +311,7 @@ mod tests {
 
     fn handles(updates: &Updates) -> Vec<u32> {
         let response = PlayResponse::decode(updates.encode_to_vec().as_slice());
-        let updates = response.expect("it is a response").updates;
+        let updates = response.expect("a response").updates;
         updates.iter().map(|update| update.handle).collect()
     }
 
@@ -337,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_outbox_refuses_and_reports_space_once_to_each_subscriber() {
+    fn a_full_outbox_refuses_and_notifies_each_subscriber_once() {
         let (outbox, mut stream) = Outbox::new();
         let count = Arc::new(Count::default());
         let on_space: Arc<dyn OnSpace> = Arc::clone(&count) as _;
@@ -369,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_drops_what_waits_and_a_dropped_stream_takes_nothing_more() {
+    fn cutting_drops_queued_updates_and_a_dropped_stream_takes_no_more() {
         let (outbox, mut stream) = Outbox::new();
         outbox.push(&mut updates(0, 1), None, None);
         outbox.cut(StreamEnd::SpectatorTooSlow);

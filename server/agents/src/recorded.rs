@@ -210,7 +210,9 @@ mod tests {
     use crate::recorded::*;
 
     fn observation() -> Observation {
-        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let rules = RuleSetSpec::default()
+            .validate()
+            .expect("valid default rules");
         let game = Game::new(rules, Seed([3; 32]), |_| {});
         let seat = game.decision().expect("a decision is open").seat;
         game.observe(Viewer::Seat(seat))

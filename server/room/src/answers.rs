@@ -24,8 +24,8 @@ pub enum JoinError {
     /// All seats are taken.
     #[error("every seat of this room is taken")]
     RoomFull,
-    /// Seats were taken and given back too often.
-    #[error("seats of this room were taken {MAX_SEATINGS} times; make a new room")]
+    /// Seats were taken and freed too often.
+    #[error("seats of this room were taken {MAX_SEATINGS} times; create a new room")]
     TooManySeatings,
     /// The requested seat is taken.
     #[error("this seat is taken; leave `seat` unset to take any free one")]
@@ -39,22 +39,22 @@ pub enum JoinError {
     /// The request id was used for another participant.
     #[error("this request id was used with another name, kind or seat; draw a new one")]
     RequestIdUsed,
-    /// The game has begun.
-    #[error("the game of this room has begun; nobody can join any more")]
+    /// The game has started.
+    #[error("the game of this room has already started; nobody can join any more")]
     GameStarted,
     /// The game has ended.
     #[error(
-        "the game of this room is over; make a new room, or ask its creator for the new join code"
+        "the game of this room is over; create a new room, or ask its creator for the new join code"
     )]
     GameOver,
 }
 
-/// Why a seat cannot be given back.
+/// Why a seat cannot be freed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveError {
-    /// The game has begun.
+    /// The game has started.
     #[error(
-        "the game of this room has begun; the seat stays yours, and a substitute plays for it when you are gone"
+        "the game of this room has already started; the seat stays yours, and a substitute plays for it while you are away"
     )]
     GameStarted,
     /// The game has ended.
@@ -103,7 +103,7 @@ impl Answer {
 pub struct Answered {
     /// The verdict.
     pub verdict: Verdict,
-    /// Measured decision time; zero where there is none.
+    /// Measured decision time; zero if there is none.
     pub time: Duration,
     /// Annotations exceeded their limit and were dropped.
     pub annotations_dropped: bool,
@@ -116,16 +116,16 @@ pub enum Verdict {
     Accepted,
     /// The action is not legal.
     Invalid {
-        /// Why, in words.
+        /// The reason, in words.
         detail: String,
         /// Attempts left; `None` when unlimited.
         attempts_left: Option<u32>,
-        /// Reward of the attempt, where the room has a scheme.
+        /// Reward of the attempt, if the room has a reward scheme.
         reward: Option<f32>,
     },
     /// The decision is closed.
     Closed,
-    /// There is no such decision yet.
+    /// The decision does not exist yet.
     Unknown,
 }
 

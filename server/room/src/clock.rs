@@ -1,5 +1,5 @@
-//! What a room does as time passes: deadlines and banks, default decisions, substitution, the decisions of built-in agents, seats that are
-//! not attached in time.
+//! The passing of time: deadlines and banks, default decisions, substitution, the decisions of built-in
+//! agents, and seats that are not attached in time.
 
 use std::time::Duration;
 
@@ -7,7 +7,8 @@ use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, Game, Seat, Viewer};
 
 use super::{
-    BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, RECALL_TIME, REPLAY_COST, State,
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST,
+    State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
@@ -31,14 +32,14 @@ impl Core {
                     open.released + self.pace()
                 } else {
                     let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
-                    deadline.max(open.look_again)
+                    deadline.max(open.recheck_at)
                 })
             }
             State::Finished | State::Aborted(_) => None,
         }
     }
 
-    /// Does what is due at `now`. `handed`: when the open decision was handed to its seat's transport, if it was.
+    /// Does what is due at `now`. `handed`: when the transport received the request for the open decision.
     pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {
         match self.state {
             State::Waiting => self.tick_waiting(now),
@@ -54,8 +55,9 @@ impl Core {
         }
     }
 
-    /// Takes the decisions that need nobody's answer and are due: those taken over from a record, then those of built-in agents and
-    /// substitutes. At most [`BUILT_IN_BUDGET`] at a time; [`Core::deadline`] then asks for the rest.
+    /// Takes the due decisions that need no answer: those taken over from a record, then those of built-in
+    /// agents and substitutes. At most [`BUILT_IN_BUDGET`] at a time; [`Core::deadline`] then requests
+    /// another tick.
     pub(super) fn advance(&mut self, now: Duration) {
         let mut budget = BUILT_IN_BUDGET;
         while budget > 0 {
@@ -115,7 +117,7 @@ impl Core {
         if replayed { REPLAY_COST } else { 1 }
     }
 
-    /// Time a seat has for a decision before its bank is touched.
+    /// Time for a decision of a seat before its bank is used.
     fn decision_time(&self, seat: Seat) -> Duration {
         let participant = self.seats[seat.index()].participant.as_ref();
         let policy = &self.header.policy;
@@ -127,13 +129,13 @@ impl Core {
         self.decision_time(seat) + self.seats[seat.index()].bank_left
     }
 
-    /// What is left of a seat's bank after a decision that took `time`.
+    /// The rest of a seat's bank after a decision that took `time`.
     pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
         let beyond = time.saturating_sub(self.decision_time(seat));
         self.seats[seat.index()].bank_left.saturating_sub(beyond)
     }
 
-    /// Time left for the open decision: before the bank is touched, and in the bank.
+    /// Time left for the open decision: before the bank is used, and in the bank.
     pub fn time_left(&self, now: Duration) -> (Duration, Duration) {
         let Some(open) = &self.open else {
             return (Duration::ZERO, Duration::ZERO);
@@ -145,7 +147,7 @@ impl Core {
         )
     }
 
-    /// Settles when the clock of the open decision started, unless that is settled: it never restarts.
+    /// Determines when the clock of the open decision started. Once determined, it never changes.
     pub(super) fn settle_start(&mut self, now: Duration, handed: Option<Duration>) {
         let Some(seat) = self.open.as_ref().map(|open| open.decision.seat) else {
             return;
@@ -157,28 +159,28 @@ impl Core {
             return;
         }
         let latest = open.released + MAX_HANDOVER;
-        (open.start, open.look_again) = match (handed, connected, recalled_until) {
+        (open.start, open.recheck_at) = match (handed, connected, recalled_until) {
             (Some(handed), _, _) => (Some(handed.clamp(open.released, latest)), Duration::ZERO),
             (None, false, Some(until)) if now < until => (None, until),
             (None, false, Some(until)) => (Some(open.released.max(until)), Duration::ZERO),
             (None, false, None) => (Some(open.released), Duration::ZERO),
             (None, true, _) if now >= latest => (Some(latest), Duration::ZERO),
-            (None, true, _) => (None, now + LOOK_AGAIN),
+            (None, true, _) => (None, now + RECHECK_INTERVAL),
         };
     }
 
-    /// Gives a seat that returns after a restart of the server all its time for the open decision.
+    /// Gives a seat that returns after a restart of the server its full time for the open decision.
     pub(super) fn restart_clock(&mut self, now: Duration, seat: Seat) {
         let recalled = self.seats[seat.index()].recalled;
         if let Some(open) = &mut self.open
             && recalled
             && open.start.is_none()
         {
-            open.release_anew(now);
+            open.reopen(now);
         }
     }
 
-    /// Pauses the clock of the open decision: its seat waits for the server since then.
+    /// Pauses the clock of the open decision from `since` on, while its seat waits for the server.
     pub(super) fn pause_clock(&mut self, since: Duration) {
         if let Some(open) = &mut self.open {
             open.paused_since.get_or_insert(since);
@@ -195,13 +197,13 @@ impl Core {
     fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
         self.all_seats().filter_map(|seat| {
             let state = &self.seats[seat.index()];
-            // A participant of a tournament has its seat, whenever it comes.
+            // A participant of a tournament keeps its seat, whenever it arrives.
             let held = self.header.tournament.is_none() && !state.ever_attached;
             (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
         })
     }
 
-    /// When a room whose seats are not all attached is closed. A restart leaves them time to return.
+    /// When a room is closed because its seats are not all attached. A restart leaves them time to return.
     fn waits_until(&self) -> Duration {
         let after_restart = self.restarted.map_or(Duration::ZERO, |at| at + JOIN_HOLD);
         self.header.policy.waiting_time.max(after_restart)

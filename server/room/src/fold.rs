@@ -1,5 +1,5 @@
-//! The effect of a change on the state and the log, the same for a new change and for one read from a journal: nothing here reads a clock, a
-//! connection or a generator.
+//! Applies a change to the state and the log. The effect is the same for a new change and for one read
+//! from a journal: nothing here reads a clock, a connection or a random generator.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ impl Core {
         }
     }
 
-    /// Disconnects everybody and gives the open decision all its time again.
+    /// Disconnects all seats and gives the open decision its full time again.
     fn restart(&mut self, at: Duration) {
         self.restarted = Some(at);
         for state in &mut self.seats {
@@ -90,7 +90,7 @@ impl Core {
             state.connection = None;
             state.recalled = true;
             match self.state {
-                // Its ticket has to be attached again within the time in which it had to be at first.
+                // Its ticket must be attached again within the same time as at first.
                 State::Waiting => {
                     state.ever_attached = false;
                     state.joined_at = at;
@@ -99,7 +99,7 @@ impl Core {
             }
         }
         if let Some(open) = &mut self.open {
-            open.release_anew(at);
+            open.reopen(at);
         }
         self.log.push(at, RoomEvent::ServerRestarted);
     }
@@ -118,7 +118,7 @@ impl Core {
         let game = match &self.header.start.script {
             None => Game::new(self.header.rules, seed, note),
             Some(script) => Game::scripted(self.header.rules, seed, script, note)
-                .expect("a script is tried before a room is made with it"),
+                .expect("a script is checked before its room is created"),
         };
         self.game = Some(Box::new(game));
         self.reseed();
@@ -132,9 +132,9 @@ impl Core {
         let mut events = std::mem::take(&mut self.events);
         self.game
             .as_mut()
-            .expect("a decision is taken in a game that has begun")
+            .expect("a decision is taken in a game that has started")
             .apply(decided.action, |event| events.push(event))
-            .expect("only legal actions are made changes");
+            .expect("only legal actions become changes");
         self.events = events;
         let seat = &mut self.seats[decided.seat.index()];
         seat.bank_left = Duration::from_millis(decided.bank_left_ms.into());
@@ -164,7 +164,7 @@ impl Core {
         self.open_next(at);
     }
 
-    /// Sets the seed that later Shifts are dealt from.
+    /// Sets the seed of the following Shifts.
     fn reseed(&mut self) {
         let seed = self.seed_for(self.decisions);
         if let Some(game) = &mut self.game {
@@ -172,7 +172,8 @@ impl Core {
         }
     }
 
-    /// The seed of a Shift that begins after this number of decisions: one taken over from a record, or the game's own.
+    /// The seed of a Shift that starts after this number of decisions: one taken over from a record, or
+    /// the game's own.
     fn seed_for(&self, decisions: u64) -> Seed {
         let mut end = 0;
         self.header
@@ -190,7 +191,7 @@ impl Core {
             )
     }
 
-    /// Notes how far delayed spectators may see after this decision.
+    /// Records how far delayed spectators may see after this decision.
     fn note_decision(&mut self) {
         if self.header.policy.spectator_delay_decisions > 0 {
             self.log_after_decision
@@ -198,7 +199,7 @@ impl Core {
         }
     }
 
-    /// Moves the events of one action to the log, with the rewards they brought.
+    /// Moves the events of one action to the log, with their rewards.
     fn log_events(&mut self, at: Duration, source: Source, time_us: u64) {
         let mut events = std::mem::take(&mut self.events);
         let mut rewards = Vec::new();
@@ -240,19 +241,19 @@ impl Core {
                     released: at,
                     announced: false,
                     start: None,
-                    look_again: Duration::ZERO,
+                    recheck_at: Duration::ZERO,
                     paused_since: None,
                     attempts: 0,
                 }
             });
     }
 
-    /// Whether the log or the journal has reached its bound.
+    /// Whether the log or the journal has reached its limit.
     pub(super) fn is_too_long(&self) -> bool {
         self.log.len() >= MAX_GAME_EVENTS || self.changes >= MAX_GAME_CHANGES
     }
 
-    /// The change by which a decision is taken.
+    /// The change that takes a decision.
     pub(super) fn decided(
         &self,
         seat: Seat,
@@ -271,7 +272,7 @@ impl Core {
         }
     }
 
-    /// Whether the open decision is a turn, which alone is rewarded.
+    /// Whether the open decision is a turn. Only turns are rewarded.
     pub fn open_is_turn(&self) -> bool {
         self.open
             .as_ref()

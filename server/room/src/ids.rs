@@ -1,5 +1,5 @@
-//! Names and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from the operating system's generator, are
-//! stored as hashes and compared in constant time.
+//! Identifiers and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from the
+//! operating system's generator, are stored as hashes and compared in constant time.
 
 use std::fmt;
 
@@ -7,19 +7,19 @@ use rand::TryRng as _;
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 
-/// Letters of a join code: no vowels (no words), nothing that looks like something else.
+/// Letters of a join code: no vowels, so that no words form, and no letters that look alike.
 const CODE_LETTERS: &[u8; 27] = b"23456789BCDFGHJKMNPQRSTVWXZ";
 const CODE_LENGTH: usize = 8;
 
 /// Random bytes from the operating system.
 ///
 /// # Panics
-/// When the operating system provides no randomness: without it no deal is fair.
+/// If the operating system provides no randomness: without it no deal is fair.
 pub fn random_bytes<const N: usize>() -> [u8; N] {
     let mut bytes = [0; N];
     rand::rngs::SysRng
         .try_fill_bytes(&mut bytes)
-        .expect("the operating system gives random bytes");
+        .expect("the operating system provides random bytes");
     bytes
 }
 
@@ -53,7 +53,7 @@ impl fmt::Debug for Id {
     }
 }
 
-/// The hash of a secret, which is what stores hold.
+/// The hash of a secret; stores contain only hashes.
 #[derive(Clone, Copy, Debug)]
 pub struct SecretHash([u8; 32]);
 
@@ -84,8 +84,8 @@ impl SecretHash {
     }
 }
 
-/// A secret that belongs to a room: the room's id and 256 random bits, written as 96 hexadecimal
-/// digits: a word that no command line takes for an option. A ticket or an owner token.
+/// A secret that belongs to a room, such as a ticket or an owner token: the room's id and 256 random
+/// bits, written as 96 hexadecimal digits, so that no command line mistakes it for an option.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Token {
     /// The room it belongs to.
@@ -103,8 +103,8 @@ impl Token {
         }
     }
 
-    /// The ticket of a request with an id chosen by the client: the same whenever the request is repeated. `key` is known to the server
-    /// alone.
+    /// The ticket for a request with an id chosen by the client: the same for every repetition. Only the
+    /// server knows `key`.
     pub fn of_request(room: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
         let parts = [key.bytes().as_slice(), &room.0, request_id];
         Self {
@@ -141,7 +141,8 @@ impl fmt::Debug for Token {
     }
 }
 
-/// A request to create something that can be repeated: its id, 32 random bytes chosen by the client, and a digest of its content.
+/// Identifies a request to create something, so that it can be repeated: its id, 32 random bytes chosen
+/// by the client, and a digest of its content.
 #[derive(Clone, Copy)]
 pub struct RequestKey {
     id: [u8; 32],
@@ -155,13 +156,14 @@ impl RequestKey {
         Self { id, content }
     }
 
-    /// The id of what it creates, which depends on the request's id alone.
+    /// The id of the created object, which depends only on the request's id.
     pub fn created_id(&self) -> Id {
         let hash = digest(b"chefshat.v1 created", &[&self.id]);
         Id(std::array::from_fn(|index| hash[index]))
     }
 
-    /// The owner token of what it creates, which depends on the content too: a request with other content does not get it.
+    /// The owner token of the created object. It depends on the content too, so a request with other
+    /// content gets another token.
     pub fn owner(&self) -> Token {
         Token {
             room: self.created_id(),
@@ -186,7 +188,7 @@ fn digest(purpose: &[u8], parts: &[&[u8]]) -> [u8; 32] {
 
 /// A new join code: eight letters, about 38 bits.
 pub fn join_code() -> String {
-    // A byte is taken modulo 27 only below the largest multiple of 27, so that every letter is as likely as any other.
+    // Bytes from the largest multiple of 27 on are skipped, so that all letters are equally likely.
     let mut code = String::with_capacity(CODE_LENGTH);
     while code.len() < CODE_LENGTH {
         let [byte] = random_bytes::<1>();
@@ -197,7 +199,7 @@ pub fn join_code() -> String {
     code
 }
 
-/// A join code as it is compared: without spaces and dashes, in capitals.
+/// The normal form of a join code: without spaces and dashes, in capitals.
 pub fn normal_code(code: &str) -> String {
     code.chars()
         .filter(char::is_ascii_alphanumeric)
@@ -211,7 +213,7 @@ mod tests {
     use crate::ids::*;
 
     #[test]
-    fn words_read_back() {
+    fn tokens_and_ids_are_parsed_back() {
         let id = Id::random();
         assert_eq!(Id::parse(&id.to_string()), Some(id));
         assert_eq!(Id::parse("12"), None);
@@ -244,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_have_their_letters_and_ignore_case() {
+    fn join_codes_use_their_letters_and_ignore_case() {
         let code = join_code();
         assert_eq!(code.len(), CODE_LENGTH);
         assert!(code.bytes().all(|letter| CODE_LETTERS.contains(&letter)));

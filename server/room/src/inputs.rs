@@ -1,5 +1,5 @@
-//! What participants do: join, attach, leave, answer, express, return. Each input is checked against the state; an invalid one is refused
-//! and changes nothing.
+//! Inputs of participants: join, attach, leave, answer, express, return. Each input is checked against
+//! the state; an invalid one is refused and changes nothing.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ impl Core {
     /// Takes a seat.
     ///
     /// # Errors
-    /// Why no seat can be taken. The room is left as it was.
+    /// No seat can be taken. The room is unchanged.
     pub fn join(
         &mut self,
         now: Duration,
@@ -49,7 +49,7 @@ impl Core {
                 seat
             }
             None => {
-                // A seat reserved for this very kind comes first, so that seats open to all stay free for others.
+                // A seat reserved for this kind comes first, so that seats open to all stay free for others.
                 let mut free: Vec<Seat> = self.all_seats().filter(|s| self.is_free(*s)).collect();
                 if free.is_empty() {
                     return Err(JoinError::RoomFull);
@@ -79,10 +79,10 @@ impl Core {
         Ok(seat)
     }
 
-    /// Gives a seat back before the game begins.
+    /// Frees a seat before the game starts.
     ///
     /// # Errors
-    /// The game has begun.
+    /// The game has started.
     pub fn leave(&mut self, now: Duration, seat: Seat) -> Result<(), LeaveError> {
         match self.state {
             State::Waiting => {}
@@ -99,7 +99,7 @@ impl Core {
         self.commit(Duration::ZERO, Change::Seated { seat, participant });
     }
 
-    /// Attaches a connection to a seat. `arrived`: when the request was read. An older connection loses the seat.
+    /// Attaches a connection to a seat and detaches an older one. `arrived`: when the request was read.
     pub fn attach(
         &mut self,
         now: Duration,
@@ -109,7 +109,7 @@ impl Core {
         arrived: Duration,
         handed_before: Option<Duration>,
     ) {
-        // A connection made after the end does not count as present at the end.
+        // A connection after the end of the game does not count as present at the end.
         if self.state.is_over() {
             return;
         }
@@ -122,7 +122,7 @@ impl Core {
         state.recalled = false;
         state.connection = Some(connection);
         state.ever_attached = true;
-        // A contribution to the seed would give this game other deals than the rest of its series.
+        // With a contribution to the seed this game would have other deals than the rest of its series.
         let dealt_alike = self.header.series().is_some();
         if self.state == State::Waiting && !dealt_alike {
             state.entropy = entropy;
@@ -134,7 +134,7 @@ impl Core {
         self.advance(now);
     }
 
-    /// Notes the loss of a connection. Does nothing if the seat has a newer one.
+    /// Records the loss of a connection. Does nothing if the seat has a newer one.
     pub fn lost(
         &mut self,
         now: Duration,
@@ -142,7 +142,7 @@ impl Core {
         connection: ConnectionId,
         handed: Option<Duration>,
     ) {
-        // After the end of a game, who was present at its end stays as it was.
+        // After the end of a game, the list of those present at its end does not change.
         if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
             return;
         }
@@ -164,10 +164,10 @@ impl Core {
         }
     }
 
-    /// Takes an expression of a seat, as an encoded message.
+    /// Accepts an expression of a seat, as an encoded message.
     ///
     /// # Errors
-    /// Why it is refused.
+    /// The expression is refused.
     pub fn express(
         &mut self,
         now: Duration,
@@ -192,7 +192,8 @@ impl Core {
         Ok(())
     }
 
-    /// Takes an answer that was read at `arrived`. `handed`: when the decision was handed to the seat's transport, if it was.
+    /// Processes an answer that was read at `arrived`. `handed`: when the transport received the decision
+    /// request.
     pub fn answer(
         &mut self,
         now: Duration,
@@ -218,14 +219,14 @@ impl Core {
         }
         self.settle_start(now, handed);
         let open = self.open.as_ref().expect("a decision is awaited");
-        // The clock stands while the seat waits for the server, as it does for the deadline.
+        // The clock is paused while the seat waits for the server, as for the deadline.
         let thought_until = open
             .paused_since
             .map_or(arrived, |since| since.min(arrived));
         let time = thought_until.saturating_sub(open.start.unwrap_or(open.released));
         let attempts = open.attempts + 1;
         if time >= self.time_allowed(seat) {
-            // It arrived after the deadline, but before the alarm rang.
+            // It arrived after the deadline, but before the timer fired.
             self.tick(now, handed);
             return Answered {
                 time,
@@ -269,7 +270,10 @@ impl Core {
         last.answered.clone()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, all of it known there")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "a single caller, which has all of it"
+    )]
     fn invalid(
         &mut self,
         now: Duration,
@@ -337,7 +341,7 @@ impl Core {
         }
     }
 
-    /// Begins the game of a room without open seats.
+    /// Starts the game of a room without open seats.
     pub fn begin_if_all_built_in(&mut self, now: Duration) {
         self.start_if_complete(now);
         self.advance(now);

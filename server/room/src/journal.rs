@@ -1,5 +1,5 @@
-//! A game as a store holds it: its header and its changes. Events and records follow from folding the changes again. These are the values; each
-//! store has its own form on disk.
+//! A stored game: its header and its changes. Events and records follow from folding the changes
+//! again. Each store has its own encoding of these values.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -44,10 +44,10 @@ pub struct RecordedSeat {
     pub seat: Seat,
 }
 
-/// How a game begins; by default with a deal.
+/// How a game starts; by default with a deal.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct GameStart {
-    /// The first Shift, where its hands are given.
+    /// The first Shift, if its hands are given.
     pub script: Option<Script>,
     /// The record it branches from.
     pub branch: Option<Branch>,
@@ -60,7 +60,7 @@ pub struct Branch {
     pub game: Id,
     /// Whether later Shifts are dealt as in the recorded game.
     pub same_deals: bool,
-    /// The decisions taken over, in order. Not empty, so that the seed of the first Shift is known.
+    /// The decisions taken over, in order. Not empty, because the first Shift's seed comes with them.
     pub taken_over: Vec<TakenOver>,
 }
 
@@ -69,18 +69,19 @@ pub struct Branch {
 pub struct TournamentGame {
     /// The tournament.
     pub tournament: Id,
-    /// The series of games with the same deals. Until all of them have ended, nothing that could reveal the deals is published.
+    /// The series of games with the same deals. Until all of them have ended, nothing that could reveal
+    /// the deals is published.
     pub series: Option<Id>,
 }
 
-/// Everything about a game that is fixed before it begins.
+/// Everything about a game that is fixed before it starts.
 #[derive(Debug, Clone)]
 pub struct GameHeader {
     /// The room.
     pub room_id: Id,
     /// The game.
     pub game_id: Id,
-    /// Name to show.
+    /// Display name.
     pub name: String,
     /// The rules.
     pub rules: RuleSet,
@@ -90,11 +91,11 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
-    /// Display names of built-in agents that have one of their own, by seat.
+    /// Display names of built-in agents, by seat, if set.
     pub called: BTreeMap<usize, String>,
     /// Recorded players, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
-    /// How the game begins.
+    /// How the game starts.
     pub start: GameStart,
     /// Where the game seed comes from.
     pub seed: SeedPlan,
@@ -104,7 +105,7 @@ pub struct GameHeader {
     pub join_code: String,
     /// The creator's token, hashed.
     pub owner: SecretHash,
-    /// The tournament it belongs to.
+    /// The tournament it belongs to, if any.
     pub tournament: Option<TournamentGame>,
 }
 
@@ -163,12 +164,12 @@ pub enum Change {
     Seated {
         /// The seat.
         seat: Seat,
-        /// Who.
+        /// The participant.
         participant: Box<SeatedParticipant>,
     },
     /// A seat that was never attached became free again.
     Vacated(Seat),
-    /// The game began.
+    /// The game started.
     Started {
         /// The seats' contributions to the game seed, in seat order.
         entropy: Vec<Vec<u8>>,
@@ -206,7 +207,7 @@ pub enum Change {
 /// A participant that took a seat.
 #[derive(Debug, Clone)]
 pub struct SeatedParticipant {
-    /// Name to show.
+    /// Display name.
     pub name: String,
     /// Its kind.
     pub kind: ParticipantKind,

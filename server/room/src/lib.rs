@@ -1,8 +1,10 @@
-//! The core of a room: `(state, input, now) → changes and answers`, without async or IO. It alone decides timeouts, invalid attempts,
-//! substitution and reconnection. The caller passes the time, as the time since the room was created.
+//! The core of a room: `(state, input, now) → changes and answers`, without async or IO. It alone
+//! decides timeouts, invalid attempts, substitution and reconnection. Callers pass the time since the
+//! room was created.
 //!
-//! An input (`inputs`, `clock`) is checked against the state and turned into changes. A change (`fold`) alters the state and the log, and
-//! always to the same effect: a game is replayed from its journal by folding its changes again.
+//! An input (`inputs`, `clock`) is checked against the state and turned into changes. Folding a change
+//! (`fold`) updates the state and the log, always with the same effect: a game is replayed from its
+//! journal by folding its changes again.
 
 mod answers;
 mod clock;
@@ -37,7 +39,7 @@ pub use limits::{
 };
 pub use revive::BadJournal;
 
-use limits::{LOOK_AGAIN, REPLAY_COST, SLOW_STORE};
+use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
 
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
@@ -85,7 +87,7 @@ pub struct Core {
     decisions: u64,
     /// When the server was last restarted.
     restarted: Option<Duration>,
-    /// Changes that have been folded but not yet handed to the store.
+    /// Changes that have been folded but not yet passed to the store.
     pending: Vec<Entry>,
     /// Buffer for the events of one action.
     events: Vec<Event>,
@@ -131,30 +133,31 @@ pub struct OpenDecision {
     pub id: u64,
     /// When it was opened, or given back to a seat that returned from a substitute.
     released: Duration,
-    /// Whether it has been committed, so that its seat may learn of it. From then on its release does not move.
+    /// Whether it has been committed and its seat may learn of it. From then on its release time is fixed.
     announced: bool,
-    /// When its clock started, once that is settled.
+    /// When its clock started, once determined.
     start: Option<Duration>,
-    /// When to check again whether the transport has taken the request; zero before the first check.
-    look_again: Duration,
-    /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on a new connection.
+    /// When to check again whether the transport has received the request; zero before the first check.
+    recheck_at: Duration,
+    /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on a new
+    /// connection.
     paused_since: Option<Duration>,
     /// Invalid attempts so far.
     attempts: u32,
 }
 
 impl OpenDecision {
-    /// Opens the decision again, with all its time.
-    fn release_anew(&mut self, at: Duration) {
+    /// Opens the decision again, with its full time.
+    fn reopen(&mut self, at: Duration) {
         self.released = at;
         self.announced = false;
         self.start = None;
-        self.look_again = Duration::ZERO;
+        self.recheck_at = Duration::ZERO;
     }
 }
 
 impl Core {
-    /// A room with free seats.
+    /// Creates a room with free seats.
     pub fn new(header: Arc<GameHeader>) -> Self {
         let seats = header
             .fills
@@ -180,7 +183,7 @@ impl Core {
                             .recorded
                             .get(&index)
                             .map_or_else(
-                                // Whose record is gone is played for as if it had been lost.
+                                // If the record is gone, a substitute plays, as for a lost agent.
                                 || built_in(header.policy.substitute),
                                 |player| Box::new(BuiltInAgent::replay(Arc::clone(player))),
                             )
@@ -215,7 +218,7 @@ impl Core {
         }
     }
 
-    /// The room that the entries of a journal lead to.
+    /// Restores a room from the entries of a journal.
     pub fn replay(header: Arc<GameHeader>, journal: &[Entry]) -> Self {
         let mut core = Self::new(header);
         for entry in journal {
@@ -244,7 +247,7 @@ impl Core {
         &self.log
     }
 
-    /// The game, once it has begun.
+    /// The game, once it has started.
     pub fn game(&self) -> Option<&Game> {
         self.game.as_deref()
     }
@@ -254,7 +257,7 @@ impl Core {
         self.open.as_ref()
     }
 
-    /// The open decision, if the seat's own agent takes it and not a built-in agent or substitute.
+    /// The open decision, if the seat's own agent takes it rather than a built-in agent or substitute.
     pub fn awaited(&self) -> Option<&OpenDecision> {
         self.open.as_ref().filter(|open| {
             !self.is_automatic(open.decision.seat) && self.next_taken_over().is_none()
@@ -292,7 +295,7 @@ impl Core {
         self.decisions
     }
 
-    /// The seats' contributions to the game seed, once the game has begun.
+    /// The seats' contributions to the game seed, once the game has started.
     pub fn entropy(&self) -> &[Vec<u8>] {
         &self.entropy
     }
@@ -313,7 +316,7 @@ impl Core {
         }
     }
 
-    /// What a viewer may know of the game.
+    /// The observation of a viewer.
     pub fn observe(&self, viewer: Viewer) -> Option<Observation> {
         self.game().map(|game| game.observe(viewer))
     }
@@ -323,7 +326,7 @@ impl Core {
         self.game().map(Game::legal_actions).unwrap_or_default()
     }
 
-    /// What the rules require of the open decision.
+    /// The requirement of the rules for the open decision.
     pub fn requirement(&self) -> Option<Requirement> {
         self.game().and_then(Game::requirement)
     }
@@ -333,7 +336,7 @@ impl Core {
         self.game().and_then(Game::default_action)
     }
 
-    /// The seat that a ticket's secret belongs to. Compares in constant time for each seat.
+    /// The seat with this ticket. Compares in constant time for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
         let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
@@ -367,13 +370,15 @@ impl Core {
         state.substituted || state.fill.is_built_in()
     }
 
-    /// Changes that are folded but not committed. The store takes them out; nobody may learn of them before they are committed.
+    /// Changes that are folded but not committed. The store removes them. They must not be published
+    /// before they are committed.
     pub fn pending(&mut self) -> &mut Vec<Entry> {
         &mut self.pending
     }
 
-    /// Notes that all changes have been committed and the open decision is published now: its time starts now, however long the commit
-    /// took. If it was published before, its seat gets back the time in which it could only wait for the store.
+    /// Called when all changes have been committed and the open decision is published. Its clock starts
+    /// now, however long the commit took. If it was published before, its seat gets back the time it
+    /// spent waiting for the store.
     pub fn released(&mut self, now: Duration) {
         let Some(open) = &mut self.open else { return };
         if !open.announced {
@@ -394,7 +399,7 @@ impl Core {
     }
 
     fn action_from(number: u32) -> ActionId {
-        // What does not fit is out of range of every action space, and is refused as that.
+        // A number that does not fit is outside every action space and is refused as such.
         ActionId::new(u16::try_from(number).unwrap_or(u16::MAX))
     }
 }

@@ -1,5 +1,5 @@
-//! The log of a room: every public event, in order. The number of an event is its position plus one. `convert::event` in the server writes
-//! what a viewer may see of an event.
+//! The log of a room: every public event, in order. The number of an event is its position plus one.
+//! `convert::event` in the server redacts events for a viewer.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use chefshat_engine::{Event, Seat, Viewer};
 
 use crate::journal::{AbortReason, SeatedParticipant, Source};
 
-/// Most events of one game. The game is aborted when it reaches them.
+/// Most events of one game. A game that reaches this limit is aborted.
 pub const MAX_GAME_EVENTS: usize = 1_000_000;
 
 /// An event with its time.
@@ -32,7 +32,7 @@ pub enum RoomEvent {
     Returned(Seat),
     /// A built-in agent plays for a seat.
     Substituted(Seat),
-    /// The game began.
+    /// The game started.
     GameStarted,
     /// An event of the engine.
     Game(GameEvent),
@@ -44,10 +44,10 @@ pub enum RoomEvent {
     Expressed(Seat, Box<[u8]>),
 }
 
-/// An event of the engine, with the decision that caused it and the rewards it brought.
+/// An event of the engine, with the decision that caused it and its rewards.
 #[derive(Debug, Clone)]
 pub struct GameEvent {
-    /// The event, nothing withheld.
+    /// The event, unredacted.
     pub event: Event,
     /// Who or what took the decision.
     pub source: Source,
@@ -58,7 +58,7 @@ pub struct GameEvent {
 }
 
 impl RoomEvent {
-    /// Whether a viewer may see more of this event than the public does: private cards, or a reward.
+    /// Whether a viewer may see more of this event than the public: private cards, or a reward.
     pub fn shows_more_to(&self, viewer: Viewer) -> bool {
         let Self::Game(game) = self else { return false };
         let is = |seat: Seat| match viewer {
@@ -92,7 +92,7 @@ impl Log {
         });
     }
 
-    /// Replaces the hands that were dealt, for tests of what is hidden.
+    /// Replaces the hands that were dealt, for tests of redaction.
     #[cfg(any(test, feature = "testing"))]
     pub(super) fn replace_hands(
         &mut self,

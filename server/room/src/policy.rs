@@ -1,4 +1,4 @@
-//! The validated policy of a room: times, limits, and what happens when participants are lost.
+//! The validated policy of a room: times, limits, and the response to lost participants.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use crate::participant::ParticipantKind;
 /// When a game is aborted because participants are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AbortPolicy {
-    /// When every seat that is not a built-in agent's has been substituted.
+    /// When every seat without a built-in agent has been substituted.
     AllLost,
     /// When one seat would be substituted.
     AnyLost,
@@ -18,7 +18,7 @@ pub enum AbortPolicy {
     Never,
 }
 
-/// What a game survives.
+/// What unfinished games survive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Durability {
     /// A crash or restart of the server.
@@ -27,7 +27,7 @@ pub enum Durability {
     Ephemeral,
 }
 
-/// Times for participants of one kind, in place of the room's.
+/// Times for participants of one kind, which override the room's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KindClock {
     /// The kind.
@@ -67,7 +67,8 @@ pub struct Policy {
     pub abort: AbortPolicy,
     /// The scheme of the rewards that seats receive.
     pub reward_scheme: Option<RewardScheme>,
-    /// How long a built-in agent or substitute waits before it decides; `None`: depends on whether people play.
+    /// How long a built-in agent or substitute waits before it decides; `None`: depends on whether people
+    /// play.
     pub pace: Option<Duration>,
     /// How long the room waits for its seats to be attached.
     pub waiting_time: Duration,
@@ -77,14 +78,14 @@ pub struct Policy {
     pub spectator_delay_decisions: usize,
     /// Whether spectators see all hands.
     pub spectators_see_hands: bool,
-    /// What the game survives.
+    /// What the unfinished game survives.
     pub durability: Durability,
     /// Times for kinds of participants, each kind at most once.
     pub clocks: Vec<KindClock>,
 }
 
 impl Policy {
-    /// Time for a decision of a kind of participant. Built-in agents (`None`) have the room's.
+    /// Time for a decision of a kind of participant. Built-in agents (`None`) use the room's.
     pub fn decision_time_of(&self, kind: Option<ParticipantKind>) -> Duration {
         (self.clock_of(kind).and_then(|clock| clock.decision_time)).unwrap_or(self.decision_time)
     }

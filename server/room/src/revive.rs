@@ -1,5 +1,6 @@
-//! Resumes a game after a restart of the server: reads its journal entry by entry and checks each before folding it, because a file can be
-//! damaged. Built-in agents decide again, so that their generators reach the state they had.
+//! Resumes a game after a restart of the server: reads its journal entry by entry and checks each one
+//! before folding it, because a file can be damaged. Built-in agents decide again, so that their
+//! generators reach the same state.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,19 +13,19 @@ use crate::journal::{Change, Entry, Fill, GameHeader, Source};
 
 /// Why a game cannot be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("entry {entry} of its journal does not fit: {problem}")]
+#[error("entry {entry} of its journal is inconsistent: {problem}")]
 pub struct BadJournal {
     /// Number of the entry, from 1.
     pub entry: usize,
-    /// What is wrong with it.
+    /// The inconsistency.
     pub problem: &'static str,
 }
 
 impl Core {
-    /// The room that the entries of a journal lead to, with all connections lost unless its game is over.
+    /// Restores the room of a journal, with all connections lost unless its game is over.
     ///
     /// # Errors
-    /// The first entry that does not fit the entries before it.
+    /// The first entry that is inconsistent with those before it.
     pub fn revived(
         header: Arc<GameHeader>,
         journal: &[Entry],
@@ -36,7 +37,7 @@ impl Core {
                 entry: index + 1,
                 problem,
             })?;
-            core.remind_agents(&entry.change);
+            core.advance_agents(&entry.change);
             core.refold(entry);
         }
         if !core.state.is_over() {
@@ -47,25 +48,25 @@ impl Core {
 
     fn check(&self, change: &Change) -> Result<(), &'static str> {
         if self.state.is_over() {
-            return Err("the game was over before it");
+            return Err("the game was already over");
         }
         let begun = self.game.is_some();
         match change {
             Change::Seated { seat, .. } | Change::Vacated(seat) => {
                 self.check_open_seat(*seat)?;
-                check(!begun, "the game has begun")
+                check(!begun, "the game has already started")
             }
             Change::Disconnected(seat) | Change::Returned(seat) | Change::Substituted(seat) => {
                 self.check_open_seat(*seat)
             }
             Change::Started { entropy } => {
-                check(!begun, "the game begins twice")?;
+                check(!begun, "the game starts twice")?;
                 check(
                     entropy.len() == self.seats.len(),
-                    "not one part for each seat",
+                    "it does not have one part for each seat",
                 )?;
                 let bounded = entropy.iter().all(|bytes| bytes.len() <= MAX_ENTROPY);
-                check(bounded, "a seat adds too much to the seed")
+                check(bounded, "a seat's contribution to the seed is too long")
             }
             Change::Attempted { seat, .. } => self.check_decision(*seat),
             Change::Decided(decided) => {
@@ -79,22 +80,22 @@ impl Core {
     }
 
     fn check_seat(&self, seat: Seat) -> Result<(), &'static str> {
-        check(seat.index() < self.seats.len(), "there is no such seat")
+        check(seat.index() < self.seats.len(), "this seat does not exist")
     }
 
     fn check_open_seat(&self, seat: Seat) -> Result<(), &'static str> {
         self.check_seat(seat)?;
         let open = matches!(self.seats[seat.index()].fill, Fill::Open { .. });
-        check(open, "the seat is a built-in agent's")
+        check(open, "the seat belongs to a built-in agent")
     }
 
     fn check_decision(&self, seat: Seat) -> Result<(), &'static str> {
         let open = self.open.as_ref().map(|open| open.decision.seat);
-        check(open == Some(seat), "no decision of this seat is open")
+        check(open == Some(seat), "this seat has no open decision")
     }
 
     /// Advances the generators of built-in agents to their state after a change.
-    fn remind_agents(&mut self, change: &Change) {
+    fn advance_agents(&mut self, change: &Change) {
         let asked = match change {
             Change::Attempted { seat, .. } => *seat,
             Change::Decided(decided)

@@ -1,4 +1,4 @@
-//! A room under an invented clock, for tests of the core and of what a server makes of it: what happens when is said by the tests.
+//! A room under a simulated clock, for tests of the core and of the server.
 #![allow(missing_docs, reason = "test support")]
 
 use std::collections::BTreeMap;
@@ -23,18 +23,18 @@ pub fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// A room on a table: the core, a clock, and the journal that a store would have kept.
+/// A room under test: the core, a clock, and the journal of committed changes.
 pub struct Table {
     pub core: Core,
     pub now: Duration,
     pub journal: Vec<Entry>,
     pub connections: u64,
-    /// How long the store takes for what it is given next.
+    /// How long the next commit takes.
     pub store_takes: Duration,
 }
 
 impl Table {
-    /// A room whose seats are free.
+    /// Creates a room whose seats are free.
     pub fn empty(policy: Policy, fills: Vec<Fill>) -> Self {
         Self::with_rules(policy, fills, RuleSetSpec::default())
     }
@@ -44,7 +44,7 @@ impl Table {
             room_id: Id([1; 16]),
             game_id: Id([2; 16]),
             name: "table".into(),
-            rules: rules.validate().expect("the rule set makes sense"),
+            rules: rules.validate().expect("a valid rule set"),
             rules_version: RULES_VERSION,
             policy,
             called: BTreeMap::new(),
@@ -66,7 +66,7 @@ impl Table {
         }
     }
 
-    /// A room of four remote agents whose game has begun.
+    /// Creates a room of four remote agents whose game has started.
     pub fn playing(policy: Policy) -> Self {
         let mut table = Self::empty(policy, vec![OPEN; 4]);
         table.fill();
@@ -100,7 +100,7 @@ impl Table {
     pub fn attach(&mut self, seat: Seat) -> ConnectionId {
         self.connections += 1;
         let connection = ConnectionId(self.connections);
-        // The connection before it, where there is one, has handed over everything.
+        // The transport of an earlier connection has received everything.
         let handed = (self.core.standing(seat).connected).then_some(self.now);
         self.core
             .attach(self.now, seat, connection, Vec::new(), self.now, handed);
@@ -113,12 +113,12 @@ impl Table {
         self.commit();
     }
 
-    /// Lets time pass, ringing at every deadline on the way.
+    /// Advances the time, ticking at every deadline on the way.
     pub fn pass_time(&mut self, time: Duration) {
         let until = self.now + time;
         while let Some(deadline) = self.core.deadline().filter(|deadline| *deadline <= until) {
             self.now = self.now.max(deadline);
-            // The transport, where there is one, took every request the moment it was released.
+            // The transport received every request as soon as it was released.
             let connected = |seat| self.core.standing(seat).connected;
             let handed = (self.core.open())
                 .filter(|open| connected(open.decision.seat))
@@ -140,12 +140,12 @@ impl Table {
         action.index().into()
     }
 
-    /// An action that is not legal now.
+    /// An action that is illegal now.
     pub fn illegal(&self) -> u32 {
         let legal = self.core.legal_actions();
         (0..500)
             .find(|number| !legal.contains(ActionId::new(*number)))
-            .expect("not everything is legal")
+            .expect("some action is illegal")
             .into()
     }
 
@@ -157,7 +157,7 @@ impl Table {
         answered
     }
 
-    /// The seat whose decision is open takes its first legal action.
+    /// Plays the first legal action of the open decision. Returns its seat.
     pub fn play_one(&mut self) -> Seat {
         let (seat, id) = self.open();
         let action = self.legal(0);
@@ -191,7 +191,7 @@ impl Table {
             .count()
     }
 
-    /// The journal, folded anew, gives the same log and the same game.
+    /// Folding the journal again gives the same log and the same game.
     pub fn assert_replays(&self) {
         let replayed = Core::replay(Arc::clone(self.core.header()), &self.journal);
         assert_eq!(
@@ -207,7 +207,7 @@ impl Table {
     }
 }
 
-/// Rules under which a game is over after one Shift.
+/// Rules for games of one Shift.
 pub fn one_shift() -> RuleSetSpec {
     RuleSetSpec {
         stop: Stop::Shifts(1),
@@ -216,12 +216,13 @@ pub fn one_shift() -> RuleSetSpec {
 }
 
 impl Core {
-    /// Puts other hands in place of those dealt, in the game and in the log, as a test of what is hidden needs it. `None` if they make no game.
+    /// Replaces the dealt hands in the game and in the log, for tests of redaction. `None` if the hands
+    /// are inconsistent.
     pub fn replace_hands(
         &mut self,
         change: impl FnOnce(&Game) -> Option<BySeat<Cards>>,
     ) -> Option<()> {
-        let game = self.game.as_ref().expect("the game has begun");
+        let game = self.game.as_ref().expect("the game has started");
         let hands = change(game)?;
         self.game = Some(Box::new(game.with_hands(hands).ok()?));
         self.log.replace_hands(&hands);

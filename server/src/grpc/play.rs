@@ -70,7 +70,7 @@ impl PlayService for Play {
         let closing = self.closing.clone();
         tokio::spawn(async move {
             tokio::select! {
-                () = closing.cancelled() => outbox.hang_up(),
+                () = closing.cancelled() => outbox.stop_reading(),
                 () = outbox.abandoned() => {}
             }
         });

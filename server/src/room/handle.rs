@@ -1,4 +1,4 @@
-//! How others reach a room: the messages of its mailbox, and a handle that sends them and returns the answers.
+//! The handle of a room: sends messages to its mailbox and returns the answers.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -22,13 +22,13 @@ pub struct RoomGone;
 /// A request for a seat.
 #[derive(Debug)]
 pub struct JoinRequest {
-    /// Name to show.
+    /// Display name.
     pub name: String,
     /// The kind of the participant.
     pub kind: ParticipantKind,
-    /// The seat wanted; `None` for any.
+    /// The requested seat; `None` for any.
     pub seat: Option<u32>,
-    /// Identifies the request when it is repeated.
+    /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
 }
 
@@ -54,15 +54,15 @@ pub struct AttachRequest {
     pub outbox: Arc<Outbox>,
     /// Number of the seat on the stream.
     pub handle: u32,
-    /// How events and decisions reach it.
+    /// How events and decisions are delivered to it.
     pub options: DeliveryOptions,
-    /// The seat's part of the game seed.
+    /// The seat's contribution to the game seed.
     pub entropy: Vec<u8>,
     /// When the request was read.
     pub arrived: Instant,
     /// Set when the seat has left the stream.
     pub detached: Arc<AtomicBool>,
-    /// The seat's ticket, for a client that the server attaches by itself.
+    /// The seat's ticket, if the server attaches the client.
     pub assigned_ticket: Option<Token>,
 }
 
@@ -71,9 +71,9 @@ pub struct AttachRequest {
 pub struct SpectateRequest {
     /// The stream.
     pub outbox: Arc<Outbox>,
-    /// Position in the log from which events are wanted.
+    /// Position in the log of the first event to send.
     pub from: usize,
-    /// Start with a snapshot.
+    /// Whether to start with a snapshot.
     pub snapshot: bool,
 }
 
@@ -84,7 +84,7 @@ pub enum SpectateError {
     NotAdmitted,
     /// There are too many spectators.
     Full,
-    /// A snapshot of a delayed room would reveal the present.
+    /// A snapshot of a delayed room would reveal its present state.
     SnapshotDelayed,
 }
 
@@ -104,7 +104,7 @@ pub enum SeatAction {
     Resume,
 }
 
-/// The result of a command that was sent without a stream.
+/// The result of a command without a stream.
 pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
 
 /// A message to a room.
@@ -159,13 +159,13 @@ impl Handle {
     /// Takes a seat.
     ///
     /// # Errors
-    /// The room is gone, or (inside) why no seat can be taken.
+    /// The room is gone, or (inner result) no seat can be taken.
     pub async fn join(&self, request: JoinRequest) -> Result<Result<Joined, JoinError>, RoomGone> {
         self.ask(|reply| Message::Join(Box::new(request), reply))
             .await
     }
 
-    /// Attaches a stream to a seat; `None` if the ticket is not of this room.
+    /// Attaches a stream to a seat; `None` if the room has no such ticket.
     ///
     /// # Errors
     /// The room is gone.
@@ -177,21 +177,21 @@ impl Handle {
             .await
     }
 
-    /// Notes that a seat's connection is lost or leaves. `reason` is sent to one that leaves.
+    /// Reports that a seat's connection is lost or leaves. `reason` is sent to one that leaves.
     pub async fn lost(
         &self,
         seat: Seat,
         connection: ConnectionId,
         reason: Option<v1::DetachReason>,
     ) {
-        // A room that is gone has nobody to miss.
+        // If the room is gone, there is nothing to do.
         let _ = self
             .mailbox
             .send(Message::Lost(seat, connection, reason))
             .await;
     }
 
-    /// Performs a command of a seat; the result is sent on its stream.
+    /// Executes a command of a seat; the result is sent on its stream.
     ///
     /// # Errors
     /// The room is gone.
@@ -208,7 +208,7 @@ impl Handle {
             .map_err(|_| RoomGone)
     }
 
-    /// Performs a command of a seat without a stream; `None` if the ticket is not of this room.
+    /// Executes a command of a seat without a stream; `None` if the room has no such ticket.
     ///
     /// # Errors
     /// The room is gone.
@@ -225,7 +225,7 @@ impl Handle {
     /// Adds a spectator.
     ///
     /// # Errors
-    /// The room is gone, or (inside) why it cannot be watched.
+    /// The room is gone, or (inner result) it cannot be watched.
     pub async fn spectate(
         &self,
         request: SpectateRequest,
@@ -242,10 +242,10 @@ impl Handle {
         self.ask(Message::Describe).await
     }
 
-    /// Gives a seat back; `None` if the ticket is not of this room.
+    /// Frees a seat; `None` if the room has no such ticket.
     ///
     /// # Errors
-    /// The room is gone, or (inside) why the seat cannot be given back.
+    /// The room is gone, or (inner result) the seat cannot be freed.
     pub async fn leave(
         &self,
         secret: [u8; 32],
@@ -261,20 +261,21 @@ impl Handle {
         self.ask(|reply| Message::Close(secret, reply)).await
     }
 
-    /// Ends the room because the server stops, if its game is not over: suspends a durable game, aborts any other.
+    /// Ends the room because the server stops, unless its game is over: suspends a durable game, aborts any
+    /// other.
     pub async fn end(&self, durable: bool) {
         let message = if durable {
             Message::Suspend
         } else {
             Message::Abort(AbortReason::Shutdown)
         };
-        // A room that is gone has nothing left to end.
+        // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(message).await;
     }
 
-    /// Closes the room for a tournament that is closed; a running game is aborted.
+    /// Closes the room because its tournament is closed; a running game is aborted.
     pub async fn give_up(&self) {
-        // A room that is gone has nothing left to end.
+        // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(Message::Abort(AbortReason::Closed)).await;
     }
 
@@ -291,13 +292,13 @@ impl Handle {
     }
 }
 
-/// Notifies a room that a stream has space again.
-pub(super) struct TellSpace(pub(super) mpsc::WeakSender<Message>);
+/// Tells a room that a stream has space again.
+pub(super) struct NotifySpace(pub(super) mpsc::WeakSender<Message>);
 
-impl OnSpace for TellSpace {
+impl OnSpace for NotifySpace {
     fn space(&self) {
         if let Some(mailbox) = self.0.upgrade() {
-            // A full mailbox means that the room is about to deliver anyway.
+            // If the mailbox is full, the room will deliver anyway.
             let _ = mailbox.try_send(Message::Space);
         }
     }

@@ -1,5 +1,5 @@
-//! Rooms: a task each, which owns one game. `chefshat-room` decides; `task` commits and publishes; `subscriber` sends to the streams of seats
-//! and spectators; `handle` is how others reach a room.
+//! Rooms. Each is a task that owns one game. `chefshat-room` decides; `task` commits and publishes;
+//! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room.
 
 mod handle;
 pub mod subscriber;

@@ -1,6 +1,7 @@
-//! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a position in the log and an outbox. Events
-//! beyond the position are sent when they are due. A room never waits for a full outbox: the position stays, and delivery resumes when there
-//! is space; a spectator that falls too far behind is cut off.
+//! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a
+//! position in the log and an outbox. Events after the position are sent when they are due. A room
+//! never waits for a full outbox: the position stays, and delivery resumes when there is space; a
+//! spectator that falls too far behind is disconnected.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -20,27 +21,27 @@ use crate::wire::{Events, Updates, encode_decision, put_event};
 
 /// Events that wait for a seat's next decision before they are sent without one.
 pub const MAX_PENDING_EVENTS: usize = 128;
-/// Most updates and events that wait for a full stream. Answers to commands beyond it are dropped.
+/// Most updates and events pending for a full stream. Further results of commands are dropped.
 const MAX_PENDING_UPDATES: usize = 1_024;
-/// Most events that happen while a spectator's stream has no space, before it is cut off.
+/// Most events that a spectator's stream may fall behind before it is disconnected.
 pub const MAX_SPECTATOR_LAG: usize = 1_024;
 /// Most spectators of one room.
 pub const MAX_SPECTATORS: usize = 256;
-/// Usual size of a decision request, bytes.
+/// Typical size of a decision request, bytes.
 const DECISION_CAPACITY: usize = 256;
 /// Most events in one batch.
 const EVENTS_PER_BATCH: usize = 256;
 
-/// How events and decisions reach a seat.
+/// How events and decisions are delivered to a seat.
 #[derive(Debug, Clone, Copy)]
 pub struct DeliveryOptions {
-    /// Send each event when it happens instead of with the next decision.
+    /// Send each event at once instead of with the next decision.
     pub at_once: bool,
     /// Leave masks out of decision requests.
     pub no_mask: bool,
-    /// Start with a snapshot instead of the events so far.
+    /// Start with a snapshot instead of the past events.
     pub snapshot: bool,
-    /// Position in the log from which events are wanted.
+    /// Position in the log of the first event to send.
     pub from: usize,
 }
 
@@ -49,7 +50,7 @@ pub struct Subscriber {
     outbox: Arc<Outbox>,
     on_space: Arc<dyn OnSpace>,
     position: usize,
-    /// Updates that leave with the next flush.
+    /// Updates for the next flush.
     pending: Updates,
     stalled: bool,
     ended: bool,
@@ -59,7 +60,7 @@ pub struct Subscriber {
 enum Role {
     Seat(SeatConnection),
     Spectator {
-        /// Length of what it may see when its stream last had space.
+        /// Number of events it could see when its stream last had space.
         kept_up_at: usize,
     },
 }
@@ -72,22 +73,22 @@ pub struct SeatConnection {
     pub id: ConnectionId,
     /// Number of the seat on the stream.
     pub handle: u32,
-    /// How events and decisions reach it.
+    /// How events and decisions are delivered to it.
     pub options: DeliveryOptions,
-    /// Notes when a decision leaves.
+    /// Records when a decision request is handed over.
     pub stamp: Arc<HandStamp>,
     /// Set with the last update to the seat on this stream.
     pub detached: Arc<AtomicBool>,
-    /// Decision that was sent last, or 0.
+    /// The last decision sent, or 0.
     sent: u64,
-    /// Newest decision whose answer was acknowledged, or 0.
+    /// The newest decision whose answer was acknowledged, or 0.
     acknowledged: u64,
     /// Whether a decision request is among the pending updates.
     decision_pending: bool,
 }
 
 impl SeatConnection {
-    /// A connection that has received nothing yet.
+    /// Creates a connection that has received nothing yet.
     pub fn new(
         seat: Seat,
         id: ConnectionId,
@@ -111,7 +112,7 @@ impl SeatConnection {
 }
 
 impl Subscriber {
-    /// A seat's connection. The seat learns of it by [`Subscriber::confirm_attached`].
+    /// The subscriber for a seat's connection. [`Subscriber::confirm_attached`] notifies the seat.
     pub fn seat(
         connection: SeatConnection,
         outbox: Arc<Outbox>,
@@ -125,7 +126,7 @@ impl Subscriber {
         )
     }
 
-    /// A spectator from an event on (position from 0). The first message is in its outbox.
+    /// A spectator that starts at an event (position from 0). The first message is in its outbox.
     pub fn spectator(
         core: &Core,
         outbox: Arc<Outbox>,
@@ -172,15 +173,15 @@ impl Subscriber {
         }
     }
 
-    /// When a decision was handed to the transport; `None` while it was not.
+    /// When a decision request was handed to the transport; `None` if it was not yet.
     pub fn handed(&self, decision_id: u64) -> Option<Duration> {
         let connection = self.connection()?;
         let left = connection.sent == decision_id && !connection.decision_pending;
         connection.stamp.get().filter(|_| left)
     }
 
-    /// Tells a seat that it is attached, with a snapshot if it asked for one. `ticket`: set if the server attached a participant of a
-    /// tournament by itself.
+    /// Tells a seat that it is attached, with a snapshot if requested. `ticket`: set if the server
+    /// attached a participant of a tournament.
     pub fn confirm_attached(&mut self, core: &Core, request_id: u32, ticket: Option<Token>) {
         let Role::Seat(connection) = &self.role else {
             return;
@@ -209,7 +210,8 @@ impl Subscriber {
         self.position = self.position.min(core.log().len());
     }
 
-    /// Sends the result of an answer: with the next flush if it was accepted and the seat receives events with its decisions, else at once.
+    /// Sends the result of an answer: with the next flush if it was accepted and the seat receives events
+    /// with its decisions, else at once.
     pub fn send_result(&mut self, result: v1::AnswerResult) {
         if self.ended || self.is_saturated() {
             return;
@@ -241,7 +243,7 @@ impl Subscriber {
         }
     }
 
-    /// Takes a seat off its stream; what is pending is sent first.
+    /// Detaches a seat from its stream; pending updates are sent first.
     pub fn detach(&mut self, reason: v1::DetachReason) {
         let Role::Seat(connection) = &self.role else {
             return;
@@ -251,13 +253,13 @@ impl Subscriber {
             let reason = reason.into();
             let detached = Update::Detached(v1::Detached { reason });
             self.pending.add(connection.handle, detached);
-            // There is one such update for each seat: a full outbox takes it too.
+            // At most one such update for each seat: even a full outbox accepts it.
             self.outbox.push_last(&mut self.pending);
             connection.detached.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Ends the whole stream. What is pending is dropped.
+    /// Ends the stream. Pending updates are dropped.
     pub fn end(&mut self, end: StreamEnd) {
         if !self.ended {
             self.ended = true;
@@ -268,7 +270,8 @@ impl Subscriber {
         }
     }
 
-    /// Sends what is due. `urgent`: send now even to a seat that receives events with its decisions. `false` when nothing more can follow.
+    /// Sends what is due. `urgent`: send now even if the seat receives events with its decisions. Returns
+    /// `false` when nothing more can follow.
     pub fn deliver(
         &mut self,
         core: &Core,
@@ -349,7 +352,8 @@ impl Subscriber {
         self.position = end;
     }
 
-    /// Moves pending updates to the outbox. If that is full they stay pending, and the room hears when there is space.
+    /// Moves pending updates to the outbox. If it is full they stay pending, and the room is notified when
+    /// there is space.
     fn flush(&mut self) -> bool {
         let stamp = match &self.role {
             Role::Seat(connection) => connection.decision_pending.then_some(&connection.stamp),
@@ -365,7 +369,7 @@ impl Subscriber {
         pushed
     }
 
-    /// Cuts off a spectator that is too far behind. A seat is waited for.
+    /// Disconnects a spectator that is too far behind. Seats have no such limit.
     fn keeps_up(&mut self, visible: usize) -> bool {
         let Role::Spectator { kept_up_at } = self.role else {
             return true;
@@ -378,7 +382,7 @@ impl Subscriber {
         false
     }
 
-    /// Whether the client does not read and as many updates are pending for it as may be.
+    /// Whether the client does not read and the pending updates have reached their limit.
     fn is_saturated(&self) -> bool {
         self.stalled && self.pending.weight() >= MAX_PENDING_UPDATES
     }
@@ -397,14 +401,14 @@ impl std::fmt::Debug for Subscriber {
     }
 }
 
-/// The events of a room as the public sees them, encoded once for all subscribers.
+/// The public events of a room, encoded once for all subscribers.
 #[derive(Debug, Default)]
 pub struct PublicEvents {
     events: Events,
 }
 
 impl PublicEvents {
-    /// Encodes what has been added to the log.
+    /// Encodes the events added to the log.
     pub fn follow(&mut self, core: &Core) {
         for position in self.events.len()..core.log().len() {
             let event = convert::event_to_proto(core, position, Viewer::Spectator);
@@ -413,8 +417,8 @@ impl PublicEvents {
         }
     }
 
-    /// The events from one position to another, encoded as a viewer may see them. The bytes of public events are shared; only events that
-    /// show more to the viewer are encoded for it.
+    /// The events between two positions, encoded for a viewer. The bytes of public events are shared; only
+    /// events that show more to the viewer are encoded separately.
     fn range(
         &self,
         core: &Core,
@@ -460,8 +464,8 @@ fn next_sequence(core: &Core) -> u64 {
     u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
 }
 
-/// What spectators may see now: all hands after the game, or where the room allows it. The hands of a series of games with the same deals stay
-/// hidden, since others still play them.
+/// The current view of spectators: all hands after the game, or if the room allows it. In a series of
+/// games with the same deals hands stay hidden, because others still play them.
 fn spectator_view(core: &Core) -> Viewer {
     let header = core.header();
     let shows_hands = header.policy.spectators_see_hands || core.state().is_over();
@@ -472,7 +476,8 @@ fn spectator_view(core: &Core) -> Viewer {
     }
 }
 
-/// Whether an event is sent to a seat at once in any case: its own finishing, substitution and return, the end of a Shift and of the game.
+/// Whether an event is always sent to a seat at once: its own finishing, substitution and return, the
+/// end of a Shift and of the game.
 pub fn is_urgent(event: &RoomEvent, seat: Seat) -> bool {
     match event {
         RoomEvent::Substituted(own) | RoomEvent::Returned(own) => *own == seat,

@@ -1,5 +1,6 @@
-//! The task of a room: receives from a bounded mailbox, arms one deadline, and for every batch of inputs lets the core apply them, commits
-//! the changes to the store and only then publishes them. All decisions are the core's.
+//! The task of a room: receives from a bounded mailbox, sets one timer, and for every batch of inputs
+//! lets the core apply them, commits the changes and only then publishes them. The core makes all
+//! decisions.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,8 +17,8 @@ use tokio_util::task::TaskTracker;
 use tracing::{debug, error, info};
 
 use super::handle::{
-    Acted, AttachRequest, Handle, JoinRequest, Joined, Message, SeatAction, SpectateError,
-    SpectateRequest, TellSpace,
+    Acted, AttachRequest, Handle, JoinRequest, Joined, Message, NotifySpace, SeatAction,
+    SpectateError, SpectateRequest,
 };
 use super::subscriber::{MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent};
 use crate::clock::RoomClock;
@@ -27,35 +28,36 @@ use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::store::{Journal, Store, StoreError};
 
-/// Inputs that are applied before the store is asked once for all of them.
+/// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;
 
-/// What a room needs from its server.
+/// The parts of the server that a room uses.
 #[derive(Clone)]
 pub struct TaskContext {
-    /// Where games are kept.
+    /// Stores games.
     pub store: Arc<dyn Store>,
     /// Writes records to files.
     pub record_writer: RecordWriter,
-    /// How long an ended room is still shown.
+    /// How long an ended room stays listed.
     pub retention: Duration,
-    /// Numbers for connections.
+    /// Source of connection ids.
     pub connections: Arc<AtomicU64>,
     /// Tasks that a shutdown waits for.
     pub tracker: TaskTracker,
-    /// Told when the game of a room has ended, and when the room is gone.
+    /// Notified when the game of a room has ended, and when the room is gone.
     pub watcher: Arc<dyn RoomWatcher>,
 }
 
-/// Who keeps the list of rooms.
+/// Maintains the list of rooms.
 pub trait RoomWatcher: Send + Sync {
-    /// The game of a room has ended; the room is still shown.
+    /// The game of a room has ended; the room is still listed.
     fn game_over(&self, room: Id);
     /// The room is gone.
     fn gone(&self, room: Id);
 }
 
-/// Starts a room, whose game may have begun before. `over_since`: the game is over, and everything that follows from that has been done.
+/// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end has
+/// been processed.
 pub fn spawn_room(
     core: Core,
     clock: RoomClock,
@@ -76,7 +78,7 @@ pub fn spawn_room(
         clock,
         connections: (0..seats).map(|_| None).collect(),
         spectators: Vec::new(),
-        on_space: Arc::new(TellSpace(mailbox.downgrade())),
+        on_space: Arc::new(NotifySpace(mailbox.downgrade())),
         releases: Vec::new(),
         public: PublicEvents::default(),
         delivered: 0,
@@ -88,7 +90,7 @@ pub fn spawn_room(
     handle
 }
 
-/// What is sent once the changes are committed.
+/// An answer or update that is sent once the changes are committed.
 enum Release {
     Join(
         oneshot::Sender<Result<Joined, JoinError>>,
@@ -119,17 +121,17 @@ struct Task {
     core: Core,
     journal: Box<dyn Journal>,
     clock: RoomClock,
-    /// The time of the inputs in hand.
+    /// The time of the current inputs.
     now: Duration,
     connections: Vec<Option<Subscriber>>,
     spectators: Vec<Subscriber>,
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
     public: PublicEvents,
-    /// Length of the log when everybody had last been looked after.
+    /// Length of the log at the last delivery.
     delivered: usize,
     over_since: Option<Duration>,
-    /// The room ends without its game being over, which goes on when the server is back.
+    /// Whether the room ends while its game is unfinished; the game resumes when the server is restarted.
     suspended: bool,
     context: TaskContext,
 }
@@ -160,7 +162,7 @@ impl Task {
                     for message in messages.drain(..) {
                         self.receive(message);
                     }
-                    // A mailbox that is never empty does not stop the clock.
+                    // A busy mailbox must not delay deadlines.
                     let due = armed && self.clock.at(alarm.deadline()) <= self.now;
                     if due && !self.ring(&mut armed) {
                         break;
@@ -177,7 +179,7 @@ impl Task {
         debug!(room = %self.core.header().room_id, "the room is gone");
     }
 
-    /// The alarm has rung. `false` when the room has been shown long enough.
+    /// Handles the timer. Returns `false` when the room need not be listed any longer.
     fn ring(&mut self, armed: &mut bool) -> bool {
         *armed = false;
         if self.is_expired() {
@@ -188,8 +190,8 @@ impl Task {
         true
     }
 
-    /// Arms the alarm for the next deadline. An alarm that rings too early finds nothing to do and is armed again, so that a later
-    /// deadline costs nothing.
+    /// Sets the timer to the next deadline. A timer that fires too early finds nothing to do and is set
+    /// again, so that moving a deadline back costs nothing.
     fn arm(&self, alarm: std::pin::Pin<&mut Sleep>, armed: bool) -> bool {
         let deadline = match self.over_since {
             Some(since) => Some(since + self.context.retention),
@@ -408,14 +410,15 @@ impl Task {
         Ok(())
     }
 
-    /// Hands new changes to the store, awaits it, then tells everybody what they may know. `false` when the room must stop.
+    /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room must
+    /// stop.
     async fn commit_and_publish(&mut self) -> bool {
         if !self.core.pending().is_empty() {
             if let Err(error) = self.journal.append(self.core.pending()).await {
                 self.fail(&error);
                 return false;
             }
-            // What the store took is nobody's thinking time.
+            // The time of the commit does not count as thinking time.
             self.now = self.clock.now();
         }
         self.core.released(self.now);
@@ -431,7 +434,7 @@ impl Task {
         self.releases = releases;
         self.deliver();
         if ends {
-            // Whoever waits for games to end may close streams at once: everything has been put into them.
+            // A shutdown that waits for games to end may close streams at once: everything has been queued.
             self.context.watcher.game_over(self.core.header().room_id);
         }
         true
@@ -508,11 +511,11 @@ impl Task {
             .retain_mut(|spectator| spectator.deliver(core, public, now, false));
     }
 
-    /// The game has ended: the store is told, the record is written.
+    /// Handles the end of the game: finishes the journal and writes the record.
     async fn conclude(&mut self) -> bool {
         self.over_since = Some(self.now);
         let header = Arc::clone(self.core.header());
-        // Of a room in which nothing was ever dealt there is no record.
+        // A game without a deal has no record.
         let summary = self.core.game().map(|_| convert::summary(&self.core));
         let has_record = summary.is_some();
         if let Err(error) = self.journal.finish(summary.map(Box::new)).await {
@@ -532,15 +535,15 @@ impl Task {
         true
     }
 
-    /// The store has failed: nobody is told of what may not be kept. The streams end, so that agents connect again and find the game where
-    /// the server, once it is back, finds it.
+    /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that agents
+    /// reconnect and find the game as the restarted server finds it.
     fn fail(&mut self, error: &StoreError) {
         error!(room = %self.core.header().room_id, %error, "the room stops");
         self.releases.clear();
         self.end_streams(StreamEnd::StoreFailed);
     }
 
-    /// Ends the streams of all subscribers, who may connect again.
+    /// Ends the streams of all subscribers, which may reconnect.
     fn end_streams(&mut self, end: StreamEnd) {
         let seats = self.connections.iter_mut().flatten();
         for subscriber in seats.chain(&mut self.spectators) {
@@ -549,7 +552,7 @@ impl Task {
     }
 }
 
-/// Whatever ends the task, a panic too: nobody waits for a room that is gone.
+/// Streams end even if the task panics, so that no client waits for a room that is gone.
 impl Drop for Task {
     fn drop(&mut self) {
         self.end_streams(StreamEnd::RoomGone);
@@ -561,7 +564,7 @@ fn is_connection(subscriber: &Subscriber, connection: ConnectionId) -> bool {
     (subscriber.connection()).is_some_and(|attached| attached.id == connection)
 }
 
-/// Answers a caller. One that is no longer there does not want to know.
+/// Answers a caller, which may have gone.
 fn answer<T>(reply: oneshot::Sender<T>, answer: T) {
     let _ = reply.send(answer);
 }

@@ -1,4 +1,4 @@
-//! The shell of a room under tokio's paused clock: streams that do not read, and what they find when they do.
+//! The task of a room under tokio's paused clock, with streams that do not read.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,9 +29,9 @@ use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{Answer, ConnectionId, Core};
 
-struct Nobody;
+struct NullWatcher;
 
-impl RoomWatcher for Nobody {
+impl RoomWatcher for NullWatcher {
     fn game_over(&self, _room: Id) {}
     fn gone(&self, _room: Id) {}
 }
@@ -40,7 +40,7 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
     room_with(policy, shifts, |journal| journal).await
 }
 
-/// A room whose journal is changed before it starts.
+/// Starts a room whose journal is replaced.
 async fn room_with(
     policy: Policy,
     shifts: u32,
@@ -55,7 +55,7 @@ async fn room_with(
             ..RuleSetSpec::default()
         }
         .validate()
-        .expect("the rule set makes sense"),
+        .expect("a valid rule set"),
         rules_version: RULES_VERSION,
         policy,
         called: BTreeMap::new(),
@@ -72,7 +72,7 @@ async fn room_with(
     let journal = store
         .create(Arc::clone(&header), Vec::new())
         .await
-        .expect("memory keeps it");
+        .expect("a memory store");
     spawn_room(
         Core::new(header),
         RoomClock::of_age(Duration::ZERO),
@@ -84,7 +84,7 @@ async fn room_with(
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
             tracker: TaskTracker::new(),
-            watcher: Arc::new(Nobody),
+            watcher: Arc::new(NullWatcher),
         },
     )
 }
@@ -105,8 +105,8 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
             seat: None,
         })
         .await
-        .expect("the room is there")
-        .expect("there is space");
+        .expect("the room exists")
+        .expect("a free seat");
     attach(room, joined.ticket).await
 }
 
@@ -130,8 +130,8 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
             assigned_ticket: None,
         })
         .await
-        .expect("the room is there")
-        .expect("the ticket is good");
+        .expect("the room exists")
+        .expect("a valid ticket");
     AttachedSeat {
         seat,
         connection,
@@ -140,14 +140,15 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
     }
 }
 
-/// Reads until the end of the game; answers decisions with their first legal action if `answering`. Gives the numbers of all events.
+/// Reads until the end of the game; answers decisions with their first legal action if `answering`.
+/// Returns the numbers of all events.
 async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u64> {
     let mut numbers = Vec::new();
     while let Some(updates) = seat.updates.next().await {
         let written = updates.expect("no error").encode_to_vec();
-        let response = v1::PlayResponse::decode(written.as_slice()).expect("it is a response");
+        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
         for update in response.updates {
-            match update.update.expect("it says something") {
+            match update.update.expect("an update") {
                 Update::Events(batch) => {
                     numbers.extend(batch.events.iter().map(|event| event.sequence));
                 }
@@ -158,7 +159,7 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u6
                     ));
                     room.perform(seat.seat, seat.connection, action, Instant::now())
                         .await
-                        .expect("the room is there");
+                        .expect("the room exists");
                 }
                 Update::Detached(detached) => {
                     assert_eq!(detached.reason(), v1::DetachReason::GameOver);
@@ -177,12 +178,12 @@ fn first_legal(decision: &v1::DecisionRequest) -> u32 {
             let byte = decision.action_mask[usize::try_from(action / 8).expect("small")];
             byte & (1 << (action % 8)) != 0
         })
-        .expect("something is legal")
+        .expect("a legal action")
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_stream_that_is_not_read_is_not_waited_for_and_finds_everything_later() {
-    // Long enough that what happens does not fit an outbox.
+async fn a_stalled_stream_delays_nobody_and_misses_nothing() {
+    // So long that its events do not fit an outbox.
     let policy = Policy {
         abort: AbortPolicy::Never,
         ..Policy::default()
@@ -192,7 +193,7 @@ async fn a_stream_that_is_not_read_is_not_waited_for_and_finds_everything_later(
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    let mut deaf = seats.pop().expect("there are four");
+    let mut stalled = seats.pop().expect("there are four");
     let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
     let played = played.await;
     let expected: Vec<u64> = (1..).take(played[0].len()).collect();
@@ -200,15 +201,15 @@ async fn a_stream_that_is_not_read_is_not_waited_for_and_finds_everything_later(
     for numbers in &played {
         assert_eq!(*numbers, expected);
     }
-    // The deaf one reads at last: what had been put aside for it, then the rest, in order and once.
-    assert_eq!(read(&room, &mut deaf, false).await, expected);
-    // And one that attaches only now.
-    let mut late = attach(&room, deaf.ticket).await;
+    // The stalled stream reads at last: its pending updates, then the rest, in order and once.
+    assert_eq!(read(&room, &mut stalled, false).await, expected);
+    // And a seat that attaches only now.
+    let mut late = attach(&room, stalled.ticket).await;
     assert_eq!(read(&room, &mut late, false).await, expected);
 }
 
 #[tokio::test(start_paused = true)]
-async fn deadlines_ring_without_anybody_saying_anything() {
+async fn deadlines_fire_without_any_input() {
     let policy = Policy {
         abort: AbortPolicy::Never,
         ..Policy::default()
@@ -219,7 +220,7 @@ async fn deadlines_ring_without_anybody_saying_anything() {
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    // Nobody answers: every seat loses its bank and three decisions, then substitutes end the game.
+    // No seat answers: each one uses up its bank and three decisions, then substitutes end the game.
     let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
     let numbers = read.await;
     assert!(numbers[0].len() > 12);
@@ -243,16 +244,16 @@ async fn a_flood_does_not_stop_the_clock() {
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    // Nobody answers anything that was asked; several ask and answer without end, so that the mailbox is never empty.
+    // No decision is answered; several clients send requests endlessly, so the mailbox is never empty.
     let (seat, connection) = (seats[0].seat, seats[0].connection);
     let flood: Vec<_> = (0..8)
         .map(|_| {
             let room = room.clone();
             tokio::spawn(async move {
                 loop {
-                    let nonsense = SeatAction::Answer(Answer::new(u64::MAX, 0));
+                    let unknown = SeatAction::Answer(Answer::new(u64::MAX, 0));
                     if room
-                        .perform(seat, connection, nonsense, Instant::now())
+                        .perform(seat, connection, unknown, Instant::now())
                         .await
                         .is_err()
                     {
@@ -267,11 +268,11 @@ async fn a_flood_does_not_stop_the_clock() {
     for flood in flood {
         flood.abort();
     }
-    assert!(numbers.expect("the game ends all the same")[0].len() > 12);
+    assert!(numbers.expect("the game ends")[0].len() > 12);
 }
 
 #[tokio::test(start_paused = true)]
-async fn the_last_word_finds_its_place_in_a_full_outbox() {
+async fn a_full_outbox_has_space_for_the_last_update() {
     let policy = Policy {
         abort: AbortPolicy::Never,
         ..Policy::default()
@@ -281,24 +282,24 @@ async fn the_last_word_finds_its_place_in_a_full_outbox() {
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    let mut deaf = seats.pop().expect("there are four");
+    let mut stalled = seats.pop().expect("there are four");
     let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
     played.await;
-    let newer = attach(&room, deaf.ticket).await;
+    let newer = attach(&room, stalled.ticket).await;
     let mut last = None;
-    while let Some(Some(updates)) = futures::FutureExt::now_or_never(deaf.updates.next()) {
+    while let Some(Some(updates)) = futures::FutureExt::now_or_never(stalled.updates.next()) {
         let written = updates.expect("no error").encode_to_vec();
-        let response = v1::PlayResponse::decode(written.as_slice()).expect("it is a response");
+        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
         last = response.updates.into_iter().last();
     }
     let Some(Update::Detached(detached)) = last.and_then(|update| update.update) else {
-        panic!("it was not told that a newer connection has its seat");
+        panic!("it was not notified that a newer connection has its seat");
     };
     assert_eq!(detached.reason(), v1::DetachReason::Superseded);
     drop(newer);
 }
 
-/// A journal whose next appends succeed, and then one panics.
+/// A journal that panics after a number of appends.
 struct PanicsAfter {
     appends: usize,
     journal: Box<dyn Journal>,
@@ -309,10 +310,7 @@ impl Journal for PanicsAfter {
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.appends = self
-            .appends
-            .checked_sub(1)
-            .expect("the journal is asked to panic");
+        self.appends = self.appends.checked_sub(1).expect("a panic on purpose");
         self.journal.append(entries)
     }
 
@@ -325,7 +323,7 @@ impl Journal for PanicsAfter {
 }
 
 #[tokio::test(start_paused = true)]
-async fn the_streams_of_a_room_that_panics_end() {
+async fn a_panic_of_a_room_ends_its_streams() {
     // Four seats are taken and attached, then the first answer panics.
     let room = room_with(Policy::default(), 1, |journal| {
         Box::new(PanicsAfter {
@@ -345,13 +343,13 @@ async fn the_streams_of_a_room_that_panics_end() {
         snapshot: false,
     })
     .await
-    .expect("the room is there")
+    .expect("the room exists")
     .expect("spectators are admitted");
     for seat in &seats {
         let answers = (0..u32::from(u8::MAX)).map(|action| Answer::new(1, action));
         for answer in answers {
             let action = SeatAction::Answer(answer);
-            // Once the room is gone it takes nothing.
+            // A room that is gone accepts no messages.
             let _ = (room.perform(seat.seat, seat.connection, action, Instant::now())).await;
         }
     }

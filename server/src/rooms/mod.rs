@@ -1,4 +1,4 @@
-//! All rooms of a server: making them, finding them, closing them down. Going on with those of a server that ended is in `restore`.
+//! The rooms of a server: creates, finds and shuts them down. `restore` resumes them.
 
 mod restore;
 mod table;
@@ -29,10 +29,10 @@ use chefshat_room::policy::{Durability, Policy};
 pub use table::CreateError;
 use table::{Entry, Table};
 
-/// What a new room is to be.
+/// The settings of a new room.
 #[derive(Debug)]
 pub struct NewRoom {
-    /// Name to show.
+    /// Display name.
     pub name: String,
     /// The rules.
     pub rules: RuleSet,
@@ -40,63 +40,64 @@ pub struct NewRoom {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
-    /// Names of built-in agents that go by others than their own, by seat.
+    /// Display names of built-in agents, by seat, if set.
     pub called: BTreeMap<usize, String>,
-    /// The recorded players of the seats that are filled by one, by seat.
+    /// The recorded players of seats that replay one, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
-    /// How its game begins.
+    /// How its game starts.
     pub start: GameStart,
-    /// The game seed, if its creator fixes it.
+    /// The game seed, if its creator sets it.
     pub game_seed: Option<[u8; 32]>,
-    /// Who sits there from the beginning, if a tournament makes the room.
+    /// The participants seated from the start, if a tournament creates the room.
     pub seating: Option<Seating>,
     /// The request for it, if it can be repeated.
     pub request: Option<RequestKey>,
 }
 
-/// What a tournament decides about a room for one of its games.
+/// The part of a room's settings that a tournament decides.
 #[derive(Debug)]
 pub struct Seating {
-    /// The game's place in it.
+    /// The id of its game's tournament and series.
     pub game: TournamentGame,
-    /// The room's id, which the tournament has kept before the room is made.
+    /// The room's id, which the tournament has committed before.
     pub room_id: Id,
-    /// The game's.
+    /// The game's id.
     pub game_id: Id,
-    /// Who sits on the open seats.
+    /// The participants on the open seats.
     pub participants: BTreeMap<usize, SeatedParticipant>,
-    /// The server's part of the seed, if games are dealt alike.
+    /// The server's part of the seed, if several games share the deals.
     pub server_seed: Option<[u8; 32]>,
 }
 
-/// A room that was made, with its secrets.
+/// A new room with its secrets.
 #[derive(Debug)]
 pub struct Created {
-    /// How to reach it.
+    /// The handle of the room.
     pub handle: Handle,
     /// The join code.
     pub join_code: String,
-    /// The owner's token.
+    /// The owner token.
     pub owner: Token,
 }
 
 /// The rooms of a server.
 pub struct Rooms {
     table: Mutex<Table>,
-    /// Series of games that are dealt alike, some of which are still to be played, and tournaments all of whose games are withheld.
+    /// Series of games with the same deals that are not finished, and tournaments all of whose games are
+    /// withheld.
     closed: Mutex<BTreeSet<Id>>,
-    /// Notified when a game has ended or a room has gone.
+    /// Notified when a game has ended or a room is gone.
     changed: Notify,
     /// Notified when the creation of a room has ended.
     created: Notify,
-    /// Games that have ended since the server was started.
+    /// Number of games that have ended since the server was started.
     ended: AtomicU64,
     context: TaskContext,
     max_rooms: usize,
 }
 
 impl Rooms {
-    /// No rooms yet.
+    /// Creates an empty set.
     pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
         Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
@@ -120,10 +121,10 @@ impl Rooms {
         })
     }
 
-    /// Makes a room.
+    /// Creates a room.
     ///
     /// # Errors
-    /// The limit of rooms, a shutdown, or the store.
+    /// There are too many rooms, the server shuts down, or the store failed.
     pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
         let owner = match (&new.seating, &new.request) {
             (Some(seating), _) => Token::random(seating.room_id),
@@ -131,7 +132,7 @@ impl Rooms {
             (None, None) => Token::random(Id::random()),
         };
         let reservation = loop {
-            // A request that is repeated while its room is being created waits for that room.
+            // A repetition of a request whose room is still being created waits for it.
             let created = self.created.notified();
             match Reservation::of(self, owner)? {
                 Claim::Reserved(reservation) => break reservation,
@@ -142,14 +143,15 @@ impl Rooms {
         if !self.context.store.has_space() {
             return Err(CreateError::DiskNearlyFull);
         }
-        // Made to the end even if whoever asked for it goes away: what is half made would be kept and be nobody's.
+        // Runs to completion even if the caller is cancelled: a half-created room would be stored and belong
+        // to nobody.
         let making = self.context.tracker.spawn(reservation.make(new));
         making
             .await
-            .map_err(|error| StoreError::Failed(format!("a room was not made: {error}")))?
+            .map_err(|error| StoreError::Failed(format!("creating a room failed: {error}")))?
     }
 
-    /// A room by its id.
+    /// The room with this id.
     pub fn get(&self, id: Id) -> Option<Handle> {
         let table = self.lock();
         let number = table.numbers.get(&id)?;
@@ -159,7 +161,7 @@ impl Rooms {
             .map(|entry| entry.handle.clone())
     }
 
-    /// A room by its join code.
+    /// The room with this join code.
     pub fn by_code(&self, code: &str) -> Option<Handle> {
         let table = self.lock();
         let number = table.codes.get(&normal_code(code))?;
@@ -174,8 +176,8 @@ impl Rooms {
         self.by_code(code).is_some_and(|handle| handle.id() == id)
     }
 
-    /// The newest `count` rooms, or of those made before the one numbered `before`, with their numbers, newest first: those whose games are
-    /// over, those whose are not, or all.
+    /// The newest `count` rooms, only those created before number `before` if set, with their numbers,
+    /// newest first: those whose games are over, those whose are not, or all.
     pub fn newest(
         &self,
         before: Option<u64>,
@@ -192,7 +194,7 @@ impl Rooms {
             .collect()
     }
 
-    /// Whether a game is being played or awaited here.
+    /// Whether a game is running or waiting to start here.
     pub fn is_running(&self, game: Id) -> bool {
         self.lock()
             .by_number
@@ -200,24 +202,25 @@ impl Rooms {
             .any(|entry| entry.game_id == game && !entry.over)
     }
 
-    /// Whether the game of a room is over; `None` if there is no such room, or it was put down.
+    /// Whether the game of a room is over; `None` if the room is unknown or suspended.
     pub fn is_over(&self, id: Id) -> Option<bool> {
         let table = self.lock();
         let entry = table.by_number.get(table.numbers.get(&id)?)?;
-        (!entry.put_down).then_some(entry.over)
+        (!entry.suspended).then_some(entry.over)
     }
 
-    /// Ready when a game has ended or a room has gone after this was called.
+    /// Completes when a game has ended or a room is gone after this call.
     pub fn changed(&self) -> Notified<'_> {
         self.changed.notified()
     }
 
-    /// Counts the games that end. One that is counted has been kept.
+    /// Number of ended games. Each of them has been committed.
     pub fn ended(&self) -> u64 {
         self.ended.load(Ordering::Acquire)
     }
 
-    /// Withholds what could tell the deals of a series, or of all games of a tournament; or gives it free when all of them have ended.
+    /// Withholds the records of a series, or of all games of a tournament, or releases them once all have
+    /// ended.
     pub fn withhold(&self, series: Id, withheld: bool) {
         let mut closed = self.closed();
         if withheld {
@@ -227,17 +230,17 @@ impl Rooms {
         }
     }
 
-    /// Whether what could tell the deals of a game is still to be withheld.
+    /// Whether the record of a game is withheld.
     pub fn is_withheld(&self, game: TournamentGame) -> bool {
         let closed = self.closed();
         closed.contains(&game.tournament) || game.series.is_some_and(|it| closed.contains(&it))
     }
 
     fn closed(&self) -> MutexGuard<'_, BTreeSet<Id>> {
-        (self.closed.lock()).expect("nothing that holds this lock can panic")
+        (self.closed.lock()).expect("no code that holds this lock can panic")
     }
 
-    /// Rooms in which a game is being played or awaited.
+    /// Number of rooms in which a game is running or waiting to start.
     pub fn open_count(&self) -> usize {
         self.lock()
             .by_number
@@ -246,12 +249,12 @@ impl Rooms {
             .count()
     }
 
-    /// Whether the server takes no new rooms.
+    /// Whether the server accepts no new rooms.
     pub fn is_shutting_down(&self) -> bool {
         self.lock().shutting_down
     }
 
-    /// Where games are kept.
+    /// The store of games.
     pub fn store(&self) -> &Arc<dyn Store> {
         &self.context.store
     }
@@ -265,8 +268,9 @@ impl Rooms {
         self.context.store.outlives_server() && header.policy.durability == Durability::Durable
     }
 
-    /// Takes no new rooms and lets running games go on for `grace`. What is left then is put down where it stands, to go on when the server
-    /// is back, or aborted if it cannot. Returns when no game is open any more.
+    /// Accepts no new rooms and lets running games continue for `grace`. The remaining ones are then
+    /// suspended until the server is restarted, or aborted if they cannot resume. Returns when no game is
+    /// open any more.
     pub async fn shut_down(&self, grace: Duration) {
         self.lock().shutting_down = true;
         let mut playing = HashSet::new();
@@ -275,28 +279,30 @@ impl Rooms {
                 Ok(room) => room.state() == chefshat_proto::v1::RoomState::Waiting,
                 Err(_) => continue,
             };
-            // Nobody is waited for who has not begun. Where that is lost it is said at once; else the agents stay as long as the server does.
+            // Games that have not started are not waited for. Ephemeral ones are aborted at once; agents of
+            // durable ones stay connected as long as the server runs.
             match (waits, durable) {
                 (false, _) => drop(playing.insert(handle.id())),
                 (true, false) => handle.end(durable).await,
                 (true, true) => {}
             }
         }
-        // Both waits end: within the grace, or because every room does as it is told.
+        // Both waits end: within the grace, or because every room obeys.
         let over = self.until(|table| !table.any_open(|id| playing.contains(&id)));
         let _ = tokio::time::timeout(grace, over).await;
-        // First those whose games are lost: putting a room down ends the streams on which others may still hear how theirs ended.
+        // Ephemeral games first: suspending a room ends streams on which other seats may still receive the
+        // end of theirs.
         for durable in [false, true] {
             for (handle, _) in self.open().into_iter().filter(|(_, it)| *it == durable) {
                 handle.end(durable).await;
             }
             self.until(|table| !table.any_open_of(durable)).await;
         }
-        // With their handles gone, the rooms end that still show their games, and the tracker's tasks with them.
+        // Dropping the handles ends the rooms that still show their games, and the tracker's tasks with them.
         self.lock().remove_over();
     }
 
-    /// The rooms whose games are not over, and whether they go on when the server is back.
+    /// The rooms whose games are not over, and whether they are durable.
     fn open(&self) -> Vec<(Handle, bool)> {
         (self.lock().by_number.values())
             .filter(|entry| entry.is_open())
@@ -304,7 +310,7 @@ impl Rooms {
             .collect()
     }
 
-    /// Waits until the table is as it is wanted.
+    /// Waits until the table meets a condition.
     async fn until(&self, wanted: impl Fn(&Table) -> bool) {
         loop {
             let changed = self.changed.notified();
@@ -318,7 +324,7 @@ impl Rooms {
     fn lock(&self) -> MutexGuard<'_, Table> {
         self.table
             .lock()
-            .expect("nothing that holds this lock can panic")
+            .expect("no code that holds this lock can panic")
     }
 }
 
@@ -328,13 +334,13 @@ impl std::fmt::Debug for Rooms {
     }
 }
 
-/// What becomes of a request for a room.
+/// The outcome of a reservation.
 enum Claim {
     /// There is space for it.
     Reserved(Reservation),
-    /// It was created by this request before.
+    /// The request has already created it.
     Created(Created),
-    /// It is being created by this request.
+    /// The request is just creating it.
     InProgress,
 }
 
@@ -400,11 +406,11 @@ impl Reservation {
         for (seat, participant) in new.seating.into_iter().flat_map(|it| it.participants) {
             core.seat(Seat::new(seat), participant);
         }
-        // Who sits there is kept with the room: there is never one whose seats are empty.
+        // The participants are committed with the room, so it never exists without them.
         let seated = std::mem::take(core.pending());
         let store = &rooms.context.store;
         let mut journal = store.create(Arc::clone(&header), seated).await?;
-        // Looked at and entered under one lock, so that a shutdown cannot slip in between and miss the room.
+        // Checked and added under one lock, so that a shutdown in between cannot miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
             let clock = RoomClock::of_age(Duration::ZERO);
@@ -416,7 +422,7 @@ impl Reservation {
                 join_code: header.join_code.clone(),
                 durable: rooms.is_durable(&header),
                 over: false,
-                put_down: false,
+                suspended: false,
             });
             return Ok(Created {
                 handle,
@@ -424,7 +430,7 @@ impl Reservation {
                 owner,
             });
         }
-        // Nobody has heard of it: it is not to be there when the server is back.
+        // No client knows it: it must not be restored with the server.
         journal.finish(None).await?;
         Err(CreateError::ShuttingDown)
     }
@@ -459,7 +465,7 @@ impl RoomWatcher for Watcher {
             let mut table = rooms.lock();
             if let Some(number) = table.numbers.get(&room).copied() {
                 match table.by_number.get_mut(&number) {
-                    Some(entry) if !entry.over => entry.put_down = true,
+                    Some(entry) if !entry.over => entry.suspended = true,
                     _ => table.remove(number),
                 }
             }

@@ -1,5 +1,6 @@
-//! Going on after the server ended: every game that was going on stands where its last kept decision left it, games that had just ended are
-//! still shown to those who have not heard of it, and records that were not written are.
+//! Resumes games after a restart of the server: running games continue after their last committed
+//! decision, games that have just ended are still shown to their clients, and missing records are
+//! written.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -21,20 +22,21 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::Fill;
 
 impl Rooms {
-    /// Takes up the games that were going on when the server ended, and says how many. One that cannot be gone on with is left as it is, and
-    /// logged.
+    /// Resumes the unfinished games of the store and returns their number. A game that cannot be resumed
+    /// is logged and left unchanged.
     ///
     /// # Errors
-    /// The store's.
+    /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let retention = u64::try_from(self.context.retention.as_millis()).unwrap_or(u64::MAX);
         let ended_since_ms = since_epoch_ms().saturating_sub(retention);
-        // Before any room exists that could write its record at the same time. Other servers that only write records may share the folder.
+        // Before any room could write its record at the same time. Other servers that only write records may
+        // share the folder.
         if self.context.store.outlives_server()
             && let Some(data_dir) = self.context.record_writer.data_dir()
             && let Err(error) = jsonl::remove_unfinished(data_dir)
         {
-            error!(%error, "unfinished files of records were not removed");
+            error!(%error, "removing unfinished record files failed");
         }
         let without_record_file = self.context.store.without_record_file().await?;
         let mut players = Players::default();
@@ -42,15 +44,15 @@ impl Rooms {
         for game in self.context.store.resumable_games(ended_since_ms).await? {
             let id = game.header.game_id;
             let goes_on = !game.concluded;
-            match self.go_on_with(game, &mut players).await {
+            match self.resume(game, &mut players).await {
                 Ok(()) => restored += usize::from(goes_on),
                 Err(problem) => {
-                    error!(game = %id, %problem, "a game cannot be gone on with; it is left as it is");
+                    error!(game = %id, %problem, "a game cannot be resumed; it is left unchanged");
                 }
             }
         }
         if restored > 0 {
-            info!(games = restored, "games go on where they stood");
+            info!(games = restored, "games resumed");
         }
         for game in without_record_file {
             self.context.record_writer.write_record(game);
@@ -58,11 +60,11 @@ impl Rooms {
         Ok(restored)
     }
 
-    async fn go_on_with(&self, game: ResumableGame, players: &mut Players) -> Result<(), String> {
+    async fn resume(&self, game: ResumableGame, players: &mut Players) -> Result<(), String> {
         let mut header = game.header;
         if header.rules_version != RULES_VERSION {
             return Err(format!(
-                "it is played by version {} of the rules; this version of chefshat knows version {RULES_VERSION}",
+                "it uses version {} of the rules; this version of chefshat supports version {RULES_VERSION}",
                 header.rules_version
             ));
         }
@@ -70,7 +72,7 @@ impl Rooms {
         let header = Arc::new(header);
         let since_created = since_epoch_ms().saturating_sub(header.created_at_ms);
         let last = game.entries.last().map_or(Duration::ZERO, |entry| entry.at);
-        // A clock that was set back does not make the room younger than its journal.
+        // A system clock that was set back does not make the room younger than its journal.
         let age = Duration::from_millis(since_created).max(last);
         let core = Core::revived(Arc::clone(&header), &game.entries, age)
             .map_err(|problem| problem.to_string())?;
@@ -85,18 +87,18 @@ impl Rooms {
             join_code: header.join_code.clone(),
             durable: true,
             over: game.concluded,
-            put_down: false,
+            suspended: false,
         });
         Ok(())
     }
 }
 
-/// Recorded players that have been read: a player may sit in many rooms.
+/// Recorded players that have been read: one may play in many rooms.
 #[derive(Default)]
 struct Players(HashMap<(Id, u32), Option<Arc<RecordedPlayer>>>);
 
 impl Players {
-    /// The recorded players of seats that are filled by one. Where a record is gone, the policy's substitute plays.
+    /// The recorded players of seats that replay one. If a record is gone, the policy's substitute plays.
     async fn of(
         &mut self,
         store: &Arc<dyn Store>,
@@ -131,7 +133,7 @@ async fn read(
 ) -> Result<Arc<RecordedPlayer>, String> {
     let stored = (store.finished(game).await)
         .map_err(|error| error.to_string())?
-        .ok_or("there is no such record")?;
+        .ok_or("the record does not exist")?;
     let reading = move || convert::recorded_player(&convert::lines_of(&stored), seat);
     tokio::task::spawn_blocking(reading)
         .await

@@ -1,5 +1,4 @@
-//! The list of the rooms: in the order in which they were made, found by their ids and join codes. What a room is, and when it leaves the list,
-//! is decided elsewhere.
+//! The table of rooms, in the order of their creation, with look-up by id and join code.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -11,18 +10,18 @@ use chefshat_room::ids::{Id, SecretHash};
 #[derive(Debug, thiserror::Error)]
 pub enum CreateError {
     /// The limit of rooms is reached.
-    #[error("the server holds {0} rooms already; close one or try later")]
+    #[error("the server already has {0} rooms; close one or try later")]
     TooMany(usize),
-    /// The request id was used for a room with other content.
+    /// The request id was used for another room.
     #[error("this request id was used to create another room; draw a new one")]
     RequestIdUsed,
-    /// The server takes no new rooms.
-    #[error("the server is shutting down and takes no new rooms")]
+    /// The server is shutting down.
+    #[error("the server is shutting down and accepts no new rooms")]
     ShuttingDown,
-    /// There is no space for more games.
+    /// The disk has no space for more games.
     #[error("the server's disk is nearly full; the rest is reserved for running games")]
     DiskNearlyFull,
-    /// The store refused.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
@@ -30,7 +29,7 @@ pub enum CreateError {
 #[derive(Default)]
 pub(super) struct Table {
     pub(super) next_number: u64,
-    /// In the order in which they were made.
+    /// In the order of their creation.
     pub(super) by_number: BTreeMap<u64, Entry>,
     pub(super) numbers: HashMap<Id, u64>,
     pub(super) codes: HashMap<String, u64>,
@@ -42,21 +41,21 @@ pub(super) struct Table {
 pub(super) struct Entry {
     pub(super) handle: Handle,
     pub(super) game_id: Id,
-    /// The owner's token, hashed.
+    /// The hash of the owner token.
     pub(super) owner: SecretHash,
     pub(super) join_code: String,
-    /// Whether the game goes on when the server is back.
+    /// Whether the game survives a restart of the server.
     pub(super) durable: bool,
     /// The game has ended.
     pub(super) over: bool,
-    /// The room has ended and its game has not, which goes on when the server is back. It stays in the table, so that whoever comes is
-    /// told to come again, not that there is no such room.
-    pub(super) put_down: bool,
+    /// The room has ended but its game resumes when the server is restarted. It stays in the table, so that
+    /// clients are told to try again rather than that the room is unknown.
+    pub(super) suspended: bool,
 }
 
 impl Entry {
     pub(super) fn is_open(&self) -> bool {
-        !self.over && !self.put_down
+        !self.over && !self.suspended
     }
 }
 
@@ -65,7 +64,7 @@ impl Table {
         self.by_number.get(self.numbers.get(&id)?)
     }
 
-    /// Reserves space for a room that is about to be created.
+    /// Reserves space for a room that will be created.
     pub(super) fn reserve(&mut self, id: Id, max_rooms: usize) -> Result<(), CreateError> {
         if self.shutting_down {
             return Err(CreateError::ShuttingDown);
@@ -89,7 +88,7 @@ impl Table {
         self.by_number.insert(number, entry);
     }
 
-    /// Ended rooms are shown only as long as there is space for them.
+    /// Removes ended rooms if their space is needed.
     pub(super) fn make_space(&mut self, max_rooms: usize) {
         while self.by_number.len() >= max_rooms
             && let Some(number) = self

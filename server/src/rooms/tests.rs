@@ -1,4 +1,4 @@
-//! What is kept of a room when it is made.
+//! Creation of rooms.
 
 use chefshat_engine::RuleSetSpec;
 
@@ -8,8 +8,8 @@ use chefshat_room::ids::SecretHash;
 use chefshat_room::journal::ParticipantKind;
 
 #[tokio::test]
-async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {
-    // It takes rooms, but nothing that is added to them later.
+async fn participants_of_a_tournament_are_committed_with_their_room() {
+    // It stores new games, but no further entries.
     let store = Arc::new(FailingStore::after(0));
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
     let fill = Fill::Open {
@@ -41,8 +41,8 @@ async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {
             server_seed: None,
         }),
     });
-    let made = made.await.expect("nothing is added to the room");
-    let room = made.handle.describe().await.expect("it is there");
+    let made = made.await.expect("the first commit succeeds");
+    let room = made.handle.describe().await.expect("the room exists");
     let names: Vec<&str> = room.seats.iter().map(|seat| seat.name.as_str()).collect();
     assert_eq!(names, ["Ada", "", "Bo", ""]);
 }

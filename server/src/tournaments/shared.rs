@@ -75,21 +75,21 @@ mod tests {
         };
         let answers = futures::future::join_all((0..8).map(|_| ask())).await;
         assert!(answers.iter().all(|answer| answer == &Ok(Arc::new(0))));
-        let anew = shared.get(|value| *value == 9, async { Ok(9) }).await;
-        assert_eq!(anew, Ok(Arc::new(9)));
+        let recomputed = shared.get(|value| *value == 9, async { Ok(9) }).await;
+        assert_eq!(recomputed, Ok(Arc::new(9)));
         assert_eq!(ask().await, Ok(Arc::new(9)));
     }
 
     #[tokio::test]
     async fn a_cancelled_caller_does_not_discard_the_value() {
         let shared = Arc::new(Shared::default());
-        let (started, go_on) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
+        let (started, proceed) = (Arc::new(Notify::new()), Arc::new(Notify::new()));
         let asking = tokio::spawn({
-            let (shared, started, go_on) = (shared.clone(), started.clone(), go_on.clone());
+            let (shared, started, proceed) = (shared.clone(), started.clone(), proceed.clone());
             async move {
                 let work = async move {
                     started.notify_one();
-                    go_on.notified().await;
+                    proceed.notified().await;
                     Ok(1)
                 };
                 shared.get(|_| true, work).await
@@ -98,7 +98,7 @@ mod tests {
         started.notified().await;
         asking.abort();
         assert!(asking.await.is_err());
-        go_on.notify_one();
+        proceed.notify_one();
         assert_eq!(shared.get(|_| true, async { Ok(2) }).await, Ok(Arc::new(1)));
     }
 

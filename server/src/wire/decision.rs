@@ -1,5 +1,5 @@
-//! Writes decision requests straight from the engine's values. They are the most frequent message, and a message tree would be built and
-//! dropped for each. A test holds the bytes equal to those of the message.
+//! Encodes decision requests directly from the engine's values. They are the most frequent message;
+//! this avoids building a message tree for each. A test compares the bytes with the encoded message.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::convert::millis;
 use chefshat_record::convert::decision_kind;
 use chefshat_room::{Core, OpenDecision};
 
-/// Encodes the open decision as it is put to its seat.
+/// Encodes the open decision for its seat.
 pub fn encode_decision(
     core: &Core,
     open: &OpenDecision,
@@ -21,7 +21,7 @@ pub fn encode_decision(
 ) {
     let observation = core
         .observe(Viewer::Seat(open.decision.seat))
-        .expect("a decision is open in a game that has begun");
+        .expect("an open decision belongs to a game that has started");
     let (time_left, bank_left) = core.time_left(now);
     put_number(out, 1, open.id);
     put_number(out, 2, decision_kind(open.decision.kind) as u64);
@@ -30,7 +30,7 @@ pub fn encode_decision(
     out.put_u8(0);
     put_observation(out, &observation);
     let length = out.len() - length_at - 1;
-    // The length is known only now; nearly always it fits the byte left for it.
+    // The length is known only now; it nearly always fits the byte reserved for it.
     if length < 0x80 {
         out[length_at] = u8::try_from(length).expect("seven bits");
     } else {
@@ -56,7 +56,7 @@ pub fn encode_decision(
     }
     let requirement = core
         .requirement()
-        .expect("a decision is open in a game that has not ended");
+        .expect("an open decision belongs to a game that has not ended");
     put_requirement(out, requirement);
     let default = core
         .default_action()
@@ -72,7 +72,7 @@ fn put_requirement(out: &mut Vec<u8>, requirement: Requirement) {
         for &(field, number) in numbers {
             put_number(out, field, number.into());
         }
-        // Small numbers of small fields, two bytes each.
+        // A few small numbers, two bytes each.
         out[length_at] = u8::try_from(out.len() - length_at - 1).expect("seven bits");
     };
     match requirement {
@@ -93,7 +93,7 @@ fn put_requirement(out: &mut Vec<u8>, requirement: Requirement) {
             9,
             &[
                 (1, gift.number),
-                // Never 0, so that one which is set is never left out.
+                // Never 0, so that a field that is set is never omitted.
                 (2, gift.total.unwrap_or(0)),
                 (
                     3,
@@ -145,7 +145,7 @@ fn put_observation(out: &mut Vec<u8>, observation: &Observation) {
     }
 }
 
-/// A number, left out when it is zero.
+/// Writes a number, omitted when it is zero.
 fn put_number(out: &mut Vec<u8>, field: u32, number: u64) {
     if number != 0 {
         encode_key(field, WireType::Varint, out);
@@ -153,9 +153,9 @@ fn put_number(out: &mut Vec<u8>, field: u32, number: u64) {
     }
 }
 
-/// The first `length` of some bytes.
+/// Writes the first `length` of some bytes.
 fn put_bytes(out: &mut Vec<u8>, field: u32, length: usize, bytes: impl Iterator<Item = u8>) {
     encode_key(field, WireType::LengthDelimited, out);
-    encode_varint(u64::try_from(length).expect("memory holds it"), out);
+    encode_varint(u64::try_from(length).expect("lengths fit u64"), out);
     out.extend(bytes.take(length));
 }

@@ -1,5 +1,6 @@
-//! Two games that differ only in cards a viewer may not know, played by the same decisions under the same clock, give that viewer the same
-//! messages to the byte. A leak planted on purpose is caught by the same comparison.
+//! Tests of redaction: two games that differ only in cards hidden from a viewer, played by the same
+//! decisions under the same clock, must send this viewer the same bytes. A deliberate leak is detected
+//! by the same comparison.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,11 +16,11 @@ use prost::Message as _;
 
 use crate::convert;
 
-/// Two cards of different faces, one in each of two hands, change places.
+/// Swaps two cards of different faces between two hands.
 fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<BySeat<Cards>> {
     let counts = |seat: Seat| hands[seat].counts(faces).collect::<Vec<u8>>();
     let (mut ours, mut theirs) = (counts(one), counts(other));
-    // Not the top face: who holds the Golden card is known.
+    // Not the top face: the holder of the Golden card is known.
     let top = usize::from(faces) - 1;
     let mine = (0..top).find(|face| ours[*face] > 0 && theirs[*face] == 0)?;
     let yours = (0..top)
@@ -35,8 +36,8 @@ fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<B
     Some(hands)
 }
 
-/// Everything the viewer is told of a table: all events, and the decision that is open if it is its own.
-fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
+/// Everything sent to the viewer: all events, and the open decision if it is the viewer's.
+fn sent_to(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
     let mut messages: Vec<Vec<u8>> = (0..table.core.log().len())
         .filter_map(|position| convert::event_to_proto(&table.core, position, see))
         .map(|event| event.encode_to_vec())
@@ -53,7 +54,7 @@ fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
     messages
 }
 
-/// A table and one like it in which two hidden cards have changed places, as if they had been dealt so.
+/// Two tables that differ in two hidden cards, as if they had been dealt so.
 fn pair(viewer: Seat, one: Seat, other: Seat, seed: u8) -> Option<(Table, Table)> {
     let table = |seed| {
         let mut table = Table::empty(
@@ -79,7 +80,7 @@ fn pair(viewer: Seat, one: Seat, other: Seat, seed: u8) -> Option<(Table, Table)
     Some((plain, other_table))
 }
 
-/// Plays both tables by the same decisions until one of them cannot take the other's; how many turns that was.
+/// Plays both tables by the same decisions until the rules differ; returns the number of turns.
 fn play_both(
     plain: &mut Table,
     swapped: &mut Table,
@@ -95,7 +96,7 @@ fn play_both(
             .iter()
             .filter(|action| swapped.core.legal_actions().contains(*action))
             .collect();
-        let shift = plain.core.game().expect("it has begun").shift();
+        let shift = plain.core.game().expect("a started game").shift();
         if common.is_empty() || shift > 1 {
             return turn;
         }
@@ -104,8 +105,8 @@ fn play_both(
             table.now += ms(10);
             assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
         }
-        if plain.core.game().expect("it has begun").shift() > 1 {
-            // The next Shift is dealt anew; what had been hidden is played or known by then.
+        if plain.core.game().expect("a started game").shift() > 1 {
+            // The next Shift has new deals; the hidden cards are played or known by then.
             return turn;
         }
     }
@@ -113,7 +114,7 @@ fn play_both(
 }
 
 #[test]
-fn hidden_cards_change_nothing_that_is_told() {
+fn hidden_cards_do_not_change_what_is_sent() {
     let seats = [0, 1, 2, 3].map(Seat::new);
     let mut turns = 0;
     for seed in 0..40 {
@@ -127,14 +128,14 @@ fn hidden_cards_change_nothing_that_is_told() {
         };
         turns += play_both(&mut plain, &mut swapped, |plain, swapped| {
             for see in [Viewer::Seat(viewer), Viewer::Spectator] {
-                assert_eq!(told(plain, viewer, see), told(swapped, viewer, see));
+                assert_eq!(sent_to(plain, viewer, see), sent_to(swapped, viewer, see));
             }
         });
     }
     assert!(turns > 400, "only {turns} turns were compared");
 }
 
-/// The open decision as a message: what is written straight must be this.
+/// The open decision as a message: the expected encoding.
 fn decision_request(
     core: &Core,
     open: &OpenDecision,
@@ -156,18 +157,22 @@ fn decision_request(
         time_left_ms: convert::millis(time_left),
         bank_left_ms: convert::millis(bank_left),
         invalid_attempts_left: core.attempts_left(),
-        default_action: core.default_action().expect("it is open").index().into(),
+        default_action: core
+            .default_action()
+            .expect("an open decision")
+            .index()
+            .into(),
         ..v1::DecisionRequest::default()
     };
     chefshat_record::convert::put_requirement(
         &mut request,
-        core.requirement().expect("it is open"),
+        core.requirement().expect("an open decision"),
     );
     request
 }
 
 #[test]
-fn a_decision_written_straight_is_the_message_that_is_said() {
+fn a_directly_encoded_decision_equals_the_encoded_message() {
     let sizes = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)];
     for (players, faces, jokers) in sizes {
         let rules = chefshat_engine::RuleSetSpec {
@@ -206,14 +211,14 @@ fn a_decision_written_straight_is_the_message_that_is_said() {
 }
 
 #[test]
-fn a_planted_leak_is_caught() {
+fn a_deliberate_leak_is_detected() {
     let [viewer, one, other] = [0, 1, 2].map(Seat::new);
     let (plain, swapped) = (0..40)
         .find_map(|seed| pair(viewer, one, other, seed))
-        .expect("some deal has two cards to change");
-    // The leak: a view that withholds nothing.
+        .expect("some deal has two cards to swap");
+    // The leak: a viewer that sees everything.
     assert_ne!(
-        told(&plain, viewer, Viewer::Everything),
-        told(&swapped, viewer, Viewer::Everything)
+        sent_to(&plain, viewer, Viewer::Everything),
+        sent_to(&swapped, viewer, Viewer::Everything)
     );
 }

@@ -1,6 +1,6 @@
-//! The bodies of streamed responses, encoded when events happen and not again when they are written. Public events are encoded once for all
-//! seats and spectators. The body of a response is a run of bytes: `PlayResponse` and `PlayServiceWatchResponse` have their updates in field 1,
-//! `SpectatorServiceWatchResponse` its events. What the messages mean is decided elsewhere.
+//! The bodies of streamed responses, encoded when events happen. Public events are encoded once for all
+//! seats and spectators. A body is a sequence of bytes: `PlayResponse` and `PlayServiceWatchResponse`
+//! have their updates in field 1, `SpectatorServiceWatchResponse` has its events.
 
 mod decision;
 #[cfg(test)]
@@ -23,9 +23,9 @@ pub mod service {
 
 /// Field of the updates in a response.
 const RESPONSE_UPDATES: u32 = 1;
-/// Usual size of what is sent at a time: a few events and a decision request, bytes.
+/// Typical size of a response: a few events and a decision request, bytes.
 const USUAL_LENGTH: usize = 384;
-/// Fields of `SpectatorServiceWatchResponse`; its events are in the field that [`BATCH_EVENTS`] names.
+/// Fields of `SpectatorServiceWatchResponse`; its events have the field number [`BATCH_EVENTS`].
 const SPECTATOR_ROOM: u32 = 2;
 const SPECTATOR_SNAPSHOT: u32 = 3;
 /// Fields of `SeatUpdate`.
@@ -64,13 +64,13 @@ impl Updates {
         self.end_part(weight);
     }
 
-    /// Adds a batch of `count` events, encoded as [`Events`] holds them.
+    /// Adds a batch of `count` events, encoded by [`Events`].
     pub fn add_events(&mut self, handle: u32, events: &[u8], count: usize) {
         self.add_encoded(handle, UPDATE_EVENTS, events);
         self.end_part(1 + count);
     }
 
-    /// Adds a decision request, as [`encode_decision`] writes it.
+    /// Adds a decision request, encoded by [`encode_decision`].
     pub fn add_decision(&mut self, handle: u32, decision: &[u8]) {
         self.add_encoded(handle, UPDATE_DECISION, decision);
         self.end_part(1);
@@ -88,7 +88,7 @@ impl Updates {
         self.end_part(1);
     }
 
-    /// Adds `count` events to a response for a spectator, encoded as [`Events`] holds them.
+    /// Adds `count` events to a response for a spectator, encoded by [`Events`].
     pub fn add_spectator_events(&mut self, events: &[u8], count: usize) {
         self.bytes.extend_from_slice(events);
         self.end_part(1 + count);
@@ -127,12 +127,12 @@ impl Updates {
         self.parts.is_empty()
     }
 
-    /// What they count for, in updates and events.
+    /// Their weight, in updates and events.
     pub fn weight(&self) -> usize {
         self.parts.iter().map(|part| part.weight).sum()
     }
 
-    /// Moves everything from `other` to the end of this.
+    /// Moves everything from `other` to the end of `self`.
     pub fn append(&mut self, other: &mut Self) {
         if self.is_empty() {
             std::mem::swap(self, other);
@@ -146,7 +146,7 @@ impl Updates {
         }));
     }
 
-    /// Takes updates from the front that count for at most `most`, but at least one.
+    /// Takes updates from the front with a total weight of at most `most`, but at least one.
     pub fn take(&mut self, most: usize) -> Self {
         let mut weight = 0;
         let count = self
@@ -172,7 +172,7 @@ impl Updates {
     }
 }
 
-/// A response is written as it stands; a server never reads one.
+/// A response is written as it is; a server never reads one.
 impl Message for Updates {
     fn encode_raw(&self, buffer: &mut impl BufMut) {
         buffer.put_slice(&self.bytes);
@@ -213,13 +213,13 @@ impl Events {
         self.ends.push(end);
     }
 
-    /// The events from one position to another.
+    /// The events between two positions.
     pub fn range(&self, from: usize, to: usize) -> &[u8] {
         let start = |position: usize| {
             let end = position
                 .checked_sub(1)
                 .and_then(|before| self.ends.get(before));
-            end.map_or(0, |end| usize::try_from(*end).expect("memory holds it"))
+            end.map_or(0, |end| usize::try_from(*end).expect("positions fit usize"))
         };
         &self.bytes[start(from)..start(to)]
     }
@@ -235,18 +235,18 @@ impl Events {
     }
 }
 
-/// Encodes one event into a batch that is being put together.
+/// Encodes one event into a batch that is being built.
 pub fn put_event(batch: &mut Vec<u8>, event: &v1::GameEvent) {
     prost::encoding::message::encode(BATCH_EVENTS, event, batch);
 }
 
 fn delimited_length(field: u32, length: usize) -> usize {
-    key_len(field) + encoded_len_varint(u64::try_from(length).expect("memory holds it")) + length
+    key_len(field) + encoded_len_varint(u64::try_from(length).expect("lengths fit u64")) + length
 }
 
 fn start_delimited(bytes: &mut Vec<u8>, field: u32, length: usize) {
     encode_key(field, WireType::LengthDelimited, bytes);
-    encode_varint(u64::try_from(length).expect("memory holds it"), bytes);
+    encode_varint(u64::try_from(length).expect("lengths fit u64"), bytes);
 }
 
 #[cfg(test)]
@@ -267,11 +267,11 @@ mod tests {
 
     fn decoded(updates: &Updates) -> Vec<v1::SeatUpdate> {
         let response = v1::PlayResponse::decode(updates.encode_to_vec().as_slice());
-        response.expect("it is a response").updates
+        response.expect("a response").updates
     }
 
     #[test]
-    fn what_is_encoded_piece_by_piece_is_what_the_protocol_says() {
+    fn parts_encoded_separately_equal_the_encoded_message() {
         let decision = v1::DecisionRequest {
             decision_id: 7,
             observation: Some(v1::Observation {
@@ -309,22 +309,26 @@ mod tests {
     }
 
     #[test]
-    fn piles_are_appended_and_taken_in_order() {
+    fn updates_are_appended_and_taken_in_order() {
         let one = |handle| {
             let mut updates = Updates::default();
             updates.add_events(handle, &[], 9);
             updates
         };
-        let mut pile = Updates::default();
+        let mut updates = Updates::default();
         for handle in 0..6 {
-            pile.append(&mut one(handle));
+            updates.append(&mut one(handle));
         }
-        assert_eq!(pile.weight(), 60);
-        let first = pile.take(35);
-        assert_eq!((decoded(&first).len(), decoded(&pile).len()), (3, 3));
-        let second = pile.take(1);
-        assert_eq!(decoded(&second).len(), 1, "at least one, however heavy");
-        let handles: Vec<u32> = [first, second, pile]
+        assert_eq!(updates.weight(), 60);
+        let first = updates.take(35);
+        assert_eq!((decoded(&first).len(), decoded(&updates).len()), (3, 3));
+        let second = updates.take(1);
+        assert_eq!(
+            decoded(&second).len(),
+            1,
+            "at least one, whatever its weight"
+        );
+        let handles: Vec<u32> = [first, second, updates]
             .iter()
             .flat_map(decoded)
             .map(|update| update.handle)

@@ -94,7 +94,7 @@ impl Tournament {
             // Seats that do not match are not a result.
             Ended::Played { .. } | Ended::Aborted => Vec::new(),
         };
-        // Participants missed the last call: call once more without them.
+        // Participants missed the last call: call again without them.
         Some(if is_last_call && missing.is_empty() {
             Change::Voided { game }
         } else {

@@ -94,13 +94,13 @@ impl<Who> Default for Ratings<Who> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum GameProblem {
     /// Too few or too many players.
-    #[error("a game of {0} players tells nothing; rated are games of 2 to {MAX_SEATS}")]
+    #[error("a game of {0} players cannot be rated; 2 to {MAX_SEATS} players are needed")]
     Players(usize),
     /// A participant has several seats.
     #[error("a participant had more than one seat")]
     SameParticipant,
     /// A place is not from 1 to the number of players.
-    #[error("there is no place {0} in the game")]
+    #[error("place {0} does not exist in this game")]
     Place(u32),
 }
 
@@ -139,7 +139,7 @@ impl<Who: Ord + Clone> Ratings<Who> {
             let rated = self.rated.entry(who.clone()).or_default();
             rated.rating = rating;
             rated.games = rated.games.saturating_add(1);
-            let index = index(*place).expect("all places were looked at");
+            let index = index(*place).expect("all places were checked");
             if rated.places.len() <= index {
                 rated.places.resize(index + 1, 0);
             }

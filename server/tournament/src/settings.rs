@@ -165,7 +165,7 @@ impl Settings {
         let games = self.games_for(most);
         if games > MAX_GAMES {
             let problem = format!(
-                "up to {games} games with {most} participants; {MAX_GAMES} is the most: take fewer participants, rounds or games of a pairing"
+                "up to {games} games with {most} participants; at most {MAX_GAMES} are allowed: choose fewer participants, rounds or games of a pairing"
             );
             return refuse("games_per_pairing", problem);
         }

@@ -28,7 +28,7 @@ pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
 /// default game. F is the number of faces, N of players, H of cards dealt to a hand, A of actions.
 /// Values by seat start with the own seat and continue to its left:
 ///
-/// | numbers | what |
+/// | numbers | meaning |
 /// |---|---|
 /// | F + 1 | the own hand: cards of face f divided by f, jokers by 2 |
 /// | 1 | whether the own hand holds the Golden card |

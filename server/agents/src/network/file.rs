@@ -289,7 +289,7 @@ fn number(texts: &BTreeMap<&str, &str>, key: &'static str) -> Result<u8, Network
     text.parse().map_err(|_| {
         metadata(
             key,
-            format!("{:?} is no number from 0 to 255", shortened(text)),
+            format!("{:?} is not a number from 0 to 255", shortened(text)),
         )
     })
 }

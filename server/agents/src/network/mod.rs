@@ -18,7 +18,7 @@ pub use file::{MAX_FILE_BYTES, NetworkError};
 /// The network of the built-in agent `trained`, loaded once.
 static TRAINED: LazyLock<Arc<Network>> = LazyLock::new(|| {
     let file = include_bytes!("trained.safetensors");
-    Arc::new(Network::from_bytes(file).expect("the file within the program is sound"))
+    Arc::new(Network::from_bytes(file).expect("the embedded file is valid"))
 });
 
 /// The input of a network.

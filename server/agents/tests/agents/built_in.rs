@@ -190,7 +190,7 @@ fn names_round_trip() {
 
 #[test]
 #[should_panic(expected = "a decision has a legal action")]
-fn no_legal_action_is_no_decision() {
+fn deciding_without_a_legal_action_panics() {
     let observation = observation(DecisionKind::Turn, None);
     let _: ActionId =
         BuiltInAgent::new(AgentKind::Random, [0; 32]).decide(&observation, &Mask::EMPTY);

@@ -127,7 +127,7 @@ fn broken_files_are_refused_with_the_reason() {
         (sound.clone().with("masked", "yes"), "not false or true"),
         (
             sound.clone().with("players", "four"),
-            "\"four\" is no number",
+            "\"four\" is not a number",
         ),
         (
             sound.clone().with("players", "7"),
@@ -137,7 +137,7 @@ fn broken_files_are_refused_with_the_reason() {
             sound.clone().with("faces", "3"),
             "\"faces\": 3 faces: choose 4 to 15",
         ),
-        (sound.clone().with("jokers", "-1"), "\"-1\" is no number"),
+        (sound.clone().with("jokers", "-1"), "\"-1\" is not a number"),
         (
             sound.clone().with("name", &"x".repeat(20_000)),
             "\"name\": 20000 bytes",

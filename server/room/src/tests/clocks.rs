@@ -1,4 +1,4 @@
-//! Deadlines, banks, defaults, substitution, giving up.
+//! Deadlines, banks, defaults, substitution, and lost participants.
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::Event;
@@ -16,7 +16,7 @@ fn quick() -> Policy {
 }
 
 #[test]
-fn a_deadline_takes_the_default_and_is_called_timeout() {
+fn a_deadline_takes_the_default_with_source_timeout() {
     let mut table = Table::playing(quick());
     let (seat, _) = table.open();
     table.pass_time(ms(1499));
@@ -31,12 +31,12 @@ fn a_deadline_takes_the_default_and_is_called_timeout() {
 }
 
 #[test]
-fn the_bank_pays_for_what_is_over_the_time_of_a_decision() {
+fn the_bank_pays_for_time_beyond_the_decision_time() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
     table.pass_time(ms(1200));
     let (left, bank) = table.core.time_left(table.now);
-    // Nobody has told the core yet when the request was handed over.
+    // The core does not know yet when the request was handed over.
     assert!(left <= ms(1000) && bank <= ms(500));
     let action = table.legal(0);
     let answered = table.answer(seat, id, action);
@@ -53,7 +53,7 @@ fn the_bank_pays_for_what_is_over_the_time_of_a_decision() {
 }
 
 #[test]
-fn an_answer_that_arrived_in_time_counts_even_if_it_waited_in_a_queue() {
+fn an_answer_that_arrived_in_time_counts_even_if_it_was_queued() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
     let action = table.legal(0);
@@ -73,9 +73,9 @@ fn an_answer_that_arrived_in_time_counts_even_if_it_waited_in_a_queue() {
 }
 
 #[test]
-fn the_clock_begins_when_the_transport_takes_the_request_but_not_for_ever_later() {
+fn the_clock_starts_when_the_transport_receives_the_request_or_after_a_limit() {
     let mut table = Table::playing(quick());
-    // Not handed over at all: the clock begins after MAX_HANDOVER.
+    // If it is not handed over at all, the clock starts after MAX_HANDOVER.
     let latest = super::super::MAX_HANDOVER;
     for now in [1500, 3000, 4999] {
         table.core.tick(ms(now), None);
@@ -93,7 +93,7 @@ fn the_clock_begins_when_the_transport_takes_the_request_but_not_for_ever_later(
 }
 
 #[test]
-fn a_room_does_not_spin_while_a_transport_takes_nothing() {
+fn a_room_does_not_spin_while_a_transport_is_stalled() {
     let mut table = Table::playing(Policy {
         decision_time: ms(10),
         bank: ms(0),
@@ -104,18 +104,18 @@ fn a_room_does_not_spin_while_a_transport_takes_nothing() {
         let deadline = table.core.deadline().expect("a decision is open");
         assert!(
             deadline > table.now,
-            "a deadline that has passed rings at once, again and again"
+            "the deadline is already in the past: the timer fires immediately"
         );
         table.now = deadline;
         table.core.tick(table.now, None);
         rings += 1;
     }
-    assert!(rings < 300, "{rings} rings");
+    assert!(rings < 300, "the timer fired {rings} times");
     assert_eq!(table.now, super::super::MAX_HANDOVER + ms(10));
 }
 
 #[test]
-fn invalid_answers_do_not_move_the_deadline_and_end_in_the_default() {
+fn invalid_answers_do_not_move_the_deadline_and_lead_to_the_default() {
     let mut table = Table::playing(Policy {
         max_invalid_attempts: Some(3),
         ..quick()
@@ -152,7 +152,7 @@ fn invalid_answers_do_not_move_the_deadline_and_end_in_the_default() {
 }
 
 #[test]
-fn without_a_limit_of_attempts_a_decision_stays_open() {
+fn a_decision_stays_open_if_attempts_are_unlimited() {
     let mut table = Table::playing(Policy {
         max_invalid_attempts: None,
         ..Policy::default()
@@ -169,14 +169,14 @@ fn without_a_limit_of_attempts_a_decision_stays_open() {
         ));
     }
     assert_eq!(table.open(), (seat, id));
-    // But a record must hold them.
+    // But records limit them.
     let wrong = table.illegal();
     table.answer(seat, id, wrong);
     assert_eq!(table.last_decision().source, Source::Invalid);
 }
 
 #[test]
-fn a_silent_seat_is_substituted_and_comes_back() {
+fn a_silent_seat_is_substituted_and_can_return() {
     let mut table = Table::playing(Policy {
         max_timeouts: 2,
         bank: ms(0),
@@ -198,7 +198,7 @@ fn a_silent_seat_is_substituted_and_comes_back() {
         table.happened(|event| matches!(event, RoomEvent::Substituted(seat) if *seat == silent)),
         1
     );
-    // The substitute plays without being asked for.
+    // The substitute plays without a request.
     for _ in 0..8 {
         assert_ne!(table.open().0, silent);
         table.play_one();
@@ -226,7 +226,7 @@ fn a_silent_seat_is_substituted_and_comes_back() {
 }
 
 #[test]
-fn a_seat_that_attaches_anew_plays_itself_again() {
+fn a_seat_that_attaches_again_plays_for_itself() {
     let mut table = Table::playing(Policy {
         max_timeouts: 1,
         bank: ms(0),
@@ -240,7 +240,7 @@ fn a_seat_that_attaches_anew_plays_itself_again() {
     while table.open().0 != seat {
         table.play_one();
     }
-    // The substitute waits its pace; the agent comes back first and gets the decision with a clock of its own.
+    // The substitute waits for its pace; the agent returns first and gets the decision with a new clock.
     table.pass_time(ms(300));
     table.attach(seat);
     assert_eq!(table.open().0, seat);
@@ -251,7 +251,7 @@ fn a_seat_that_attaches_anew_plays_itself_again() {
 }
 
 #[test]
-fn disconnected_is_not_timeout_and_does_not_stop_the_clock() {
+fn a_lost_connection_does_not_stop_the_clock_and_has_its_own_source() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
     let connection = ConnectionId(u64::try_from(seat.index()).expect("small") + 1);
@@ -271,7 +271,7 @@ fn disconnected_is_not_timeout_and_does_not_stop_the_clock() {
     assert_eq!(
         table.core.time_left(table.now),
         (ms(0), ms(500)),
-        "the time really left"
+        "the actual time left"
     );
     let connection = ConnectionId(table.connections);
     table.lost(seat, connection);
@@ -281,7 +281,7 @@ fn disconnected_is_not_timeout_and_does_not_stop_the_clock() {
 }
 
 #[test]
-fn a_game_without_its_participants_is_given_up_as_the_policy_says() {
+fn a_game_without_participants_is_aborted_as_the_policy_says() {
     for (policy, lost_seats) in [
         (AbortPolicy::AnyLost, Some(1)),
         (AbortPolicy::AllLost, Some(4)),
@@ -310,7 +310,7 @@ fn a_game_without_its_participants_is_given_up_as_the_policy_says() {
 }
 
 #[test]
-fn built_in_agents_play_by_themselves_at_their_pace() {
+fn built_in_agents_play_without_requests_at_their_pace() {
     let fills = vec![
         Fill::BuiltIn(AgentKind::Greedy),
         Fill::BuiltIn(AgentKind::Random),
@@ -341,14 +341,14 @@ fn built_in_agents_play_by_themselves_at_their_pace() {
     };
     assert!(
         by_default(Source::Invalid) > 0,
-        "random_unmasked was wrong five times in a row"
+        "random_unmasked sent five invalid actions in a row"
     );
     assert_eq!(by_default(Source::Timeout), 0);
     table.assert_replays();
 }
 
 #[test]
-fn kinds_of_participants_may_have_clocks_of_their_own() {
+fn kinds_of_participants_can_have_separate_clocks() {
     let policy = Policy {
         clocks: vec![KindClock {
             kind: ParticipantKind::Human,
@@ -384,7 +384,7 @@ fn kinds_of_participants_may_have_clocks_of_their_own() {
 }
 
 #[test]
-fn built_in_agents_wait_a_second_where_a_person_plays() {
+fn built_in_agents_wait_a_second_if_a_person_plays() {
     for (kind, pace) in [
         (ParticipantKind::Human, ms(1000)),
         (ParticipantKind::Agent, Duration::ZERO),
@@ -403,7 +403,7 @@ fn built_in_agents_wait_a_second_where_a_person_plays() {
         }
         match kind {
             ParticipantKind::Human => {
-                assert_ne!(table.open().0, seat, "a built-in agent thinks");
+                assert_ne!(table.open().0, seat, "a built-in agent is waiting");
                 assert_eq!(table.core.deadline(), Some(table.now + pace));
                 let decisions = table.core.decisions();
                 table.pass_time(pace - ms(1));
@@ -418,12 +418,12 @@ fn built_in_agents_wait_a_second_where_a_person_plays() {
 }
 
 #[test]
-fn an_answer_is_called_closed_only_if_its_decision_is() {
+fn an_answer_is_closed_only_if_its_decision_is() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
     let (wrong, right) = (table.illegal(), table.legal(0));
     let core = &mut table.core;
-    // Both were read before the room had said anything: one in time, one after the deadline.
+    // Both were read before the room responded: one in time, one after the deadline.
     let first = core.answer(
         ms(1600),
         seat,
@@ -439,7 +439,7 @@ fn an_answer_is_called_closed_only_if_its_decision_is() {
         ms(1550),
         Some(ms(0)),
     );
-    assert_eq!(second.verdict, Verdict::Accepted, "the clock stood");
+    assert_eq!(second.verdict, Verdict::Accepted, "the clock was paused");
     assert!(
         core.open()
             .is_none_or(|open| open.decision.seat != seat || open.id != id)

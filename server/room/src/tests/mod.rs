@@ -1,4 +1,4 @@
-//! The core of a room under an invented clock: what happens when is said by the tests.
+//! Tests of the core of a room under a simulated clock.
 
 mod clocks;
 mod revival;

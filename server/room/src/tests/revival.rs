@@ -1,5 +1,5 @@
-//! A server that was restarted: the game stands where its journal left it, everybody is given time to come back, and nothing that a
-//! built-in agent would have done is changed by it.
+//! Restarts of the server: the game resumes where its journal ended, clients get time to return, and
+//! built-in agents decide as they would have done without the restart.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,12 +15,11 @@ use crate::policy::Policy;
 use crate::{BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
 
 impl Table {
-    /// The server dies, and is back after `downtime`.
+    /// Simulates a crash and a restart after `downtime`.
     fn restart(&mut self, downtime: Duration) {
         self.now += downtime;
         let header = Arc::clone(self.core.header());
-        self.core =
-            Core::revived(header, &self.journal, self.now).expect("the journal is as it was kept");
+        self.core = Core::revived(header, &self.journal, self.now).expect("a consistent journal");
         self.commit();
     }
 }
@@ -41,7 +40,7 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
     }
     let (seat, id) = table.open();
     let legal = table.core.legal_actions();
-    // Its time is nearly up when the server dies.
+    // Its time is nearly up when the server crashes.
     table.pass_time(ms(1_400));
     table.restart(Duration::from_secs(3_600));
     assert_eq!(table.open(), (seat, id));
@@ -51,15 +50,15 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
         1
     );
     table.assert_replays();
-    // It comes back late, but within the time it is given, and has all its time again.
+    // It returns late, but within the recall time, and has its full time again.
     table.pass_time(RECALL_TIME - ms(10));
-    assert_eq!(table.open(), (seat, id), "it was waited for");
+    assert_eq!(table.open(), (seat, id), "the clock waited for it");
     table.attach(seat);
     assert_eq!(table.happened(|it| matches!(it, RoomEvent::Returned(_))), 1);
     let (left, bank) = table.core.time_left(table.now);
     assert_eq!((left, bank), (ms(1_000), ms(500)));
     table.pass_time(ms(1_499));
-    assert_eq!(table.open(), (seat, id), "it still has a millisecond");
+    assert_eq!(table.open(), (seat, id), "a millisecond is left");
     let action = table.legal(0);
     assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
     assert_eq!(table.last_decision().source, Source::Agent);
@@ -67,7 +66,7 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
 }
 
 #[test]
-fn who_does_not_come_back_is_late_as_ever() {
+fn a_seat_that_does_not_return_times_out_as_usual() {
     let mut table = Table::playing(policy());
     table.play_one();
     let (seat, id) = table.open();
@@ -80,7 +79,7 @@ fn who_does_not_come_back_is_late_as_ever() {
 }
 
 #[test]
-fn the_next_seat_is_waited_for_as_well() {
+fn the_clock_waits_for_the_next_seat_too() {
     let mut table = Table::playing(policy());
     let (first, _) = table.open();
     table.restart(ms(10));
@@ -89,13 +88,13 @@ fn the_next_seat_is_waited_for_as_well() {
     let (second, id) = table.open();
     assert_ne!(first, second);
     table.pass_time(RECALL_TIME - ms(10));
-    assert_eq!(table.open(), (second, id), "it was waited for");
+    assert_eq!(table.open(), (second, id), "the clock waited for it");
     table.attach(second);
     table.play_one();
 }
 
 #[test]
-fn an_answer_that_was_acknowledged_is_acknowledged_again() {
+fn an_acknowledged_answer_is_acknowledged_again() {
     let mut table = Table::playing(policy());
     let (seat, decision_id) = table.open();
     let action = table.legal(0);
@@ -110,11 +109,11 @@ fn an_answer_that_was_acknowledged_is_acknowledged_again() {
         None,
     );
     assert_eq!(again, answered);
-    assert!(table.core.pending().is_empty(), "it counts once");
+    assert!(table.core.pending().is_empty(), "it counts only once");
 }
 
 #[test]
-fn built_in_agents_do_what_they_would_have_done() {
+fn built_in_agents_decide_the_same_after_a_restart() {
     let fills = [
         Fill::BuiltIn(AgentKind::Random),
         Fill::BuiltIn(AgentKind::RandomUnmasked),
@@ -153,15 +152,15 @@ fn built_in_agents_do_what_they_would_have_done() {
 }
 
 #[test]
-fn what_the_store_takes_is_nobodys_time_and_delays_nothing_twice() {
+fn commit_time_counts_for_no_seat() {
     let mut table = Table::playing(policy());
-    // The store takes three seconds; only then is the next seat told.
+    // The commit takes three seconds; the next seat is notified only afterwards.
     table.store_takes = ms(3_000);
     table.play_one();
     let (seat, id) = table.open();
     table.pass_time(ms(1_499));
-    assert_eq!(table.open(), (seat, id), "it still has a millisecond");
-    // Whatever else is kept meanwhile does not give it more.
+    assert_eq!(table.open(), (seat, id), "a millisecond is left");
+    // Another commit meanwhile does not extend its time.
     table.core.released(table.now);
     table.pass_time(ms(1));
     assert_ne!(table.open(), (seat, id));
@@ -169,8 +168,8 @@ fn what_the_store_takes_is_nobodys_time_and_delays_nothing_twice() {
 }
 
 #[test]
-fn a_seat_that_waits_for_the_store_has_the_time_given_back() {
-    // Its answer is refused after half a second, and the store takes three to keep that.
+fn a_seat_that_waits_for_the_store_gets_the_time_back() {
+    // Its answer is refused after half a second, and the commit takes three.
     let mut table = Table::playing(policy());
     let (seat, id) = table.open();
     table.pass_time(ms(500));
@@ -181,9 +180,9 @@ fn a_seat_that_waits_for_the_store_has_the_time_given_back() {
     let action = table.legal(0);
     let answered = table.answer(seat, id, action);
     assert_eq!(answered.verdict, Verdict::Accepted);
-    assert_eq!(answered.time, ms(1_499), "thinking time alone");
+    assert_eq!(answered.time, ms(1_499), "only the time of the agent");
 
-    // It loses its connection and comes back after half a second, which the store takes three to keep.
+    // It loses its connection and returns after half a second; that commit takes three.
     let (seat, id) = table.open();
     let connection = u64::try_from(seat.index()).expect("small") + 1;
     table.lost(seat, ConnectionId(connection));
@@ -200,11 +199,11 @@ fn a_seat_that_waits_for_the_store_has_the_time_given_back() {
 }
 
 #[test]
-fn the_alarm_does_not_ring_for_a_seat_that_waits_for_the_store() {
+fn the_timer_does_not_fire_for_a_seat_that_waits_for_the_store() {
     let mut table = Table::playing(policy());
     let (seat, id) = table.open();
     table.pass_time(ms(500));
-    // The room was busy with the store, and finds the answer and the end of the time at once.
+    // The room was waiting for the store, and finds the answer and the deadline at the same time.
     let (answer, arrived) = (Answer::new(id, table.illegal()), table.now);
     table.now += ms(3_000);
     let handed = Some(Duration::ZERO);
@@ -218,7 +217,7 @@ fn the_alarm_does_not_ring_for_a_seat_that_waits_for_the_store() {
 }
 
 #[test]
-fn wrong_answers_buy_no_time_from_a_store_that_is_as_usual() {
+fn invalid_answers_gain_no_time_from_a_fast_store() {
     let mut table = Table::playing(policy());
     let (seat, id) = table.open();
     let opened = table.now;
@@ -234,12 +233,12 @@ fn wrong_answers_buy_no_time_from_a_store_that_is_as_usual() {
 }
 
 #[test]
-fn a_substitute_plays_on_until_its_seat_comes_back() {
+fn a_substitute_plays_until_the_agent_returns() {
     let mut table = Table::playing(policy());
     while table.happened(|it| matches!(it, RoomEvent::Substituted(_))) == 0 {
         let (seat, _) = table.open();
         if seat == Seat::new(2) {
-            // As long as it takes it to be late, and no longer.
+            // Exactly as long as it takes to time out.
             table.pass_time(ms(10));
         } else {
             table.play_one();
@@ -253,7 +252,7 @@ fn a_substitute_plays_on_until_its_seat_comes_back() {
 }
 
 #[test]
-fn a_room_that_waits_keeps_its_seats_for_those_who_come_back() {
+fn a_waiting_room_keeps_its_seats_for_returning_clients() {
     let mut table = Table::empty(
         Policy {
             waiting_time: ms(10_000),
@@ -265,7 +264,7 @@ fn a_room_that_waits_keeps_its_seats_for_those_who_come_back() {
         table.join(ParticipantKind::Agent).expect("a seat is free");
     }
     table.attach(Seat::new(0));
-    // The time it would have waited is long over when the server is back.
+    // The waiting time is long over when the server is restarted.
     table.restart(Duration::from_secs(86_400));
     assert_eq!(table.core.state(), State::Waiting);
     table.pass_time(JOIN_HOLD - ms(1));
@@ -276,19 +275,19 @@ fn a_room_that_waits_keeps_its_seats_for_those_who_come_back() {
     assert_eq!(table.core.state(), State::Playing);
     table.assert_replays();
 
-    let mut deserted = Table::empty(policy(), vec![OPEN; 4]);
-    deserted.join(ParticipantKind::Agent).expect("free");
-    deserted.attach(Seat::new(0));
-    deserted.restart(ms(10));
-    deserted.pass_time(JOIN_HOLD);
+    let mut abandoned = Table::empty(policy(), vec![OPEN; 4]);
+    abandoned.join(ParticipantKind::Agent).expect("free");
+    abandoned.attach(Seat::new(0));
+    abandoned.restart(ms(10));
+    abandoned.pass_time(JOIN_HOLD);
     assert_eq!(
-        deserted.happened(|it| matches!(it, RoomEvent::Vacated(_))),
+        abandoned.happened(|it| matches!(it, RoomEvent::Vacated(_))),
         1
     );
 }
 
 #[test]
-fn a_game_that_was_over_stays_over() {
+fn a_finished_game_stays_finished() {
     let mut table = Table::with_rules(policy(), vec![OPEN; 4], one_shift());
     table.fill();
     while table.core.state() == State::Playing {
@@ -301,7 +300,7 @@ fn a_game_that_was_over_stays_over() {
 }
 
 #[test]
-fn a_journal_that_does_not_fit_is_refused() {
+fn an_inconsistent_journal_is_refused() {
     let mut table = Table::playing(policy());
     for _ in 0..5 {
         table.play_one();
@@ -315,7 +314,7 @@ fn a_journal_that_does_not_fit_is_refused() {
                 decided.action = ActionId::new(9_999);
             }
         }),
-        ("of this seat", |change| {
+        ("no open decision", |change| {
             if let Change::Decided(decided) = change {
                 decided.seat = Seat::new((decided.seat.index() + 1) % 4);
             }
@@ -325,7 +324,7 @@ fn a_journal_that_does_not_fit_is_refused() {
                 entropy: vec![Vec::new(); 4],
             };
         }),
-        ("no such seat", |change| {
+        ("does not exist", |change| {
             *change = Change::Disconnected(Seat::new(5))
         }),
     ];
@@ -348,13 +347,13 @@ fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
     };
     let seed = Seed([5; 32]);
     let mut game = Game::new(
-        rules.clone().validate().expect("it makes sense"),
+        rules.clone().validate().expect("a valid rule set"),
         seed,
         |_| {},
     );
     let mut actions = Vec::new();
     while !game.is_over() {
-        let action = game.legal_actions().nth(0).expect("something is legal");
+        let action = game.legal_actions().nth(0).expect("a legal action");
         game.apply(action, |_| {}).expect("it is legal");
         actions.push(action);
     }
@@ -371,14 +370,14 @@ fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
     table.core = Core::new(Arc::new(header));
     let seats: Vec<Seat> = table.core.all_seats().collect();
     for _ in &seats {
-        table.join(ParticipantKind::Agent).expect("there is a seat");
+        table.join(ParticipantKind::Agent).expect("a free seat");
     }
     for seat in seats {
         table.attach(seat);
     }
     let mut ticks = 0;
     while table.core.decisions() < count {
-        assert!(table.core.awaited().is_none(), "nobody is asked");
+        assert!(table.core.awaited().is_none(), "no seat is asked");
         let deadline = table.core.deadline().expect("there is more to do");
         assert!(deadline <= table.now, "at once");
         table.core.tick(table.now, None);

@@ -1,4 +1,4 @@
-//! Joining, attaching, answering: who may do what.
+//! Joining, attaching and answering.
 
 use chefshat_engine::RewardScheme;
 
@@ -7,7 +7,7 @@ use crate::journal::AbortReason;
 use crate::{ExpressError, JOIN_HOLD, JoinError, LeaveError, MAX_SEATINGS};
 
 #[test]
-fn seats_are_given_to_those_they_are_reserved_for() {
+fn reserved_seats_are_only_given_to_their_kind() {
     let human = Fill::Open {
         reserved_for: Some(ParticipantKind::Human),
     };
@@ -40,7 +40,7 @@ fn seats_are_given_to_those_they_are_reserved_for() {
 fn a_seat_that_is_never_attached_is_freed() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
     for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("there is space");
+        table.join(ParticipantKind::Agent).expect("a free seat");
     }
     table.attach(Seat::new(2));
     table.pass_time(JOIN_HOLD);
@@ -60,10 +60,10 @@ fn a_seat_that_is_never_attached_is_freed() {
 }
 
 #[test]
-fn the_game_begins_when_every_seat_is_attached() {
+fn the_game_starts_when_every_seat_is_attached() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
     for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("there is space");
+        table.join(ParticipantKind::Agent).expect("a free seat");
     }
     for seat in 0..3 {
         table.attach(Seat::new(seat));
@@ -74,7 +74,7 @@ fn the_game_begins_when_every_seat_is_attached() {
 }
 
 #[test]
-fn answers_are_taken_once_and_acknowledged_twice() {
+fn an_answer_counts_once_and_is_acknowledged_again_if_repeated() {
     let mut table = Table::playing(Policy::default());
     let (seat, id) = table.open();
     let other = table
@@ -86,7 +86,7 @@ fn answers_are_taken_once_and_acknowledged_twice() {
     assert_eq!(
         table.answer(other, 1, action).verdict,
         Verdict::Unknown,
-        "it was not asked yet"
+        "the decision is not open yet"
     );
     assert_eq!(table.answer(seat, id + 1, action).verdict, Verdict::Unknown);
     assert_eq!(table.answer(seat, 0, action).verdict, Verdict::Unknown);
@@ -95,24 +95,24 @@ fn answers_are_taken_once_and_acknowledged_twice() {
     assert_eq!(first.verdict, Verdict::Accepted);
     table.now += ms(20);
     let journal = table.journal.len();
-    assert_eq!(table.answer(seat, id, action), first, "the same word");
+    assert_eq!(table.answer(seat, id, action), first, "the same result");
     assert_eq!(
         table.answer(seat, id, action + 1).verdict,
         Verdict::Closed,
-        "another answer"
+        "a different answer"
     );
     assert_eq!(table.journal.len(), journal, "nothing has changed");
 }
 
 #[test]
-fn the_newest_connection_has_the_seat() {
+fn the_newest_connection_gets_the_seat() {
     let mut table = Table::playing(Policy::default());
     let seat = Seat::new(0);
     let newer = table.attach(seat);
     table.lost(seat, ConnectionId(1));
     assert!(
         table.core.standing(seat).connected,
-        "the older one is not missed"
+        "the loss of the older connection is ignored"
     );
     table.lost(seat, newer);
     assert!(!table.core.standing(seat).connected);
@@ -141,7 +141,7 @@ fn rewards_go_to_turns_and_to_invalid_attempts() {
 }
 
 #[test]
-fn expressions_are_public_or_for_the_record_alone_and_bounded() {
+fn expressions_are_public_or_recorded_only_and_limited() {
     let mut table = Table::playing(Policy::default());
     let seat = Seat::new(1);
     let express = |table: &mut Table, record_only| {
@@ -153,7 +153,7 @@ fn expressions_are_public_or_for_the_record_alone_and_bounded() {
     };
     let events = table.core.log().len();
     assert_eq!(express(&mut table, true), Ok(()));
-    assert_eq!(table.core.log().len(), events, "nobody is told");
+    assert_eq!(table.core.log().len(), events, "nothing is published");
     assert_eq!(express(&mut table, false), Ok(()));
     assert_eq!(table.core.log().len(), events + 1);
     for _ in 2..super::super::MAX_EXPRESSIONS_PER_SEAT {
@@ -165,7 +165,7 @@ fn expressions_are_public_or_for_the_record_alone_and_bounded() {
 }
 
 #[test]
-fn annotations_are_capped() {
+fn annotations_are_limited() {
     let mut table = Table::playing(Policy::default());
     let annotate = |table: &mut Table, bytes: usize| {
         let (seat, decision_id) = table.open();
@@ -193,7 +193,7 @@ fn annotations_are_capped() {
 }
 
 #[test]
-fn delayed_spectators_see_what_is_so_many_decisions_old() {
+fn delayed_spectators_see_events_after_a_number_of_decisions() {
     let mut table = Table::with_rules(
         Policy {
             spectator_delay_decisions: 3,
@@ -203,7 +203,7 @@ fn delayed_spectators_see_what_is_so_many_decisions_old() {
         one_shift(),
     );
     table.fill();
-    // The deal itself is not told before three decisions have been taken: it may show all hands.
+    // The deal itself is withheld until three decisions have been taken: it may show all hands.
     let told = table.core.visible_to_spectators();
     assert!(matches!(
         table.core.log().since(told - 1),
@@ -227,13 +227,13 @@ fn delayed_spectators_see_what_is_so_many_decisions_old() {
 }
 
 #[test]
-fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
+fn a_freed_seat_has_no_state_of_its_former_participant() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
     let seats: Vec<Seat> = table.core.all_seats().collect();
     for _ in &seats {
         table.join(ParticipantKind::Agent).expect("a seat is free");
     }
-    // One is connected when it leaves, one was lost before, one came and went, all but the last.
+    // The first is never attached, the second loses its connection, the third is attached; they leave.
     let connection = table.attach(seats[1]);
     table.lost(seats[1], connection);
     table.attach(seats[2]);
@@ -250,7 +250,7 @@ fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
         table.attach(*seat);
     }
     let returned = table.happened(|it| matches!(it, RoomEvent::Returned(_)));
-    assert_eq!(returned, 0, "they are others than those who went");
+    assert_eq!(returned, 0, "they are new participants");
     assert_eq!(
         table.core.leave(table.now, seats[0]),
         Err(LeaveError::GameStarted)
@@ -259,7 +259,7 @@ fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
 }
 
 #[test]
-fn seats_cannot_be_taken_and_given_back_for_ever() {
+fn a_seat_cannot_be_taken_and_freed_without_limit() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
     for _ in 0..MAX_SEATINGS {
         let seat = table.join(ParticipantKind::Agent).expect("a seat is free");

@@ -1,4 +1,5 @@
-//! Whatever comes in, in whatever order: no panic, no change that was not checked, and a journal that replays to the same room.
+//! Random inputs in random order: no panic, no unchecked change, and a journal that replays to the same
+//! room.
 
 use chefshat_agents::AgentKind;
 use proptest::prelude::*;
@@ -83,7 +84,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn any_inputs_leave_a_room_that_replays(
+    fn random_inputs_leave_a_room_that_replays(
         inputs in proptest::collection::vec(input(), 1..400),
         built_in in proptest::option::of(0..4usize),
         begin in any::<bool>(),

@@ -98,7 +98,7 @@ impl Reader {
         let outbox = Arc::clone(&self.outbox);
         let end = loop {
             let next = poll_fn(|context| {
-                if outbox.poll_hung_up(context) {
+                if outbox.poll_reading_stopped(context) {
                     return Poll::Ready(Next::Message(None));
                 }
                 // The reader has a sender itself, so the channel never closes.

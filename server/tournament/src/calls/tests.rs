@@ -23,7 +23,7 @@ fn join(tournament: &mut Tournament, max_games: usize, built_in: Option<AgentKin
         max_games,
         ..testing::entrant(&name)
     });
-    tournament.fold(&change.expect("there is space"));
+    tournament.fold(&change.expect("a free place"));
 }
 
 fn end_one(tournament: &mut Tournament, game: usize, ended: Ended) {
@@ -42,7 +42,7 @@ fn played() -> Ended {
     }
 }
 
-/// Begins with `rounds` rounds of random pairings.
+/// Starts with `rounds` rounds of random pairings.
 fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
     tournament.fold(&Change::Begun { rounds });
     let mut order: Vec<usize> = (0..tournament.participants().len()).collect();
@@ -118,7 +118,7 @@ impl Scan {
     }
 }
 
-/// Plays a random tournament. Returns the number of changes asked for, and how often each happened.
+/// Plays a random tournament. Returns the number of changes requested, and how often each happened.
 fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
     let mut chance = Chance::of_round([seed; 32], 1);
     let mut tournament = Tournament::new(Settings {
@@ -127,7 +127,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
         max_parallel: [1, 2, 256][chance.below(3)],
         ..settings()
     })
-    .expect("it makes sense");
+    .expect("valid settings");
     let participants = 4 + chance.below(9);
     for _ in 0..participants {
         let built_in = (chance.below(8) == 0).then_some(AgentKind::Random);
@@ -202,7 +202,7 @@ fn changes_equal_those_of_checking_every_game() {
 
 /// A tournament with all of its rounds paired.
 fn drawn(participants: usize, rounds: u32) -> Tournament {
-    let mut tournament = Tournament::new(settings()).expect("it makes sense");
+    let mut tournament = Tournament::new(settings()).expect("valid settings");
     (0..participants).for_each(|_| join(&mut tournament, 1, None));
     draw(&mut tournament, rounds, &mut Chance::of_round([1; 32], 1));
     tournament

@@ -104,7 +104,7 @@ fn absent_participants_are_waited_for_then_called_again_then_forfeit() {
     assert_eq!(
         (forfeit.did.points, forfeit.did.decisions),
         (0, 0),
-        "what the filler did is not its own"
+        "the filler's play is not the participant's"
     );
     let standings = tournament.standings();
     let line = standings.iter().find(|line| line.participant == away);
@@ -180,7 +180,7 @@ fn missing_the_last_call_forfeits_even_when_connected() {
     assert_eq!(
         follow(&mut tournament, 0),
         [forfeited(0, &[silent])],
-        "nobody waits any longer"
+        "the wait is over"
     );
     // Now another participant is absent.
     end(&mut tournament, 0, never_started(&[silent, late]));
@@ -196,7 +196,7 @@ fn missing_the_last_call_forfeits_even_when_connected() {
     assert_eq!(
         places,
         [2, 3, 1, 4],
-        "those who forfeited in the order of their seats"
+        "those who forfeited, in the order of their seats"
     );
 }
 
@@ -317,6 +317,6 @@ fn after_a_restart_only_those_who_missed_the_last_call_forfeit_at_once() {
     assert_eq!(
         follow(&mut all_back, 10),
         [forfeited(0, &[silent])],
-        "nobody waits for who did not come to the last call"
+        "the game does not wait for participants who missed the last call"
     );
 }

@@ -98,7 +98,7 @@ fn a_deal_opens_when_its_last_game_is_over() {
     assert_eq!(
         open(&tournament),
         [true, true],
-        "nothing is played any more"
+        "no game is being played any more"
     );
 }
 
@@ -123,7 +123,7 @@ fn a_deal_that_was_seen_is_not_played_again() {
     let mut tournament = begun(settings.clone(), 8);
     follow(&mut tournament, 0);
     end(&mut tournament, 0, Ended::Aborted);
-    assert_eq!(tournament.games()[0].deal, None, "dealt anew");
+    assert_eq!(tournament.games()[0].deal, None, "dealt again");
     assert_eq!(tournament.games()[1].deal, deal);
     end(&mut tournament, 1, played(&[1, 2, 3, 4]));
     assert!(tournament.is_deal_open(0), "no game of it is left");
@@ -132,5 +132,9 @@ fn a_deal_that_was_seen_is_not_played_again() {
     let mut tournament = begun(settings, 8);
     follow(&mut tournament, 0);
     end(&mut tournament, 0, Ended::Aborted);
-    assert_eq!(tournament.games()[0].deal, Some(0), "they remember nothing");
+    assert_eq!(
+        tournament.games()[0].deal,
+        Some(0),
+        "stateless participants"
+    );
 }

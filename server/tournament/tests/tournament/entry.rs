@@ -115,11 +115,11 @@ fn joining_is_refused_with_a_reason() {
         tournament.fold(&change);
     }
     assert_eq!(join(&tournament, |_| {}), Err(JoinProblem::Started));
-    assert_eq!(tournament.participants().len(), 4, "a filler has come");
+    assert_eq!(tournament.participants().len(), 4, "a filler was added");
 }
 
 #[test]
-fn it_begins_once_and_with_enough() {
+fn it_starts_once_and_with_enough_participants() {
     let too_few = BeginProblem::TooFew { have: 1, need: 2 };
     for format in Format::ALL {
         let mut tournament = joined(settings(format), 1);
@@ -155,7 +155,7 @@ fn a_filler_takes_a_name_that_is_free() {
 }
 
 #[test]
-fn it_begins_automatically_at_the_set_number() {
+fn it_starts_automatically_at_the_set_number() {
     for format in Format::ALL {
         let mut settings = settings(format);
         settings.start_when_joined = Some(6);

@@ -221,7 +221,7 @@ fn run(plan: Plan) -> Run {
             _ => match run.tournament.wake_at() {
                 Some(at_ms) => run.now_ms = run.now_ms.max(at_ms),
                 // Only an absent participant can block it.
-                None => panic!("nothing goes on, and nobody is waited for"),
+                None => panic!("the tournament is stuck, and no participant is awaited"),
             },
         }
     }
