@@ -116,7 +116,7 @@ impl CheckAgent {
             self.print(case, &outcome)?;
             played += 1;
             passed += usize::from(outcome.is_passed());
-            if outcome.is_hopeless() {
+            if outcome.is_fatal() {
                 break;
             }
         }

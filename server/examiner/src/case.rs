@@ -1,41 +1,41 @@
-//! The cases of an examination as data: the room or tournament each is played in, where the examiner interferes, what the agent must meet.
-//! How a case is judged is in `exam`.
+//! The cases of an examination as data: the room or tournament of each, where the examiner interferes,
+//! and what the agent must be faced with. `exam` judges them.
 
 use std::time::Duration;
 
 use chefshat_proto::v1::{self, create_room_request::Start, rule_set::Stop};
 
-/// How patient an examination is. Everything an agent is waited for is one of these.
+/// Time limits of an examination. Every wait for the agent uses one of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
-    /// For the agent to start and take its seat.
+    /// For starting and taking a seat.
     pub start: Duration,
-    /// For everything else: an answer, coming back, leaving, ending.
+    /// For each other step: answering, reconnecting, leaving, exiting.
     pub each: Duration,
 }
 
 impl Patience {
-    /// A case may take so many times [`Patience::each`] in all.
+    /// A case may take this multiple of [`Patience::each`] in total.
     const CASE: u32 = 120;
 
-    /// For a whole case.
+    /// For a complete case.
     pub fn case(&self) -> Duration {
         self.start + self.each * Self::CASE
     }
 }
 
-/// Where the examiner interferes. Each happens at a turn with a choice, one after the other.
+/// An interference of the examiner. They happen one after the other, each at a turn with a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interference {
-    /// An answer is replaced by an illegal one on its way, so that it comes back as INVALID.
+    /// An answer is replaced by an illegal one on its way to the server, so that it is refused as INVALID.
     Refuse,
-    /// The connection is cut when an answer arrives, which the server never gets.
+    /// The connection is cut when an answer arrives; the server never receives the answer.
     CutBeforeAnswer,
-    /// The connection is cut when the answer has been taken, before the agent is told.
+    /// The connection is cut after an answer has been accepted, before the agent receives the result.
     CutBeforeResult,
     /// The connection is cut in place of a request.
     CutBeforeRequest,
-    /// An answer is held back until its decision has run out of time.
+    /// An answer is held back until its decision has timed out.
     HoldAnswer,
     /// Answers are dropped until a substitute plays for the seat.
     DropAnswers,
@@ -46,13 +46,14 @@ pub enum Interference {
 pub struct Case {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What is examined, in words.
+    /// What is examined.
     pub about: &'static str,
-    /// Where the examiner interferes, in order.
+    /// The examiner's interferences, in order.
     pub interferences: &'static [Interference],
-    /// Kinds of decisions that the agent is put, by construction.
+    /// Kinds of decisions that the case always contains.
     pub kinds: &'static [v1::DecisionKind],
-    /// Time is short, so that a busy machine may lose a decision: what is lost to the clock is judged by its share alone.
+    /// The time is so short that a busy machine may lose a decision: only the share of lost decisions is
+    /// judged.
     pub hurried: bool,
     /// Where it is played.
     pub place: Place,
@@ -63,13 +64,13 @@ pub struct Case {
 pub enum Place {
     /// In a room, with one seat for the agent.
     Room(fn(&Patience) -> v1::CreateRoomRequest),
-    /// In a tournament, as one participant. Its command is another.
+    /// In a tournament, as one participant. It has its own command.
     Tournament(fn(&Patience) -> v1::TournamentSettings),
 }
 
 use v1::DecisionKind::{Exchange, SpecialAction, Turn};
 
-/// All cases, in the order in which they are played.
+/// All cases, in order.
 pub static CASES: [Case; 11] = [
     Case {
         name: "game",
@@ -170,7 +171,7 @@ pub static CASES: [Case; 11] = [
 ];
 
 impl Case {
-    /// The case of a name.
+    /// The case with this name.
     pub fn named(name: &str) -> Option<&'static Case> {
         CASES.iter().find(|case| case.name == name)
     }
@@ -181,13 +182,14 @@ impl Case {
     }
 }
 
-/// Time for a decision where losing some to the clock is part of the case.
+/// Time for a decision in cases that lose some to the clock.
 const LATE_MS: u32 = 1_000;
 /// Time for a decision in the case of short deadlines.
-const HURRIED_MS: u32 = 400;
-/// How long they wait in a tournament, so that its games are played at the same time.
+const SHORT_MS: u32 = 400;
+/// Pace of built-in agents in a tournament, so that its games are played at the same time.
 const MANY_PACE_MS: u32 = 10;
-/// How long built-in agents wait where a substitute plays, so that its agent can take over before the game is over.
+/// Pace of built-in agents in a case with a substitute, so that the agent can take over before the game
+/// is over.
 const PACE_MS: u32 = 60;
 
 fn milliseconds(duration: Duration) -> u32 {
@@ -244,7 +246,7 @@ fn whole_game(patience: &Patience) -> v1::CreateRoomRequest {
 fn special_action(patience: &Patience) -> v1::CreateRoomRequest {
     let seat = 2;
     let mut room = room(4, seat, Stop::TargetShifts(2), milliseconds(patience.each));
-    // As Dishwasher with two jokers it may declare a Food Fight, after which it gives cards as Chef.
+    // As Dishwasher with two jokers it may declare a Food Fight, and then gives cards as Chef.
     room.start = Some(second_shift(vec![0, 1, 3, seat], Some(seat)));
     room
 }
@@ -265,7 +267,7 @@ fn original(patience: &Patience) -> v1::CreateRoomRequest {
 }
 
 fn deadlines(_: &Patience) -> v1::CreateRoomRequest {
-    room(4, 2, Stop::TargetShifts(1), HURRIED_MS)
+    room(4, 2, Stop::TargetShifts(1), SHORT_MS)
 }
 
 fn unhurried(patience: &Patience) -> v1::CreateRoomRequest {
@@ -311,8 +313,8 @@ fn many_seats(patience: &Patience) -> v1::TournamentSettings {
     }
 }
 
-/// Begins a standard game with its second Shift: cards dealt out one by one from a sorted deck, so that all hands are alike; both jokers
-/// to one seat if so wished.
+/// Starts a default game with its second Shift: cards dealt one by one from a sorted deck, so that all
+/// hands are alike. `jokers`: the seat that gets both jokers.
 fn second_shift(last_order: Vec<u32>, jokers: Option<u32>) -> Start {
     const SEATS: u32 = 4;
     const FACES: u32 = 11;
@@ -332,7 +334,7 @@ fn second_shift(last_order: Vec<u32>, jokers: Option<u32>) -> Start {
     hands[0].golden = true;
     if let Some(seat) = jokers {
         let seat = seat as usize;
-        // Each joker that lies elsewhere changes places with a middling card, of which every hand has some.
+        // Each joker elsewhere is swapped with a card of medium face, of which every hand has some.
         for (other, own) in (0..hands.len()).filter(|other| *other != seat).zip(5..) {
             let Some(at) = hands[other].cards.iter().position(|card| *card == JOKER) else {
                 continue;
@@ -360,7 +362,7 @@ mod tests {
     const ABOUT: usize = 68;
 
     #[test]
-    fn every_case_has_a_name_of_its_own_and_a_room_that_makes_sense() {
+    fn every_case_has_a_unique_name_and_a_valid_room() {
         let patience = Patience {
             start: Duration::from_secs(30),
             each: Duration::from_secs(5),
@@ -376,7 +378,7 @@ mod tests {
                 continue;
             };
             let room = room(&patience);
-            let rules = rules_from_proto(&room.rules.expect("rules")).expect("they make sense");
+            let rules = rules_from_proto(&room.rules.expect("rules")).expect("valid rules");
             assert_eq!(room.seats.len(), rules.players(), "{}", case.name);
             if let Some(Start::Scripted(script)) = room.start {
                 let script = script_from_proto(&script, &rules).expect("a script");
@@ -386,7 +388,7 @@ mod tests {
                     &script,
                     |_| {},
                 )
-                .expect("a game can stand there");
+                .expect("a reachable position");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! One case from the making of its room to the end of the agent's process, and what came of it.
+//! Runs one case, from the creation of its room to the exit of the agent's process.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -18,56 +18,56 @@ use super::process::{AgentCommand, AgentProcess, Places};
 use super::relay::{self, Desk};
 use chefshat_server::host::{Host, HostError};
 
-/// Name of the agent on the seat.
+/// Name of the agent in the room.
 const NAME: &str = "examined";
-/// Last lines of an agent's output that are shown with a fault.
+/// Last lines of the agent's output that are shown with a fault.
 const LAST_LINES: usize = 8;
 
-/// Why an examination could not be held. Nothing an agent does brings it about.
+/// Why an examination failed for reasons other than the agent.
 #[derive(Debug, thiserror::Error)]
 pub enum ExaminationError {
     /// A socket or file.
-    #[error("the examiner has no socket or file: {0}")]
+    #[error("a socket or file failed: {0}")]
     Io(#[from] io::Error),
-    /// The server did not do as it was asked.
+    /// A request to the server failed.
     #[error("the examiner's own server: {0}")]
     Server(#[from] chefshat_client::Error),
-    /// It did not end well.
+    /// The server did not stop cleanly.
     #[error(transparent)]
     Stopped(#[from] HostError),
-    /// It left something out.
-    #[error("the examiner's own server did not say which room it made")]
+    /// A response was incomplete.
+    #[error("the examiner's own server did not return the room it created")]
     NoRoom,
 }
 
-/// Where a case waits for an agent that somebody starts by hand.
+/// Where a case waits for an agent that is started by hand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Waiting {
-    /// Where the examiner listens.
+    /// The examiner's address.
     pub address: SocketAddr,
     /// The join code.
     pub code: String,
 }
 
-/// What came of a case.
+/// The outcome of a case.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What was found; nothing if it was passed.
+    /// The faults found; empty if the case is passed.
     pub findings: Vec<Finding>,
     /// How long it took.
     pub took: Duration,
-    /// The last lines the agent wrote.
+    /// The agent's last lines of output.
     pub last_lines: Vec<String>,
 }
 
 impl Outcome {
-    /// Whether nothing was found.
+    /// Whether no fault was found.
     pub fn is_passed(&self) -> bool {
         self.findings.is_empty()
     }
 
-    /// Whether other cases would show the same: there is no agent to examine.
-    pub fn is_hopeless(&self) -> bool {
+    /// Whether other cases would fail in the same way, because there is no agent to examine.
+    pub fn is_fatal(&self) -> bool {
         let hopeless = [
             Fault::CommandFailed,
             Fault::NeverJoined,
@@ -77,7 +77,7 @@ impl Outcome {
     }
 }
 
-/// An examiner who has a server and waits for cases.
+/// An examiner with its server.
 #[derive(Debug)]
 pub struct Examination {
     host: Host,
@@ -88,10 +88,11 @@ pub struct Examination {
 }
 
 impl Examination {
-    /// An examiner that listens on `listen` (port 0: another port for each case) and writes what agents print into the folder `logs`.
+    /// Creates an examiner that listens on `listen` (port 0: another port for each case) and writes the
+    /// output of agents into the folder `logs`.
     ///
     /// # Errors
-    /// When its server does not start.
+    /// Its server cannot be started.
     pub async fn new(
         listen: Option<SocketAddr>,
         patience: Patience,
@@ -107,10 +108,11 @@ impl Examination {
         })
     }
 
-    /// Plays a case, with an agent started by this command; without one `waiting` is told where somebody may start one.
+    /// Runs a case with an agent started by `command`. Without a command, calls `waiting` when an agent can
+    /// be started by hand.
     ///
     /// # Errors
-    /// When the case cannot be held.
+    /// The case could not be run.
     pub async fn examine(
         &self,
         case: &'static Case,
@@ -167,7 +169,7 @@ impl Examination {
         })
     }
 
-    /// Makes what a case is played in.
+    /// Creates the room or tournament of a case.
     async fn open(&self, case: &Case) -> Result<Opened, ExaminationError> {
         let client = &self.client;
         match case.place {
@@ -205,7 +207,7 @@ impl Examination {
         }
     }
 
-    /// Closes it. What has ended by itself is closed already, as it were.
+    /// Closes it. It may have ended already.
     async fn close(&self, venue: Venue, owner_token: String) {
         let client = &self.client;
         match venue {
@@ -223,24 +225,24 @@ impl Examination {
         }
     }
 
-    /// Ends the examiner's server.
+    /// Stops the examiner's server.
     ///
     /// # Errors
-    /// When it did not end well.
+    /// It did not stop cleanly.
     pub async fn stop(self) -> Result<(), ExaminationError> {
         drop(self.client);
         Ok(self.host.stop().await?)
     }
 }
 
-/// What was made for a case.
+/// The room or tournament of a case.
 struct Opened {
     venue: Venue,
     code: String,
     owner_token: String,
 }
 
-/// Waits until there is nothing more to see.
+/// Waits until the case is over.
 async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Result<()> {
     let mut running = process.is_some();
     while !desk.look().is_done() {

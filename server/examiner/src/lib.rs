@@ -1,6 +1,7 @@
-//! The examiner of agents: it plays cases with an agent over the real protocol and says what the agent got wrong. It stands between the
-//! agent and a server in the same process, passes every message on, watches, and interferes where a case says so; rooms, clocks and masks
-//! are the real ones. How the command is used and what it prints is in `cli`.
+//! The examiner of agents: plays cases with an agent over the real protocol and reports its faults. It
+//! stands between the agent and a server in the same process, forwards every message, watches, and
+//! interferes if a case requires it; rooms, clocks and masks are the real ones. The command is in the
+//! command line's crate.
 
 pub mod case;
 pub mod exam;

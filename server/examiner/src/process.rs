@@ -1,5 +1,5 @@
-//! The agent's process: started from a command with places left open, in a process group of its own, so that all of it ends with its case;
-//! what it writes is read, and the last of it kept.
+//! The agent's process: started from a command with placeholders, in its own process group, so that all
+//! of it ends with its case. Its output is logged, and the last lines are kept in memory.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -17,39 +17,39 @@ use tokio::time::timeout;
 
 /// Bytes of an agent's output that are written to its log.
 const MAX_LOG_BYTES: usize = 16 * 1024 * 1024;
-/// Bytes of it that are kept to be shown.
+/// Bytes of its output that are kept in memory.
 const MAX_TAIL_BYTES: usize = 4 * 1024;
-/// How long the last of it is waited for when the process has ended.
+/// How long to wait for the rest of its output after the process has exited.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
-/// A command with places left open: `{address}`, `{url}`, `{code}` or `{tournament}`, and `{name}`.
+/// A command with placeholders: `{address}`, `{url}`, `{code}` or `{tournament}`, and `{name}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AgentCommand(Vec<String>);
 
-/// What is put into the open places of a command.
+/// The values of the placeholders.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     /// `host:port` of the examiner.
     pub(super) address: String,
     /// Join code of the room or the tournament.
     pub(super) code: String,
-    /// Name to show.
+    /// Display name.
     pub(super) name: String,
 }
 
 impl AgentCommand {
-    /// A command that takes a seat in a room, its words not yet filled in.
+    /// A command that takes a seat in a room, given as words.
     ///
     /// # Errors
-    /// What is missing, in words.
+    /// The missing placeholder.
     pub fn new(words: Vec<String>) -> Result<Self, String> {
         Self::mentioning("{code}", words)
     }
 
-    /// A command, for the shell, that takes part in a tournament.
+    /// A command that takes part in a tournament, given as a shell line.
     ///
     /// # Errors
-    /// What is missing, in words.
+    /// The missing placeholder.
     pub fn for_tournament(line: &str) -> Result<Self, String> {
         let words = ["sh", "-c", line].map(str::to_owned).to_vec();
         Self::mentioning("{tournament}", words)
@@ -59,19 +59,19 @@ impl AgentCommand {
         let mentions = |place: &str| words.iter().any(|word| word.contains(place));
         if !mentions(code) {
             return Err(format!(
-                "the command must say {code} where the join code goes, for instance --code {code}"
+                "the command needs {code} in place of the join code, for instance --code {code}"
             ));
         }
         if !mentions("{address}") && !mentions("{url}") {
             return Err(
-                "the command must say {address} (host:port) or {url} (http://host:port) where the server's address goes"
+                "the command needs {address} (host:port) or {url} (http://host:port) in place of the server's address"
                     .into(),
             );
         }
         Ok(Self(words))
     }
 
-    /// The command as it was typed.
+    /// The words as they were given.
     pub fn words(&self) -> &[String] {
         &self.0
     }
@@ -90,7 +90,7 @@ impl AgentCommand {
     }
 }
 
-/// A process that was started. It, and whatever it started, is killed when this is dropped.
+/// A running process. Dropping it kills the process and everything it started.
 #[derive(Debug)]
 pub(super) struct AgentProcess {
     child: Child,
@@ -99,14 +99,14 @@ pub(super) struct AgentProcess {
     readers: Vec<JoinHandle<()>>,
 }
 
-/// What the process has written.
+/// The output of the process.
 #[derive(Debug, Default)]
 struct Log {
     tail: VecDeque<u8>,
 }
 
 impl AgentProcess {
-    /// Starts it. `log`: a file for what it writes.
+    /// Starts it. `log`: a file for its output.
     pub(super) async fn start(
         command: &AgentCommand,
         places: &Places,
@@ -134,14 +134,14 @@ impl AgentProcess {
         let file = Arc::new(tokio::sync::Mutex::new((file, MAX_LOG_BYTES)));
         let mut readers = Vec::new();
         if let Some(stdout) = child.stdout.take() {
-            readers.push(tokio::spawn(keep(
+            readers.push(tokio::spawn(keep_tail(
                 stdout,
                 Arc::clone(&kept),
                 Arc::clone(&file),
             )));
         }
         if let Some(stderr) = child.stderr.take() {
-            readers.push(tokio::spawn(keep(stderr, Arc::clone(&kept), file)));
+            readers.push(tokio::spawn(keep_tail(stderr, Arc::clone(&kept), file)));
         }
         Ok(Self {
             child,
@@ -151,16 +151,16 @@ impl AgentProcess {
         })
     }
 
-    /// Waits until it has ended.
+    /// Waits until it has exited.
     pub(super) async fn ended(&mut self) -> io::Result<ExitStatus> {
         self.child.wait().await
     }
 
-    /// Ends it, and gives the last lines it wrote.
+    /// Kills it and returns the last lines of its output.
     pub(super) async fn finish(mut self, most: usize) -> Vec<String> {
         self.kill();
         for reader in std::mem::take(&mut self.readers) {
-            // What left the group may hold its output open; nobody waits for that.
+            // A process that left the group may hold the output open; it is not waited for.
             let _read = timeout(LAST_WORDS, reader).await;
         }
         self.last_lines(most)
@@ -168,7 +168,7 @@ impl AgentProcess {
 
     fn kill(&self) {
         if let Some(group) = self.group {
-            // There may be nothing left of it.
+            // The group may be gone already.
             let _gone = kill_process_group(group, Signal::KILL);
         }
     }
@@ -179,7 +179,7 @@ impl AgentProcess {
         let text = String::from_utf8_lossy(&bytes);
         let lines: Vec<&str> = text.lines().collect();
         let from = lines.len().saturating_sub(most);
-        // What an agent writes may hold anything; a terminal is to see text.
+        // The output may contain control characters, which a terminal must not receive.
         let plain = |line: &&str| line.chars().filter(|it| !it.is_control()).collect();
         lines[from..].iter().map(plain).collect()
     }
@@ -191,8 +191,8 @@ impl Drop for AgentProcess {
     }
 }
 
-/// Reads what a process writes to the end, and keeps the last of it.
-async fn keep(
+/// Reads the output of a process to its end and keeps the last part.
+async fn keep_tail(
     mut source: impl AsyncRead + Unpin,
     log: Arc<Mutex<Log>>,
     file: Arc<tokio::sync::Mutex<(Option<tokio::fs::File>, usize)>>,
@@ -211,7 +211,7 @@ async fn keep(
         if let Some(file) = file {
             let written = &read[..count.min(*left)];
             *left -= written.len();
-            // A log that cannot be written is no reason to stop reading.
+            // Keep reading even if the log cannot be written.
             let _lost = file.write_all(written).await;
             let _lost = file.flush().await;
         }
@@ -227,14 +227,14 @@ mod tests {
     }
 
     #[test]
-    fn places_are_filled_in_wherever_they_stand() {
+    fn placeholders_are_filled_in_everywhere() {
         let command = AgentCommand::new(words("run --server={url} {address} {code}/{name} {}"));
         let places = Places {
             address: "127.0.0.1:7".into(),
             code: "BCDF".into(),
             name: "Ada".into(),
         };
-        let filled = command.expect("it says where they go").filled(&places);
+        let filled = command.expect("it has all placeholders").filled(&places);
         let expected = words("run --server=http://127.0.0.1:7 127.0.0.1:7 BCDF/Ada {}");
         assert_eq!(
             filled,
@@ -243,15 +243,15 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_cannot_find_its_room_is_refused() {
+    fn a_command_without_needed_placeholders_is_refused() {
         for (command, missing) in [("run", "{code}"), ("run {code}", "{address}")] {
-            let problem = AgentCommand::new(words(command)).expect_err("something is missing");
+            let problem = AgentCommand::new(words(command)).expect_err("a placeholder is missing");
             assert!(problem.contains(missing), "{problem}");
         }
     }
 
     #[tokio::test]
-    async fn the_whole_group_ends_with_its_guard_and_its_last_lines_are_kept() {
+    async fn dropping_kills_the_group_and_keeps_its_last_lines() {
         let command = AgentCommand(words("sh -c XXX"));
         let script = "echo one; echo two; sleep 600 & echo $!; wait";
         let command =
@@ -263,7 +263,7 @@ mod tests {
         };
         let process = AgentProcess::start(&command, &places, None)
             .await
-            .expect("there is a shell");
+            .expect("a shell");
         let lines = loop {
             let lines = process.last_lines(2);
             if lines.len() == 2 && lines[0] == "two" {
@@ -275,7 +275,7 @@ mod tests {
         let sleeper = Pid::from_raw(sleeper).expect("not zero");
         assert!(rustix::process::test_kill_process(sleeper).is_ok());
         drop(process);
-        // Its end takes a moment, and whoever inherits it may leave it as a zombie: it is not running any more.
+        // It may remain as a zombie for a moment, but it does not run any more.
         let stat = format!("/proc/{}/stat", sleeper.as_raw_nonzero());
         while let Ok(stat) = std::fs::read_to_string(&stat)
             && !stat.contains(") Z ")

@@ -1,5 +1,5 @@
-//! Carries the messages between the agent and the server, and shows each to the case that is being played (`exam`). Rooms are joined and
-//! games are played through here call by call; every other call goes through as it is.
+//! Forwards messages between the agent and the server, and shows each to the current case (`exam`).
+//! Calls that join rooms and play games are examined; all others are forwarded unchanged.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,12 +24,12 @@ use tower::{Service as _, ServiceExt as _};
 use super::exam::{Exam, Passed, StreamId};
 use chefshat_server::config::MAX_MESSAGE_BYTES;
 
-/// Messages that wait for one side of a stream.
+/// Messages queued for one side of a stream.
 const QUEUE: usize = 16;
-/// Largest message taken from the server, bytes; its own limit is far below.
+/// Largest message accepted from the server, bytes; its own limit is far below.
 const MAX_RESPONSE_BYTES: usize = 64 << 20;
 
-/// The case that is being played, shared by all who carry messages.
+/// The current case, shared by all connections.
 #[derive(Debug)]
 pub(super) struct Desk {
     exam: Mutex<Exam>,
@@ -49,35 +49,35 @@ impl Desk {
         })
     }
 
-    /// Shows the case something; whoever waits for it looks again.
+    /// Passes an event to the case and wakes its waiters.
     pub(super) fn show<T>(&self, act: impl FnOnce(&mut Exam, Duration) -> T) -> T {
         let shown = act(&mut self.look(), self.began.elapsed());
         self.changed.notify_one();
         shown
     }
 
-    /// The case as it stands.
+    /// Locks the case for reading.
     pub(super) fn look(&self) -> MutexGuard<'_, Exam> {
         self.exam.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// When the case must be told that time has passed.
+    /// When the time limits of the case must be checked.
     pub(super) fn wake_at(&self) -> Instant {
         self.began + self.look().wake_at()
     }
 
-    /// Waits until the case was shown something.
+    /// Waits until an event has been passed to the case.
     pub(super) async fn changed(&self) {
         self.changed.notified().await;
     }
 
-    /// Time since the case began.
+    /// Time since the start of the case.
     pub(super) fn elapsed(&self) -> Duration {
         self.began.elapsed()
     }
 }
 
-/// Serves the examiner on a socket, in front of a server, until it is dropped.
+/// Serves the examiner on a socket, in front of a server, until the future is dropped.
 pub(super) async fn serve(
     listener: TcpListener,
     server: Channel,
@@ -103,7 +103,7 @@ pub(super) async fn serve(
         .await
 }
 
-/// Passes a call on as it is.
+/// Forwards a call unchanged.
 async fn through(
     mut server: Channel,
     request: http::Request<axum::body::Body>,
@@ -231,7 +231,7 @@ struct Stream {
 }
 
 impl Stream {
-    /// Carries messages both ways until either side, or the case, ends the stream.
+    /// Forwards messages both ways until either side, or the case, ends the stream.
     async fn carry(
         mut self,
         mut agent: Streaming<v1::PlayRequest>,
@@ -253,7 +253,7 @@ impl Stream {
                         return;
                     }
                 },
-                told = server.message() => match told {
+                received = server.message() => match received {
                     Ok(Some(response)) => desk.show(|exam, now| exam.from_server(id, response, now)),
                     Ok(None) => {
                         desk.show(|exam, _| exam.ended(id, None));
@@ -276,18 +276,18 @@ impl Stream {
         }
     }
 
-    /// Passes on what is to be passed on; says whether the stream goes on.
+    /// Forwards messages; returns whether the stream continues.
     async fn pass(&self, passed: Passed) -> bool {
         if let (Some(server), false) = (&self.to_server, passed.to_server.is_empty()) {
             let commands = passed.to_server;
-            // A server that takes no more says why on the other side of the stream.
+            // If the server accepts no more, the other direction of the stream has the reason.
             let _ended = server.send(v1::PlayRequest { commands }).await;
         }
         if !passed.to_agent.is_empty() {
             let updates = passed.to_agent;
-            let told = self.to_agent.send(Ok(v1::PlayResponse { updates }));
-            if timeout(self.desk.patience, told).await.is_err() {
-                self.desk.show(|exam, _| exam.deaf());
+            let received = self.to_agent.send(Ok(v1::PlayResponse { updates }));
+            if timeout(self.desk.patience, received).await.is_err() {
+                self.desk.show(|exam, _| exam.not_reading());
                 return false;
             }
         }

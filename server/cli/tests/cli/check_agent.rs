@@ -32,7 +32,7 @@ fn a_report_says_what_was_expected_what_came_and_what_to_do() {
         "FAULT game ",
         "NEVER_JOINED",
         "expected: ",
-        "its process ended: exit status: 3",
+        "its process exited: exit status: 3",
         "to do: ",
         " 127.0.0.1:",
         "0 of 1 cases passed",

@@ -1,22 +1,22 @@
-//! Decisions put to the agent, what it answers, what becomes of that; and where the examiner interferes with it.
+//! Decision requests, the agent's answers, their results, and interferences with them.
 
 use std::time::Duration;
 
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
 
-use super::seats::{SeatKey, Stand};
+use super::seats::{DecisionState, SeatKey};
 use super::{Exam, Interference, Passed, Phase, StreamId};
 use crate::fault::Fault;
 
-/// Answers to a closed decision that may be on their way when the agent is told that it is.
+/// Answers to a closed decision that may be on their way when the agent receives the result.
 const CROSSING_ANSWERS: u32 = 1;
-/// Decisions lost before a hurried case is given up, if more are lost than answered.
+/// Lost decisions after which a case with short deadlines is ended, if more are lost than answered.
 const HURRIED_LOSSES: u32 = 8;
-/// Decisions answered between two interferences.
+/// Answered decisions between two interferences.
 const QUIET_DECISIONS: u32 = 1;
 
 impl Exam {
-    /// A decision is put to the agent.
+    /// A decision is requested from the agent.
     pub(super) fn put(
         &mut self,
         key: &SeatKey,
@@ -28,7 +28,7 @@ impl Exam {
         let held: Vec<v1::Answer> = (seen.decisions.range_mut(..request.decision_id))
             .filter_map(|(_, decision)| decision.held.take())
             .collect();
-        // Its time is up: the server may have it now.
+        // Its time is up: the server may receive it now.
         passed
             .to_server
             .extend(held.into_iter().map(|answer| v1::SeatCommand {
@@ -43,35 +43,38 @@ impl Exam {
         }
     }
 
-    /// Judges the decisions before this one that came to an end without a result.
+    /// Judges earlier decisions that ended without a result.
     pub(super) fn settle_before(&mut self, key: &SeatKey, next: u64) {
         let Some(seen) = self.seats.get_mut(key) else {
             return;
         };
         let mut unanswered = None;
         for (id, decision) in seen.decisions.range_mut(..next) {
-            let open = matches!(decision.stand, Stand::Open | Stand::Refused);
-            if !open || decision.lost_noted || decision.tampered && decision.stand == Stand::Open {
+            let open = matches!(decision.stand, DecisionState::Open | DecisionState::Refused);
+            if !open
+                || decision.lost_noted
+                || decision.tampered && decision.stand == DecisionState::Open
+            {
                 continue;
             }
             decision.lost_noted = true;
-            decision.stand = Stand::Closed;
+            decision.stand = DecisionState::Closed;
             seen.lost += 1;
             unanswered = Some((*id, decision.kind));
         }
         let Some((id, kind)) = unanswered else { return };
         if self.case.hurried {
-            return self.weigh_losses(key);
+            return self.check_losses(key);
         }
         let got = format!(
-            "decision {id} ({}) was not answered before its time ran out",
+            "decision {id} ({}) was not answered in time",
             kind_in_words(kind)
         );
         self.failed(Fault::NotAnswered, "an answer to every decision", got);
     }
 
-    /// Gives a hurried case up when it is clear how it will end.
-    pub(super) fn weigh_losses(&mut self, key: &SeatKey) {
+    /// Ends a case with short deadlines once its outcome is clear.
+    pub(super) fn check_losses(&mut self, key: &SeatKey) {
         let Some(seen) = self.seats.get(key) else {
             return;
         };
@@ -111,9 +114,9 @@ impl Exam {
         }
         let tampers = match seen.decisions.get_mut(&id) {
             None => {
-                // What was put too long ago is not remembered.
+                // Decisions requested too long ago are forgotten.
                 if id > newest {
-                    self.unasked(id, newest);
+                    self.unrequested_answer(id, newest);
                 }
                 false
             }
@@ -130,7 +133,7 @@ impl Exam {
                 false
             }
             Some(decision) => match decision.stand {
-                Stand::Taken | Stand::Answered => {
+                DecisionState::Taken | DecisionState::Answered => {
                     let action = answer.action;
                     self.fault(
                         Fault::AnsweredTwice,
@@ -139,10 +142,10 @@ impl Exam {
                     );
                     false
                 }
-                // On its way when the clock ran out.
-                Stand::Closed => false,
-                Stand::Open | Stand::Refused => {
-                    decision.stand = Stand::Answered;
+                // It was on its way when the time ran out.
+                DecisionState::Closed => false,
+                DecisionState::Open | DecisionState::Refused => {
+                    decision.stand = DecisionState::Answered;
                     decision.tampered |= dropping;
                     let choice = decision.legal_count() > 1;
                     let turn = decision.kind == v1::DecisionKind::Turn;
@@ -161,16 +164,16 @@ impl Exam {
         }
     }
 
-    fn unasked(&mut self, id: u64, newest: u64) {
+    fn unrequested_answer(&mut self, id: u64, newest: u64) {
         let got = match newest {
-            0 => format!("an answer to decision {id} before any was put"),
-            _ => format!("an answer to decision {id}, when {newest} was the newest put"),
+            0 => format!("an answer to decision {id} before any was requested"),
+            _ => format!("an answer to decision {id}, when {newest} was the newest requested"),
         };
-        let expected = "answers to decisions that were put";
+        let expected = "answers to decisions that were requested";
         self.fault(Fault::AnsweredUnasked, expected, got);
     }
 
-    /// Judges the action of an answer to an open decision; says whether it is legal.
+    /// Judges the action of an answer to an open decision; returns whether it is legal.
     fn judge_action(&mut self, key: &SeatKey, answer: &v1::Answer) -> bool {
         let (id, action) = (answer.decision_id, answer.action);
         let seen = self.seats.get(key);
@@ -199,7 +202,7 @@ impl Exam {
         legal
     }
 
-    /// A legal answer at a turn with a choice: passes it on, or does what the case is about.
+    /// Handles a legal answer at a turn with a choice: forwards it, or interferes.
     fn tamper(
         &mut self,
         stream: StreamId,
@@ -213,7 +216,7 @@ impl Exam {
         self.quiet += 1;
         let decision = (self.seats.get_mut(key))
             .and_then(|seen| seen.decisions.get_mut(&answer.decision_id))
-            .expect("the answer is to a decision that was put");
+            .expect("the answer is to a requested decision");
         match self.plan.front() {
             Some(Interference::Refuse) if quiet => {
                 let illegal = (0..).find(|action| !decision.is_legal(*action));
@@ -234,7 +237,7 @@ impl Exam {
                 self.interfered();
             }
             Some(Interference::DropAnswers) if quiet => {
-                // Until the substitute comes, this and what follows is dropped.
+                // Until the substitute plays, this and the following answers are dropped.
                 decision.tampered = true;
                 self.dropping = true;
             }
@@ -242,7 +245,7 @@ impl Exam {
         }
     }
 
-    /// Whether the connection is cut in place of this message.
+    /// Whether the connection is cut instead of sending this message.
     pub(super) fn cuts_instead(
         &mut self,
         stream: StreamId,
@@ -276,14 +279,14 @@ impl Exam {
         true
     }
 
-    /// The agent is told what became of an answer.
+    /// The agent receives the result of an answer.
     pub(super) fn result(&mut self, key: &SeatKey, result: &mut v1::AnswerResult) {
         let id = result.decision_id;
         if result.annotations_dropped {
             self.fault(
                 Fault::AnnotationsDropped,
                 "annotations within their limits",
-                format!("those of decision {id} were dropped"),
+                format!("annotations of decision {id} were dropped"),
             );
         }
         let Some(seen) = self.seats.get_mut(key) else {
@@ -294,21 +297,22 @@ impl Exam {
         };
         match result.status() {
             v1::AnswerStatus::Accepted => {
-                decision.stand = Stand::Taken;
+                decision.stand = DecisionState::Taken;
                 seen.taken += 1;
                 self.fulfil(Fault::GaveUpWhenRefused);
             }
             v1::AnswerStatus::Invalid => {
                 let exhausted = result.invalid_attempts_left == Some(0);
                 decision.stand = if exhausted {
-                    Stand::Closed
+                    DecisionState::Closed
                 } else {
-                    Stand::Refused
+                    DecisionState::Refused
                 };
                 let swapped = decision.swapped.take();
                 if let Some((_, own)) = swapped.filter(|(sent, _)| *sent == result.action) {
                     result.action = own;
-                    result.detail = "the examiner put another action, which is not legal, in the place of yours: answer again".into();
+                    result.detail =
+                        "the examiner replaced your action by an illegal one: answer again".into();
                     self.demand(
                         Fault::GaveUpWhenRefused,
                         "another answer to the decision after INVALID",
@@ -319,22 +323,22 @@ impl Exam {
             v1::AnswerStatus::Closed => {
                 decision.closed_told = true;
                 let tampered = decision.tampered;
-                if decision.stand != Stand::Answered {
+                if decision.stand != DecisionState::Answered {
                     return;
                 }
-                decision.stand = Stand::Closed;
+                decision.stand = DecisionState::Closed;
                 if tampered {
-                    // What was put before this was told may be answered without having read it.
+                    // Decisions requested before this result may be answered without having read it.
                     seen.read_after = seen.newest();
                     self.demand(
                         Fault::StoppedAfterClosed,
-                        "the game to be played on after an answer came too late",
+                        "the agent to continue after an answer came too late",
                         None,
                     );
                 } else if !std::mem::replace(&mut decision.lost_noted, true) {
                     seen.lost += 1;
                     if self.case.hurried {
-                        return self.weigh_losses(key);
+                        return self.check_losses(key);
                     }
                     self.fault(
                         Fault::TooSlow,

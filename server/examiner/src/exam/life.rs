@@ -1,5 +1,4 @@
-//! From joining to leaving: seats taken, streams opened, broken off and ended, the end of the game and of the process, and what happens
-//! because time has passed.
+//! From joining to leaving: seats, streams, the end of the game and of the process, and time limits.
 
 use std::collections::BTreeSet;
 use std::process::ExitStatus;
@@ -8,12 +7,12 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use tonic::{Code, Status};
 
-use super::seats::{Asked, SeatKey, Stand, StreamSeen};
+use super::seats::{DecisionState, RequestedAttach, SeatKey, StreamSeen};
 use super::{Exam, Phase, StreamId, Venue};
 use crate::fault::Fault;
 
 impl Exam {
-    /// The agent asked for a seat, with this join code, and this came of it.
+    /// The agent requested a seat with this join code, with this result.
     pub fn joined(
         &mut self,
         code: &str,
@@ -29,7 +28,7 @@ impl Exam {
         if !code.eq_ignore_ascii_case(join_code) {
             if let (Err(status), Phase::Starting) = (answer, self.phase) {
                 let got = format!("join code {code:?}: {}", status.message());
-                self.fatal(Fault::JoinRefused, "the join code it was given", got);
+                self.fatal(Fault::JoinRefused, "exactly the given join code", got);
             }
             return;
         }
@@ -37,7 +36,7 @@ impl Exam {
             return self.fatal(
                 Fault::JoinedAgain,
                 "the ticket of the seat it has",
-                "it asked for a seat with the same join code again",
+                "a second request for a seat with the same join code",
             );
         }
         match answer {
@@ -45,7 +44,7 @@ impl Exam {
                 self.phase = Phase::Joined;
                 self.demand(
                     Fault::NeverAttached,
-                    "an attachment with the ticket it was given",
+                    "an attachment with the ticket it received",
                     Some(now + self.patience.each),
                 );
             }
@@ -67,7 +66,7 @@ impl Exam {
         self.streams.len() - 1
     }
 
-    /// The agent plays by calls that are not examined.
+    /// The agent uses calls that are not examined.
     pub fn unexamined(&mut self, call: &str) {
         if !self.is_done() {
             let got = format!("a call of PlayService.{call}");
@@ -82,13 +81,13 @@ impl Exam {
                 let from = attach.from_sequence;
                 self.fault(
                     Fault::EventsSkipped,
-                    format!("events asked for from {next} on, or from the beginning"),
-                    format!("events asked for from {from} on"),
+                    format!("events requested from {next} on, or from the beginning"),
+                    format!("events requested from {from} on"),
                 );
             }
         }
         let seen = &mut self.streams[stream];
-        let asked = Asked {
+        let asked = RequestedAttach {
             ticket: attach.ticket.clone(),
             no_mask: attach.no_mask,
         };
@@ -113,10 +112,10 @@ impl Exam {
         seen.no_mask = asked.as_ref().is_some_and(|asked| asked.no_mask);
         let newest = seen.newest();
         if let Some(decision) = seen.decisions.get_mut(&newest)
-            && decision.stand == Stand::Answered
+            && decision.stand == DecisionState::Answered
         {
-            // Whether its answer arrived the agent cannot know: it may give it again.
-            decision.stand = Stand::Open;
+            // The agent cannot know whether its answer arrived: it may send it again.
+            decision.stand = DecisionState::Open;
             decision.tampered = true;
         }
         if let Some(asked) = asked {
@@ -142,9 +141,9 @@ impl Exam {
     pub(super) fn refused(&mut self, stream: StreamId, handle: u32, refused: &v1::Refused) {
         let got = format!("{} ({})", refused.message, refused.reason);
         if self.streams[stream].asked.remove(&handle).is_some() {
-            self.fatal(Fault::AttachRefused, "an attachment that is accepted", got);
+            self.fatal(Fault::AttachRefused, "a valid attachment", got);
         } else if refused.reason != "HANDLE_UNKNOWN" {
-            self.fault(Fault::CommandRefused, "commands that are accepted", got);
+            self.fault(Fault::CommandRefused, "valid commands", got);
         }
     }
 
@@ -169,7 +168,7 @@ impl Exam {
         seen.over = true;
         let (own, met) = (seen.own, seen.kinds.clone());
         if own && matches!(self.venue, Venue::Room { .. }) {
-            self.weigh_losses(&key);
+            self.check_losses(&key);
             self.game_over(&met, now);
         }
     }
@@ -190,7 +189,7 @@ impl Exam {
         }
     }
 
-    /// The agent has been told that the tournament is over.
+    /// The agent has received the end of the tournament.
     fn tournament_over(&mut self, now: Duration) {
         let together = self.together;
         if together < 2 && !self.is_done() {
@@ -206,7 +205,7 @@ impl Exam {
         self.game_over(&met, now);
     }
 
-    /// The agent has been told that its game is over.
+    /// The agent has received the end of its game.
     fn game_over(&mut self, met: &BTreeSet<i32>, now: Duration) {
         if self.is_done() {
             return;
@@ -219,7 +218,7 @@ impl Exam {
             self.fault(
                 demand.fault,
                 demand.expected,
-                "nothing of the kind until the game was over",
+                "none before the game was over",
             );
         }
         let missed = (self.case.kinds.iter()).find(|kind| !met.contains(&i32::from(**kind)));
@@ -234,24 +233,24 @@ impl Exam {
         if !self.plan.is_empty() && self.findings.is_empty() {
             self.fault(
                 Fault::NotExamined,
-                "a game long enough for the case",
-                "it was over before the examiner could do what the case is about",
+                "a game that is long enough for the case",
+                "the game ended before the examiner could interfere",
             );
         }
         self.phase = Phase::Over;
         self.demand(
             Fault::NeverLeft,
             match self.venue {
-                Venue::Room { .. } => "the stream to be left after Detached (GAME_OVER)",
+                Venue::Room { .. } => "the end of the stream after Detached (GAME_OVER)",
                 Venue::Tournament { .. } => {
-                    "the stream to be left after Detached (TOURNAMENT_OVER)"
+                    "the end of the stream after Detached (TOURNAMENT_OVER)"
                 }
             },
             Some(now + self.patience.each),
         );
     }
 
-    /// The examiner breaks a stream off.
+    /// The examiner cuts a stream.
     pub(super) fn cut(&mut self, stream: StreamId, now: Duration) {
         self.streams[stream].cut = true;
         self.demand(
@@ -261,7 +260,7 @@ impl Exam {
         );
     }
 
-    /// The agent half-closed a stream, or ended it; a `Status` says how if it was with an error.
+    /// The agent half-closed or ended a stream, the latter possibly with an error in `status`.
     pub fn left(&mut self, stream: StreamId, status: Option<&Status>, now: Duration) {
         let seen = &mut self.streams[stream];
         if self.phase == Phase::Done || seen.cut || std::mem::replace(&mut seen.closed, true) {
@@ -276,7 +275,7 @@ impl Exam {
                 if self.started {
                     self.demand(
                         Fault::NeverExited,
-                        "the process to end after its game",
+                        "the process to exit after its game",
                         Some(now + self.patience.each),
                     );
                 } else {
@@ -305,18 +304,18 @@ impl Exam {
         }
     }
 
-    /// The agent did not read what was sent to it for as long as the examiner waits.
-    pub fn deaf(&mut self) {
+    /// The agent has not read its stream for as long as the examiner waits.
+    pub fn not_reading(&mut self) {
         if !self.is_done() {
             self.fatal(
                 Fault::NotReading,
-                "an agent that reads what it is sent",
-                "nothing was read for too long",
+                "an agent that reads its stream",
+                "its stream was not read for too long",
             );
         }
     }
 
-    /// The agent's process has ended.
+    /// The agent's process has exited.
     pub fn exited(&mut self, status: ExitStatus) {
         match self.phase {
             Phase::Done => {}
@@ -333,33 +332,33 @@ impl Exam {
                 self.failed(
                     Fault::ExitedEarly,
                     expected,
-                    format!("its process ended: {status}"),
+                    format!("its process exited: {status}"),
                 );
             }
         }
     }
 
-    /// When [`Exam::tick`] must be called although nothing happens.
+    /// When [`Exam::tick`] must be called if nothing happens before.
     pub fn wake_at(&self) -> Duration {
         let limit = self.patience.case();
         let by = self.demand.as_ref().and_then(|demand| demand.by);
         by.map_or(limit, |by| by.min(limit))
     }
 
-    /// Time has passed.
+    /// Checks the time limits.
     pub fn tick(&mut self, now: Duration) {
         if self.is_done() || now < self.wake_at() {
             return;
         }
         if now >= self.patience.case() {
-            let got = format!("it was not over after {} s", now.as_secs());
+            let got = format!("the case was not over after {} s", now.as_secs());
             return self.fatal(Fault::CaseTooLong, "an end of the case", got);
         }
         let waited = match self.phase {
             Phase::Starting => self.patience.start,
             _ => self.patience.each,
         };
-        let got = format!("nothing of the kind within {:.1} s", waited.as_secs_f64());
+        let got = format!("nothing within {:.1} s", waited.as_secs_f64());
         self.failed(Fault::CaseTooLong, "an end of the case", got);
     }
 }

@@ -1,6 +1,7 @@
-//! One case as it is played: every message between the agent and the server passes through here, is noted, judged, and sometimes
-//! tampered with. Synchronous, without IO and with a clock that is handed in, so that every course of events can be tested as data; who
-//! carries the messages is in `relay`, what is known of each seat and decision in `seats`.
+//! A case in progress: every message between the agent and the server passes through here, and is
+//! recorded, judged and sometimes changed. It is synchronous, without IO and with a clock passed in, so
+//! that every sequence of events can be tested as data. `relay` carries the messages, `seats` holds
+//! what is known of each seat and decision.
 
 mod answers;
 mod life;
@@ -17,28 +18,28 @@ use super::case::{Case, Interference, Patience};
 use super::fault::{Fault, Finding};
 use seats::{SeatKey, SeatSeen, StreamSeen};
 
-/// Commands beyond what was asked for that an agent may say in a case.
+/// Unrequested commands that an agent may send in a case.
 const UNASKED_COMMANDS: u64 = 200;
-/// Commands that an agent may say for each update it is told.
+/// Commands that an agent may send for each update it receives.
 const COMMANDS_AN_UPDATE: u64 = 4;
-/// Different faults that are kept of a case.
+/// Most different faults recorded in a case.
 const MAX_FINDINGS: usize = 16;
 
 /// Number of a stream in its case, from 0.
 pub type StreamId = usize;
 
-/// What becomes of a message: what is passed on, and to whom.
+/// The messages to forward in place of a message.
 #[derive(Debug, Default, PartialEq)]
 pub struct Passed {
     /// Commands for the server.
     pub to_server: Vec<v1::SeatCommand>,
     /// Updates for the agent, after which the stream may be cut.
     pub to_agent: Vec<v1::SeatUpdate>,
-    /// The stream breaks off here.
+    /// The stream is cut here.
     pub cut: bool,
 }
 
-/// What the agent is to take part in.
+/// What the agent takes part in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Venue {
     /// A room.
@@ -55,27 +56,27 @@ pub enum Venue {
     },
 }
 
-/// Where the case stands.
+/// The phase of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// The agent has no seat.
     Starting,
-    /// It has one, and is not attached.
+    /// It has a seat but is not attached.
     Joined,
     /// It plays.
     Playing,
-    /// Its game is over, and it has been told so.
+    /// Its game is over, and it has received the end.
     Over,
-    /// There is nothing more to see.
+    /// The case is over.
     Done,
 }
 
-/// Something that must come next, and what it means if it does not.
+/// Something that must happen next, and the fault if it does not.
 #[derive(Debug)]
 struct Demand {
     fault: Fault,
     expected: String,
-    /// By when; `None`: the game's own clock says.
+    /// The deadline; `None`: set by the game's own clock.
     by: Option<Duration>,
 }
 
@@ -84,12 +85,12 @@ struct Demand {
 pub struct Exam {
     case: &'static Case,
     patience: Patience,
-    /// Whether the examiner started the agent's process, whose end it therefore sees.
+    /// Whether the examiner started the agent's process and therefore sees it exit.
     started: bool,
     venue: Venue,
     phase: Phase,
     demand: Option<Demand>,
-    /// What the examiner has still to do to the agent.
+    /// Interferences still to come.
     plan: VecDeque<Interference>,
     /// Decisions answered without interference since the last one.
     quiet: u32,
@@ -99,14 +100,14 @@ pub struct Exam {
     seats: BTreeMap<SeatKey, SeatSeen>,
     tickets: BTreeMap<String, SeatKey>,
     findings: Vec<Finding>,
-    told: u64,
+    received: u64,
     said: u64,
     /// Most seats of the venue that were attached at a time.
     together: usize,
 }
 
 impl Exam {
-    /// A case in this room, at time zero.
+    /// Creates a case in this room, at time zero.
     pub fn new(case: &'static Case, patience: Patience, venue: Venue, started: bool) -> Self {
         Self {
             case,
@@ -116,9 +117,9 @@ impl Exam {
             demand: Some(Demand {
                 fault: Fault::NeverJoined,
                 expected: match &venue {
-                    Venue::Room { .. } => "a seat to be taken with the join code".into(),
+                    Venue::Room { .. } => "a seat taken with the join code".into(),
                     Venue::Tournament { .. } => {
-                        "the tournament to be joined, and its ticket attached to a stream".into()
+                        "joining the tournament, and attaching its ticket to a stream".into()
                     }
                 },
                 by: Some(patience.start),
@@ -131,23 +132,23 @@ impl Exam {
             seats: BTreeMap::new(),
             tickets: BTreeMap::new(),
             findings: Vec::new(),
-            told: 0,
+            received: 0,
             said: 0,
             together: 0,
         }
     }
 
-    /// Whether there is nothing more to see.
+    /// Whether the case is over.
     pub fn is_done(&self) -> bool {
         self.phase == Phase::Done
     }
 
-    /// What was found so far.
+    /// The faults found so far.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
     }
 
-    /// What the agent says on a stream.
+    /// Handles a message of the agent on a stream.
     pub fn from_agent(
         &mut self,
         stream: StreamId,
@@ -155,19 +156,19 @@ impl Exam {
         now: Duration,
     ) -> Passed {
         let mut passed = Passed::default();
-        // A message without commands is no less a message.
+        // An empty message counts too.
         self.said += u64::from(request.commands.is_empty());
         for command in request.commands {
             if self.is_done() || self.streams[stream].cut {
                 break;
             }
             self.said += 1;
-            if self.said > UNASKED_COMMANDS + COMMANDS_AN_UPDATE * self.told {
-                let (said, told) = (self.said, self.told);
+            if self.said > UNASKED_COMMANDS + COMMANDS_AN_UPDATE * self.received {
+                let (said, received) = (self.said, self.received);
                 self.fatal(
                     Fault::Flooding,
                     "about one command for each decision",
-                    format!("{said} commands, after {told} updates in all"),
+                    format!("{said} commands, after {received} updates in total"),
                 );
                 break;
             }
@@ -188,7 +189,7 @@ impl Exam {
         match command.command {
             Some(Command::Attach(mut attach)) => {
                 self.attaching(stream, &attach);
-                // The examiner reads every mask; an agent that wants none is sent none.
+                // The examiner reads every mask; agents that do not want masks do not receive them.
                 attach.no_mask = false;
                 passed.to_server.push(v1::SeatCommand {
                     handle,
@@ -208,12 +209,12 @@ impl Exam {
                     self.answer(stream, key, handle, answer, now, passed);
                     return;
                 }
-                // What is on its way when a seat is detached is nobody's fault.
+                // Commands on their way when a seat is detached are not a fault.
                 if !seen.ended.contains(&handle) {
                     let id = answer.decision_id;
                     self.fault(
                         Fault::AnsweredUnasked,
-                        "answers to decisions that were put",
+                        "answers to decisions that were requested",
                         format!("an answer to decision {id} before the seat was attached"),
                     );
                 }
@@ -236,7 +237,7 @@ impl Exam {
         passed.to_server.push(command);
     }
 
-    /// What the server says on a stream.
+    /// Handles a message of the server on a stream.
     pub fn from_server(
         &mut self,
         stream: StreamId,
@@ -253,7 +254,7 @@ impl Exam {
             return passed;
         }
         for v1::SeatUpdate { handle, update } in response.updates {
-            self.told += 1;
+            self.received += 1;
             let Some(mut update) = update else { continue };
             self.update(stream, handle, &mut update, now, &mut passed);
             passed.to_agent.push(v1::SeatUpdate {
@@ -276,7 +277,7 @@ impl Exam {
             Update::Attached(attached) => self.attached(stream, handle, attached),
             Update::Refused(refused) => self.refused(stream, handle, refused),
             Update::Events(batch) => {
-                self.told += batch.events.len() as u64;
+                self.received += batch.events.len() as u64;
                 if let Some(key) = self.streams[stream].bound.get(&handle).cloned() {
                     for event in &batch.events {
                         self.event(&key, event, now);
@@ -337,7 +338,7 @@ impl Exam {
         }
     }
 
-    /// Notes a fault; the case goes on.
+    /// Records a fault; the case continues.
     fn fault(&mut self, fault: Fault, expected: impl Into<String>, got: impl Into<String>) {
         if let Some(known) = self.findings.iter_mut().find(|it| it.fault == fault) {
             known.times = known.times.saturating_add(1);
@@ -351,7 +352,7 @@ impl Exam {
         }
     }
 
-    /// Notes a fault after which there is nothing more to see.
+    /// Records a fault that ends the case.
     fn fatal(&mut self, fault: Fault, expected: impl Into<String>, got: impl Into<String>) {
         self.fault(fault, expected, got);
         self.phase = Phase::Done;
@@ -365,12 +366,12 @@ impl Exam {
         });
     }
 
-    /// What was demanded has come.
+    /// Something required has happened.
     fn fulfil(&mut self, fault: Fault) {
         self.demand.take_if(|demand| demand.fault == fault);
     }
 
-    /// What was demanded has not come; `fault` where nothing particular was.
+    /// Something required did not happen; `fault` applies if nothing specific was required.
     fn failed(&mut self, fault: Fault, expected: &str, got: impl Into<String>) {
         match self.demand.take() {
             Some(demand) => self.fatal(demand.fault, demand.expected, got),
@@ -378,7 +379,7 @@ impl Exam {
         }
     }
 
-    /// The examiner has done what it was about to do.
+    /// The current interference is complete.
     fn interfered(&mut self) {
         self.plan.pop_front();
         self.quiet = 0;

@@ -1,4 +1,5 @@
-//! What the examiner has seen of each stream, seat and decision. What it makes of it is decided in the files beside this.
+//! What the examiner has seen of each stream, seat and decision. The other files of this module
+//! interpret it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,9 +15,9 @@ pub(super) struct SeatKey {
     pub(super) seat: u32,
 }
 
-/// An attachment that was asked for.
+/// A requested attachment.
 #[derive(Debug)]
-pub(super) struct Asked {
+pub(super) struct RequestedAttach {
     pub(super) ticket: String,
     pub(super) no_mask: bool,
 }
@@ -24,22 +25,22 @@ pub(super) struct Asked {
 /// One Play stream.
 #[derive(Debug, Default)]
 pub(super) struct StreamSeen {
-    /// Attachments asked for: each has the next handle.
+    /// Requested attachments; each takes the next handle.
     pub(super) attachments: u32,
-    /// Those not yet answered, by handle.
-    pub(super) asked: BTreeMap<u32, Asked>,
+    /// Those without an answer yet, by handle.
+    pub(super) asked: BTreeMap<u32, RequestedAttach>,
     /// The seat behind each handle, once attached.
     pub(super) bound: BTreeMap<u32, SeatKey>,
     /// Handles of seats that have been detached.
     pub(super) ended: BTreeSet<u32>,
-    /// The examiner broke it off.
+    /// The examiner has cut it.
     pub(super) cut: bool,
     /// The agent has left it, or it has ended.
     pub(super) closed: bool,
 }
 
 impl StreamSeen {
-    /// Whether a handle means anything here. That of an attachment is known before it is answered.
+    /// Whether a handle is valid. The handle of an attachment is known before its answer.
     pub(super) fn knows(&self, handle: u32) -> bool {
         handle < self.attachments
             || self.bound.contains_key(&handle)
@@ -47,38 +48,38 @@ impl StreamSeen {
     }
 }
 
-/// How a decision stands, as far as the agent has been told and has said.
+/// The state of a decision, as the agent knows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stand {
-    /// Put, and not answered.
+pub(super) enum DecisionState {
+    /// Requested and not answered.
     Open,
     /// Answered, without a result yet.
     Answered,
-    /// Answered illegally: to be answered again.
+    /// Answered illegally; another answer is due.
     Refused,
-    /// The answer was taken.
+    /// The answer was accepted.
     Taken,
     /// Closed without the agent's answer.
     Closed,
 }
 
-/// A decision that was put to the agent.
+/// A decision requested from the agent.
 #[derive(Debug)]
 pub(super) struct DecisionSeen {
     pub(super) kind: v1::DecisionKind,
     pub(super) mask: Vec<u8>,
-    pub(super) stand: Stand,
-    /// The examiner interfered: what is lost with it is not the agent's fault.
+    pub(super) stand: DecisionState,
+    /// The examiner interfered: losses caused by it are not the agent's fault.
     pub(super) tampered: bool,
-    /// The examiner's own action, sent in place of the agent's, and that.
+    /// The examiner's action, sent in place of the agent's, and the agent's.
     pub(super) swapped: Option<(u32, u32)>,
-    /// The agent's answer that is held back.
+    /// The agent's answer, held back.
     pub(super) held: Option<v1::Answer>,
-    /// The agent has been told that it is closed.
+    /// The agent has received the result CLOSED.
     pub(super) closed_told: bool,
-    /// Answers that came after that.
+    /// Answers after that.
     pub(super) after_closed: u32,
-    /// It was lost, and that has been noted.
+    /// It timed out, and that has been recorded.
     pub(super) lost_noted: bool,
 }
 
@@ -94,30 +95,30 @@ impl DecisionSeen {
     }
 }
 
-/// One seat, over all streams.
+/// A seat, over all streams.
 #[derive(Debug, Default)]
 pub(super) struct SeatSeen {
-    /// Number of the last event passed on.
+    /// Number of the last event forwarded.
     pub(super) last_event: u64,
     /// It belongs to the case.
     pub(super) own: bool,
     /// Events below this number happened before the seat was last attached.
     pub(super) live_from: u64,
-    /// Number of actions; 0 until the game has begun.
+    /// Number of actions; 0 until the game has started.
     pub(super) actions: u32,
-    /// The last so many decisions put, by number.
+    /// The last decisions requested, by number.
     pub(super) decisions: BTreeMap<u64, DecisionSeen>,
-    /// Kinds of decisions put.
+    /// Kinds of decisions requested.
     pub(super) kinds: BTreeSet<i32>,
     /// The agent wants no masks.
     pub(super) no_mask: bool,
-    /// Newest decision when the agent was told that an answer held back was too late.
+    /// Newest decision when the agent learned that a held-back answer was too late.
     pub(super) read_after: u64,
-    /// Decisions that were the agent's to take, and came to an end.
+    /// Decisions that were the agent's to take, and are over.
     pub(super) taken: u32,
     /// Decisions that it lost to the clock.
     pub(super) lost: u32,
-    /// It has been told that the game is over.
+    /// It has received the end of the game.
     pub(super) over: bool,
 }
 
@@ -128,7 +129,7 @@ impl SeatSeen {
         }
     }
 
-    /// Notes a decision that is put, for the first time or again.
+    /// Records a decision request, the first or a repeated one.
     pub(super) fn put(&mut self, request: &v1::DecisionRequest) {
         self.kinds.insert(request.kind);
         let seen = self
@@ -137,7 +138,7 @@ impl SeatSeen {
             .or_insert_with(|| DecisionSeen {
                 kind: request.kind(),
                 mask: request.action_mask.clone(),
-                stand: Stand::Open,
+                stand: DecisionState::Open,
                 tampered: false,
                 swapped: None,
                 held: None,
@@ -145,13 +146,13 @@ impl SeatSeen {
                 after_closed: 0,
                 lost_noted: false,
             });
-        seen.stand = Stand::Open;
+        seen.stand = DecisionState::Open;
         while self.decisions.len() > REMEMBERED {
             self.decisions.pop_first();
         }
     }
 
-    /// Number of the newest decision put, or 0.
+    /// Number of the newest decision requested, or 0.
     pub(super) fn newest(&self) -> u64 {
         self.decisions.last_key_value().map_or(0, |(id, _)| *id)
     }

@@ -1,4 +1,4 @@
-//! Courses in which the examiner interferes: what is passed on, and what is made of what follows.
+//! Cases with interferences: the messages forwarded, and the faults found.
 
 use super::*;
 
@@ -8,10 +8,13 @@ fn a_refusal_looks_like_one_of_the_agents_own_answer() {
     let mut course = Course::of("refusal", steps);
     assert_eq!(course.answers(), [(1, 1), (2, ILLEGAL)]);
     course.step(result(2, ILLEGAL, AnswerStatus::Invalid));
-    let Some(Update::Result(told)) = course.to_agent.last() else {
+    let Some(Update::Result(received)) = course.to_agent.last() else {
         panic!("no result");
     };
-    assert_eq!((told.action, told.status()), (5, AnswerStatus::Invalid));
+    assert_eq!(
+        (received.action, received.status()),
+        (5, AnswerStatus::Invalid)
+    );
     course.step(answer(2, 1));
     assert_eq!(course.answers(), [(1, 1), (2, ILLEGAL), (2, 1)]);
     course.step(accepted(2));
@@ -34,21 +37,21 @@ fn a_connection_is_cut_before_an_answer_a_request_and_a_result() {
     course.step(put(2));
     course.step(answer(2, 1));
     assert_eq!((course.cuts, course.answers()), (1, vec![(1, 1)]));
-    // What comes on the old stream is lost; on a new one the decision is put again.
+    // Messages on the old stream are lost; on a new one the decision is requested again.
     course.step(answer(2, 1));
     course.step(Attach(2));
     course.step(put(2));
     course.step(answer(2, 1));
     course.step(accepted(2));
     assert_eq!(course.answers(), [(1, 1), (2, 1)]);
-    let told = course.to_agent.len();
+    let received = course.to_agent.len();
     course.step(put(3));
-    assert_eq!((course.cuts, course.to_agent.len()), (3, told));
+    assert_eq!((course.cuts, course.to_agent.len()), (3, received));
     course.step(Attach(0));
     course.step(put(3));
     course.step(answer(3, 1));
     course.step(accepted(3));
-    assert_eq!(course.cuts, 4, "the result is not told");
+    assert_eq!(course.cuts, 4, "the result is not sent");
     course.step(Attach(2));
     course.step(put(4));
     assert!(course.codes().is_empty());
@@ -116,6 +119,6 @@ fn answers_are_dropped_until_a_substitute_plays() {
     );
     let resumed = and_good_end([with(&[resume()]), played(4, 6)].concat());
     check("resuming", "substitution", resumed, &[]);
-    let anew = and_good_end([with(&[Leave, Attach(3)]), played(4, 6)].concat());
-    check("attaching anew", "substitution", anew, &[]);
+    let again = and_good_end([with(&[Leave, Attach(3)]), played(4, 6)].concat());
+    check("attaching again", "substitution", again, &[]);
 }

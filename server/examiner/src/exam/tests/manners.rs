@@ -1,4 +1,4 @@
-//! Courses without interference: joining, answering, leaving, in a room and in a tournament.
+//! Cases without interferences: joining, answering, leaving, in a room and in a tournament.
 
 use super::*;
 
@@ -35,7 +35,7 @@ fn before_the_game() {
 }
 
 #[test]
-fn answers_in_every_course() {
+fn answers_and_their_faults() {
     let closed = |id| result(id, 1, AnswerStatus::Closed);
     let invalid = |id| result(id, ILLEGAL, AnswerStatus::Invalid);
     check("a good game", "small", and_good_end(played(2, 9)), &[]);
@@ -69,11 +69,11 @@ fn answers_in_every_course() {
         and_good_end(beyond),
         &["ACTION_OUT_OF_SPACE"],
     );
-    let unasked = [put(2), answer(3, 1), answer(2, 1), accepted(2)];
+    let unrequested_answer = [put(2), answer(3, 1), answer(2, 1), accepted(2)];
     check(
         "unasked",
         "small",
-        and_good_end(unasked),
+        and_good_end(unrequested_answer),
         &["ANSWERED_UNASKED"],
     );
     let crossing = [put(2), put(3), answer(2, 1)];
@@ -159,7 +159,7 @@ fn the_end() {
 }
 
 #[test]
-fn most_answers_in_time_are_enough_for_a_hurried_case() {
+fn short_deadlines_need_most_answers_in_time() {
     let lost = |ids: std::ops::RangeInclusive<u64>| ids.map(put).collect::<Vec<_>>();
     let some = and_good_end([lost(2..=9), played(10, 20)].concat());
     check("some lost", "deadlines", some, &["TOO_SLOW"]);
@@ -169,33 +169,33 @@ fn most_answers_in_time_are_enough_for_a_hurried_case() {
 }
 
 #[test]
-fn an_agent_that_wants_no_masks_gets_none() {
+fn an_agent_without_masks_receives_none_but_is_judged() {
     let mut course = Course::of("small", [Join]);
     let stream = course.exam.opened();
     let attach = v1::Attach {
         no_mask: true,
         ..v1::Attach::default()
     };
-    course.says(stream, 0, Command::Attach(attach));
+    course.sends(stream, 0, Command::Attach(attach));
     let attached = v1::Attached {
         room_id: "room".into(),
         ..v1::Attached::default()
     };
-    course.told(stream, Update::Attached(attached));
+    course.received(stream, Update::Attached(attached));
     course.step(put(1));
-    let Some(Update::Decision(told)) = course.to_agent.last() else {
+    let Some(Update::Decision(received)) = course.to_agent.last() else {
         panic!("no decision");
     };
-    assert!(told.action_mask.is_empty());
+    assert!(received.action_mask.is_empty());
     course.step(answer(1, ILLEGAL));
     assert_eq!(
         course.codes(),
         ["ILLEGAL_ACTION"],
-        "it is judged all the same"
+        "its actions are still judged"
     );
 }
 
-/// A tournament in which so many games are played at a time, with what follows.
+/// A tournament with this number of games at a time, followed by these steps.
 fn tournament(seats: u32, rest: &[Step]) -> Course {
     let venue = Venue::Tournament {
         tournament_id: "cup".into(),
@@ -206,12 +206,12 @@ fn tournament(seats: u32, rest: &[Step]) -> Course {
         ..Course::of("small", [])
     };
     let stream = course.exam.opened();
-    course.says(stream, 0, Command::Attach(v1::Attach::default()));
+    course.sends(stream, 0, Command::Attach(v1::Attach::default()));
     let entered = v1::Entered {
         tournament_id: "cup".into(),
         ..v1::Entered::default()
     };
-    course.told(stream, Update::Entered(entered));
+    course.received(stream, Update::Entered(entered));
     for number in 0..seats {
         let handle = (1 << 31) + number;
         let attached = v1::Attached {
@@ -219,11 +219,11 @@ fn tournament(seats: u32, rest: &[Step]) -> Course {
             tournament_id: "cup".into(),
             ..v1::Attached::default()
         };
-        course.told_to(handle, Update::Attached(attached));
+        course.receives_on(handle, Update::Attached(attached));
         for step in [put(1), answer(1, 1), accepted(1)] {
             match step {
-                Told(update) => course.told_to(handle, update),
-                Says(_, command) => course.says(stream, handle, command),
+                Told(update) => course.receives_on(handle, update),
+                Says(_, command) => course.sends(stream, handle, command),
                 _ => {}
             }
         }

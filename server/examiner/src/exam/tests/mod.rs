@@ -1,4 +1,5 @@
-//! Courses of events as data: what agent and server say, and what is found. The cases against real agents are whole-system tests.
+//! Sequences of events as data: messages of agent and server, and the faults found. The system tests
+//! run the cases against real agents.
 
 mod interferences;
 mod manners;
@@ -19,23 +20,23 @@ const MASK: [u8; 1] = [0b0010_0110];
 const ACTIONS: u32 = 8;
 const ILLEGAL: u32 = 0;
 
-/// Something that happens.
+/// A step of a sequence.
 #[derive(Clone)]
 #[expect(clippy::large_enum_variant, reason = "a test holds a few")]
 enum Step {
     /// The agent takes its seat.
     Join,
-    /// It opens a stream and attaches, asking for events from a number on; the server attaches it.
+    /// It opens a stream and attaches, requesting events from a number on; the server attaches it.
     Attach(u64),
-    /// It says something on its newest stream.
+    /// It sends a command on its newest stream.
     Says(u32, Command),
-    /// The server does.
+    /// The server sends an update.
     Told(Update),
-    /// So many seconds pass.
+    /// This number of seconds pass.
     Wait(u64),
     /// The agent leaves its newest stream.
     Leave,
-    /// Its process ends with a status.
+    /// Its process exits with this status.
     Exit(i32),
 }
 use Step::{Attach, Exit, Join, Leave, Says, Told, Wait};
@@ -100,14 +101,14 @@ fn resume() -> Step {
     Says(0, Command::Resume(v1::ResumeSeat {}))
 }
 
-/// Decisions from one number to another, each answered and taken.
+/// Decisions from one number to another, each answered and accepted.
 fn played(from: u64, to: u64) -> Vec<Step> {
     (from..=to)
         .flat_map(|id| [put(id), answer(id, 1), accepted(id)])
         .collect()
 }
 
-/// A case as it went: everything that was passed on, and the case as it stands.
+/// The course of a case: everything that was forwarded, and the case itself.
 struct Course {
     exam: Exam,
     now: Duration,
@@ -150,12 +151,12 @@ impl Course {
                     from_sequence,
                     ..v1::Attach::default()
                 };
-                self.says(stream, 0, Command::Attach(attach));
+                self.sends(stream, 0, Command::Attach(attach));
                 let attached = v1::Attached {
                     room_id: "room".into(),
                     ..v1::Attached::default()
                 };
-                self.told(stream, Update::Attached(attached));
+                self.received(stream, Update::Attached(attached));
                 let started = v1::GameStarted {
                     action_space: Some(v1::ActionSpace {
                         size: ACTIONS,
@@ -165,8 +166,8 @@ impl Course {
                 };
                 self.step(event(1, Kind::GameStarted(Box::new(started))));
             }
-            Says(handle, command) => self.says(newest, handle, command),
-            Told(update) => self.told(newest, update),
+            Says(handle, command) => self.sends(newest, handle, command),
+            Told(update) => self.received(newest, update),
             Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
                 self.exam.tick(self.now);
@@ -176,7 +177,7 @@ impl Course {
         }
     }
 
-    fn says(&mut self, stream: StreamId, handle: u32, command: Command) {
+    fn sends(&mut self, stream: StreamId, handle: u32, command: Command) {
         let command = v1::SeatCommand {
             handle,
             command: Some(command),
@@ -188,12 +189,12 @@ impl Course {
         self.take(passed);
     }
 
-    fn told(&mut self, stream: StreamId, update: Update) {
+    fn received(&mut self, stream: StreamId, update: Update) {
         self.pass(stream, 0, update);
     }
 
-    /// The server says something to a seat on the newest stream.
-    fn told_to(&mut self, handle: u32, update: Update) {
+    /// The server sends an update to a seat on the newest stream.
+    fn receives_on(&mut self, handle: u32, update: Update) {
         self.pass(self.exam.streams.len() - 1, handle, update);
     }
 
@@ -222,7 +223,7 @@ impl Course {
         findings.map(|finding| finding.fault.code()).collect()
     }
 
-    /// Answers the server got.
+    /// Answers that the server received.
     fn answers(&self) -> Vec<(u64, u32)> {
         let answers = self.to_server.iter().filter_map(|command| match command {
             Command::Answer(answer) => Some((answer.decision_id, answer.action)),
@@ -232,7 +233,7 @@ impl Course {
     }
 }
 
-/// From joining to the first decision taken.
+/// From joining to the first accepted decision.
 fn begun() -> Vec<Step> {
     let mut steps = vec![Join, Attach(0)];
     steps.extend(played(1, 1));
@@ -242,10 +243,10 @@ fn begun() -> Vec<Step> {
 fn check(name: &str, case: &str, steps: impl IntoIterator<Item = Step>, expected: &[&str]) {
     let course = Course::of(case, begun().into_iter().chain(steps));
     assert_eq!(course.codes(), expected, "{name}");
-    assert!(course.exam.is_done(), "{name} comes to an end");
+    assert!(course.exam.is_done(), "{name} ends");
 }
 
-/// The game is over, and the agent leaves and ends as it should.
+/// The game is over, and the agent leaves and exits correctly.
 fn good_end() -> Vec<Step> {
     vec![game_over(), Leave, Exit(0)]
 }
