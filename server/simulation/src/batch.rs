@@ -34,7 +34,7 @@ pub struct Batch {
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum BatchError {
     /// The number of agents is not the number of seats.
-    #[error("{given} agents for {players} players: name one for each seat")]
+    #[error("{given} agents for {players} players: give one for each seat")]
     Agents {
         /// Agents given.
         given: usize,

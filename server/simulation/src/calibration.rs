@@ -1,8 +1,9 @@
-//! Whether ratings claim what is true: fields of made-up participants whose skills are known play games, and the ratings that come of these are
-//! held against the skills. Nobody plays Chef's Hat here; what is drawn is places.
+//! Tests the stated uncertainty of ratings: simulated participants with known skills play games, and
+//! the resulting ratings are compared with the skills. No cards are played here; only places are drawn.
 //!
-//! In a game everybody has a random performance around its skill, and the places are those of the performances (Plackett and Luce's model, with
-//! Gumbel noise), so that of any two the one beats the other as often as [`win_chance`](chefshat_tournament::ratings::win_chance) says.
+//! In a game everyone has a random performance around its skill, and places follow the performances
+//! (Plackett and Luce's model, with Gumbel noise), so that of any two participants one beats the other
+//! with the probability [`win_chance`](chefshat_tournament::ratings::win_chance).
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -14,25 +15,26 @@ use chefshat_tournament::ratings::BETA;
 use chefshat_tournament::ratings::{FIRST_MEAN, Rating};
 use chefshat_tournament::statistics::Moments;
 
-/// 95 % of a normal distribution lie within so many deviations of the mean.
+/// 95 % of a normal distribution lie within this many deviations of the mean.
 const Z95: f64 = 1.959_963_984_540_054;
 
-/// What fields are made.
+/// The fields to simulate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fields {
-    /// How many.
+    /// Number of fields.
     pub fields: u64,
-    /// Participants of each.
+    /// Participants of each field.
     pub participants: usize,
     /// Standard deviation of their skills, which are normally distributed.
     pub spread: f64,
     /// Players of a game, at most as many as there are participants.
     pub players: usize,
-    /// What all chance is drawn from.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// How the ratings compare with the skills after some rounds. Skills and ratings are taken relative to the mean of their field.
+/// Ratings compared with skills after a number of rounds. Both are taken relative to the mean of their
+/// field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Calibration {
     /// For each participant 1 if its skill is within 1.96 deviations of its rating's mean, else 0.
@@ -81,9 +83,10 @@ impl Calibration {
     }
 }
 
-/// Plays the fields and compares after each of these numbers of rounds, which ascend. In a round everybody plays one game, but for those that
-/// are left over. `update` is what a game does to the ratings of its players, as [`after_game`](chefshat_tournament::ratings::after_game) does. On the threads of the
-/// rayon pool it is called in; the result does not depend on them.
+/// Plays the fields and compares after each of these numbers of rounds, which ascend. In a round
+/// everyone plays one game, except for those left over. `update` computes the ratings after a game, as
+/// [`after_game`](chefshat_tournament::ratings::after_game) does. Runs on the current rayon pool, which
+/// does not affect the result.
 pub fn calibration(
     fields: &Fields,
     rounds: &[u32],
@@ -135,7 +138,7 @@ fn add_field(
     }
 }
 
-/// The places of a game, from 1, in the order of the table.
+/// Draws the places of a game, from 1, in the order of the table.
 fn places(table: &[usize], skills: &[f64], generator: &mut ChaCha8Rng) -> Vec<u32> {
     let performances: Vec<f64> = table
         .iter()
@@ -157,12 +160,12 @@ fn shuffle(order: &mut [usize], generator: &mut ChaCha8Rng) {
     }
 }
 
-/// Above 0 and below 1.
+/// A uniform number above 0 and below 1.
 fn uniform(generator: &mut ChaCha8Rng) -> f64 {
     ((generator.next_u64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
 }
 
-/// Of mean 0 and deviation 1, by Box and Muller's formula.
+/// A normal number with mean 0 and deviation 1, by Box and Muller's formula.
 fn normal(generator: &mut ChaCha8Rng) -> f64 {
     let length = (-2.0 * uniform(generator).ln()).sqrt();
     length * (TAU * uniform(generator)).cos()

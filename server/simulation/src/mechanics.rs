@@ -94,7 +94,7 @@ impl Condition {
             Condition::WithoutSpecialActions => spec.special_actions = false,
         }
         let rules = spec.validate();
-        Some(rules.expect("every preset makes sense without one of the mechanics"))
+        Some(rules.expect("every preset is valid without one of the mechanics"))
     }
 }
 

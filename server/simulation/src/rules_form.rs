@@ -1,11 +1,11 @@
-//! A rule set as JSON: every field by the name the rules give it, as the test vectors and the results of batches write it. What makes
-//! sense is decided by the engine, not here.
+//! A rule set as JSON, with the field names of the rules, as used by test vectors and results of
+//! batches. The engine validates it.
 
 use chefshat_engine::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A rule set with every field spelled out.
+/// A rule set with every field set.
 #[derive(Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RulesForm {
@@ -31,13 +31,13 @@ pub struct RulesForm {
     pub opening_pass: bool,
     /// `pizza` or `turn`.
     pub pass_scope: PassScopeName,
-    /// Pizzas in a row without a play after which somebody must play.
+    /// Consecutive pizzas without a play after which somebody must play.
     pub max_idle_pizzas: u32,
     /// Turns that end a Shift.
     pub max_turns: u32,
 }
 
-/// An opening by its name.
+/// The opening, by name.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OpeningName {
@@ -47,7 +47,7 @@ pub enum OpeningName {
     AnyTopFace,
 }
 
-/// The scope of a pass, by its name.
+/// The scope of a pass, by name.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PassScopeName {

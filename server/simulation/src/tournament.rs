@@ -73,7 +73,7 @@ fn play_called(
     let called: Vec<usize> = tournament.playing().collect();
     assert!(
         !called.is_empty(),
-        "a tournament of built-in agents goes on"
+        "a tournament of built-in agents always has a next game"
     );
     let changes: Vec<Change> = called
         .into_par_iter()
@@ -82,7 +82,7 @@ fn play_called(
             progress();
             tournament
                 .ended(index, ended)
-                .expect("it is one of the games that are being played")
+                .expect("it is one of the games being played")
         })
         .collect();
     changes.iter().for_each(|change| tournament.fold(change));

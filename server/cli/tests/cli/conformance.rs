@@ -131,10 +131,10 @@ fn what_is_no_file_of_vectors_is_refused() {
     let table = [
         (folder.path().join("missing.jsonl"), "No such file"),
         (folder.path().to_owned(), "is a folder"),
-        (write("empty", b""), "there are no vectors in it"),
+        (write("empty", b""), "the file has no vectors"),
         (
             write("binary", &[0, 159, 146, 150]),
-            "line 1 is not a vector: it is no JSON",
+            "line 1 is not a vector: it is not JSON",
         ),
         (
             write("foreign", b"{\"name\": \"chefshat\"}"),

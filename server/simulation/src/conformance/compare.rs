@@ -1,18 +1,19 @@
-//! Comparing what a vector expects with what the engine does. What is compared is decided in `game` and `deal`.
+//! Compares the expectations of a vector with the engine's results. `game` and `deal` decide what is
+//! compared.
 
 use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-/// The first place where the engine does not do what a vector says.
+/// The first place where the engine disagrees with a vector.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 #[error("{place}: expected {expected}, got {got}")]
 pub struct Disagreement {
-    /// What differs, in the words of the vector: for instance `steps[41], legal actions`.
+    /// What differs, in the terms of the vector: for instance `steps[41], legal actions`.
     pub place: String,
     /// Index from 0 of the step where it was found; `None` for a deal.
     pub step: Option<usize>,
-    /// What the vector says, as JSON or in words.
+    /// The vector's value, as JSON or in words.
     pub expected: String,
     /// The engine's result, as JSON or in words.
     pub got: String,
@@ -43,7 +44,7 @@ pub(super) fn agree(
 }
 
 fn json(value: impl Serialize) -> Value {
-    serde_json::to_value(value).expect("vectors are made of numbers, words and lists")
+    serde_json::to_value(value).expect("vectors consist of numbers, strings and lists")
 }
 
 /// Why a line fails.
@@ -52,7 +53,7 @@ pub enum LineError {
     /// The engine disagrees.
     #[error(transparent)]
     Disagrees(#[from] Disagreement),
-    /// The line is no vector.
+    /// The line is not a vector.
     #[error("{0}")]
     Unreadable(String),
 }

@@ -1,4 +1,4 @@
-//! Replaying a vector of one deal.
+//! Checks a vector of one deal.
 
 use chefshat_engine::{Card, Deal, Seat, Seed};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::compare::{LineError, agree, unreadable};
 use crate::RulesForm;
 
-/// A deal made by another engine.
+/// A deal by another engine.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DealVector {

@@ -1,4 +1,4 @@
-//! Replaying a vector of a whole game.
+//! Checks a vector of a complete game.
 
 use chefshat_engine::{ActionId, Event, Game, Seed, SpecialAction};
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,7 @@ pub(super) fn check(vector: GameVector) -> Result<u64, LineError> {
     let step = vector.steps.len();
     let Some(standings) = game.standings() else {
         let expected = format!("the game's end after {step}");
-        return Err(in_words("steps", step, expected, "a game that goes on".into()).into());
+        return Err(in_words("steps", step, expected, "a game that continues".into()).into());
     };
     let last = step.checked_sub(1);
     agree("number of shifts", last, vector.shifts.len(), game.shift())?;
@@ -109,7 +109,7 @@ fn in_words(place: &str, step: usize, expected: String, got: String) -> Disagree
     }
 }
 
-/// Describes which actions a list lacks and which it has in excess.
+/// Describes which actions a list lacks and which it has in addition.
 fn difference(expected: &[u16], got: &[u16]) -> String {
     let without = |these: &[u16], those: &[u16]| -> Vec<u16> {
         let rest = these.iter().filter(|action| !those.contains(action));
@@ -118,13 +118,13 @@ fn difference(expected: &[u16], got: &[u16]) -> String {
     let (lacks, more) = (without(expected, got), without(got, expected));
     let mut words = String::new();
     if !lacks.is_empty() {
-        words += &format!(", which lacks {lacks:?}");
+        words += &format!(", without {lacks:?}");
     }
     if !more.is_empty() {
-        words += &format!(", too many by {more:?}");
+        words += &format!(", with {more:?} in addition");
     }
     if words.is_empty() {
-        // The vector has the same actions, but one of them twice or not in order.
+        // The vector has the same actions, but one of them twice or in another order.
         words += ", each once, ascending";
     }
     words

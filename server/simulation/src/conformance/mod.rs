@@ -1,5 +1,5 @@
-//! Checking the engine against test vectors: files of one JSON object a line, each a deal or a whole game as another engine played it. This
-//! file reads lines and says which of them agree; how a line is replayed is in `game` and `deal`.
+//! Checks the engine against test vectors: files with one JSON object per line, each a deal or a
+//! complete game of another engine. This file reads lines; `game` and `deal` check them.
 
 mod compare;
 mod deal;
@@ -34,7 +34,7 @@ impl Agreed {
     }
 }
 
-/// What came of a file: how many vectors agreed until the first that did not, or the end.
+/// The result for a file: the vectors that agreed up to the first failure or the end.
 #[derive(Debug)]
 pub struct Report {
     /// Vectors that agreed.
@@ -46,20 +46,20 @@ pub struct Report {
 /// Why checking stopped. Lines are counted from 1.
 #[derive(Debug, Error)]
 pub enum Failure {
-    /// The engine does not do what the vector says.
+    /// The engine disagrees with the vector.
     #[error("line {line} does not agree: {disagreement}")]
     Disagrees {
         /// The line.
         line: u64,
-        /// Where, what was expected, what came out.
+        /// The place, the expected value and the engine's value.
         disagreement: Disagreement,
     },
-    /// The line is no vector.
+    /// The line is not a vector.
     #[error("line {line} is not a vector: {reason}")]
     Unreadable {
         /// The line.
         line: u64,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
     /// The file cannot be read.
@@ -67,11 +67,11 @@ pub enum Failure {
     Read {
         /// The line.
         line: u64,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// The file has no vectors.
-    #[error("there are no vectors in it: one JSON object a line was expected")]
+    #[error("the file has no vectors: expected one JSON object per line")]
     Empty,
 }
 
@@ -118,10 +118,10 @@ pub fn check(mut input: impl BufRead, mut progress: impl FnMut(u64)) -> Report {
 /// Checks one line and counts it if it agrees. Its keys tell whether it is a deal or a game.
 ///
 /// # Errors
-/// If it is no vector, or the engine does something else.
+/// It is not a vector, or the engine disagrees.
 pub fn check_line(line: &[u8], agreed: &mut Agreed) -> Result<(), LineError> {
     let value: Value = serde_json::from_slice(line)
-        .map_err(|error| LineError::Unreadable(format!("it is no JSON: {error}")))?;
+        .map_err(|error| LineError::Unreadable(format!("it is not JSON: {error}")))?;
     if value.get("steps").is_some() {
         agreed.steps += game::check(parse(value)?)?;
         agreed.games += 1;

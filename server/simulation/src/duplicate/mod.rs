@@ -111,7 +111,7 @@ pub enum DuplicateError {
     Deals(u64),
     /// A network does not fit the rules, so that it would play as `greedy`.
     #[error(
-        "{who} was trained for {players} players, {faces} faces and hands of {hand_size} cards, and does not know games of another size"
+        "{who} was trained for {players} players, {faces} faces and hands of {hand_size} cards, and cannot play games of another size"
     )]
     DoesNotFit {
         /// `A` or `B`.
@@ -148,7 +148,7 @@ impl Duplicate {
         };
         let rules = spec
             .validate()
-            .expect("a rule set makes sense with any number of Shifts");
+            .expect("a rule set is valid with any number of Shifts");
         for (who, contender) in ["A", "B"].into_iter().zip(&contenders) {
             if let Contender::Network(network) = contender
                 && !network.fits(&rules)

@@ -35,7 +35,7 @@ pub enum StepError {
     },
     /// An illegal action, if that is an error.
     #[error(
-        "row {row} (game {game}, seat {seat}): action {} is not legal there; take one of the row's mask, or set invalid actions to be asked again",
+        "row {row} (game {game}, seat {seat}): action {} is not legal; choose one of the row's mask, or set invalid_actions to ASK_AGAIN",
         action.index()
     )]
     Illegal {
@@ -49,7 +49,7 @@ pub enum StepError {
         action: ActionId,
     },
     /// There is no such game to reset.
-    #[error("there is no game {game}: the games are 0 to {last}")]
+    #[error("game {game} does not exist: the games are 0 to {last}")]
     NoGame {
         /// The game named.
         game: u32,
@@ -57,7 +57,7 @@ pub enum StepError {
         last: u32,
     },
     /// Games to reset are repeated or out of order.
-    #[error("game {game} is named twice or out of order: name games ascending, each once")]
+    #[error("game {game} is repeated or out of order: list games ascending, each once")]
     Order {
         /// The game named.
         game: u32,
@@ -65,7 +65,7 @@ pub enum StepError {
     /// Records of running games exceed the limit. The games have advanced and cannot be used any
     /// more.
     #[error(
-        "more than {MAX_KEPT} decisions and invalid attempts are kept of games that go on: play fewer or shorter games at a time, or without records"
+        "the records of running games exceed {MAX_KEPT} decisions and invalid attempts: play fewer or shorter games at a time, or without records"
     )]
     Kept,
 }

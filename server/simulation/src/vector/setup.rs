@@ -105,7 +105,7 @@ pub struct VectorSetup {
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 pub enum SetupError {
     /// The number of entries is not the number of seats.
-    #[error("{given} seats are filled, but {players} play")]
+    #[error("{given} seats are filled, but the game has {players}")]
     Seats {
         /// Entries given.
         given: usize,
@@ -126,7 +126,7 @@ pub enum SetupError {
         seats: usize,
     },
     /// The total number of games is below the number of parallel games.
-    #[error("{total} games in all are fewer than the {games} that are played side by side")]
+    #[error("{total} games in total are fewer than the {games} parallel games")]
     Total {
         /// Total number of games.
         total: u64,

@@ -1,4 +1,4 @@
-//! The vectors of `tests/fixtures/vectors` agree, and every kind of damage is reported where it is.
+//! The vectors of `tests/fixtures/vectors` agree, and every kind of damage is located.
 
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read};
@@ -130,16 +130,16 @@ fn damage_to_a_game_is_located() {
 #[test]
 fn wrong_legal_actions_are_listed() {
     let table: [(&str, Damage); 4] = [
-        (", which lacks [0]", |game| {
+        (", without [0]", |game| {
             game["steps"][1][2]
                 .as_array_mut()
                 .unwrap()
                 .insert(0, json!(0))
         }),
-        (", too many by [199]", |game| {
+        (", with [199] in addition", |game| {
             drop(game["steps"][1][2].as_array_mut().unwrap().pop())
         }),
-        (", which lacks [0], too many by [199]", |game| {
+        (", without [0], with [199] in addition", |game| {
             let legal = game["steps"][1][2].as_array_mut().unwrap();
             legal.insert(0, json!(0));
             legal.pop();
@@ -162,7 +162,7 @@ fn a_shortened_or_extended_game_is_reported() {
     });
     assert_eq!(
         (place.as_str(), got.as_str()),
-        ("steps", "a game that goes on"),
+        ("steps", "a game that continues"),
         "{expected}"
     );
     let (place, _, _, got) = damaged("games.jsonl", |game| {
@@ -222,8 +222,8 @@ fn lines_that_are_not_vectors_are_explained() {
         vector.to_string()
     };
     let table = [
-        ("hello".to_owned(), "it is no JSON"),
-        ("{\"rules\": ".to_owned(), "it is no JSON"),
+        ("hello".to_owned(), "it is not JSON"),
+        ("{\"rules\": ".to_owned(), "it is not JSON"),
         ("[1, 2]".to_owned(), "it is neither a game"),
         (
             "{\"name\": \"chefshat\"}".to_owned(),

@@ -213,7 +213,7 @@ fn deals_are_the_same_in_all_seatings_and_random_choices_are_not() {
         assert_eq!(other.hands, first.hands);
         assert!(
             !orders.contains(&other.order),
-            "agents that draw do so anew"
+            "agents that draw do so independently"
         );
         orders.push(other.order);
     }

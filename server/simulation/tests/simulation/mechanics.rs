@@ -95,7 +95,7 @@ fn the_paper_s_number_of_shifts_is_one_game_with_these_figures() {
 }
 
 #[test]
-fn more_shifts_are_more_games_and_of_the_last_only_the_first_count() {
+fn further_shifts_come_from_further_games_of_which_the_last_counts_in_part() {
     let rules = All.rules("paper").unwrap();
     let games = Batch::new(rules, &[AgentKind::Random; 4], 3, 5)
         .unwrap()
@@ -140,7 +140,7 @@ fn any_number_of_threads_gives_the_same_table() {
 }
 
 #[test]
-fn the_paper_s_figures_are_those_it_prints() {
+fn the_stored_figures_are_those_of_the_paper() {
     let printed = Condition::ALL.map(|condition| {
         let paper = condition.paper();
         (paper.starter_wins, paper.laps)

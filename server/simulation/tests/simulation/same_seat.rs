@@ -25,7 +25,7 @@ fn measured(random_percent: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> 
 #[test]
 fn identical_agents_do_not_differ_on_the_same_deals() {
     let [same] = measured([0, 0], 1, &[200])[..] else {
-        panic!("one was asked for")
+        panic!("one result was requested")
     };
     assert_eq!(
         (same.games, same.difference, same.duplicate_error),

@@ -98,7 +98,7 @@ fn duplicate_deals_are_the_same_cards() {
         standings
             .iter()
             .all(|line| line.score == standings[0].score),
-        "everybody has played every hand"
+        "everyone has played every hand"
     );
 }
 

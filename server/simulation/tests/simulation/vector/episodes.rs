@@ -25,7 +25,7 @@ fn rewards_add_up_to_the_statistics() {
             let (mut games, mut batch) = VectorGames::new(setup);
             // By game and seat, within the running episode: rewards received, and rewards by the
             // Shifts' statistics.
-            let mut told: BTreeMap<(u32, u8), f64> = BTreeMap::new();
+            let mut received: BTreeMap<(u32, u8), f64> = BTreeMap::new();
             let mut counted: BTreeMap<(u32, u8), f64> = BTreeMap::new();
             let (mut wrong, mut episodes, mut brought) = (0u64, 0, false);
             loop {
@@ -40,17 +40,21 @@ fn rewards_add_up_to_the_statistics() {
                 let rewards = f32s(&endings.rewards);
                 for (row, game) in u32s(&endings.games).into_iter().enumerate() {
                     let key = (game, endings.seats[row]);
-                    let told = told.remove(&key).unwrap_or(0.0) + f64::from(rewards[row]);
+                    let received = received.remove(&key).unwrap_or(0.0) + f64::from(rewards[row]);
                     let counted = counted.remove(&key).unwrap();
-                    let close = (told - counted).abs() < 1e-3;
-                    assert!(close, "{} by {episode:?}: {told} {counted}", scheme.name());
+                    let close = (received - counted).abs() < 1e-3;
+                    assert!(
+                        close,
+                        "{} by {episode:?}: {received} {counted}",
+                        scheme.name()
+                    );
                     episodes += 1;
-                    brought |= told != 0.0;
+                    brought |= received != 0.0;
                 }
                 let rewards = f32s(&batch.rewards);
                 for (row, game) in u32s(&batch.games).into_iter().enumerate() {
                     let reward = f64::from(rewards[row]);
-                    *told.entry((game, batch.seats[row])).or_default() += reward;
+                    *received.entry((game, batch.seats[row])).or_default() += reward;
                 }
                 wrong += u32s(&shifts.wrong).into_iter().map(u64::from).sum::<u64>();
                 if batch.done {
@@ -67,7 +71,7 @@ fn rewards_add_up_to_the_statistics() {
             }
             assert_eq!(batch.totals.games, 8);
             assert!(wrong > 100 && batch.totals.invalid_attempts == wrong);
-            assert!(told.is_empty() && counted.is_empty());
+            assert!(received.is_empty() && counted.is_empty());
             assert!(brought && episodes >= 8 * 4, "{}", scheme.name());
         }
     }
@@ -205,21 +209,21 @@ fn statistics_of_a_shift_joined_midway_count_from_there() {
         .with_rewards(Some(RewardScheme::PaperIntended))
         .with_statistics(true);
     let (mut games, mut batch) = VectorGames::new(setup);
-    let mut told = [0.0; 4];
+    let mut received = [0.0; 4];
     while batch.shifts.rows == 0 {
         batch = games.step(&some_actions(&batch)).unwrap();
         for (seat, reward) in batch.seats.iter().zip(f32s(&batch.rewards)) {
-            told[usize::from(*seat)] += reward;
+            received[usize::from(*seat)] += reward;
         }
     }
     for (seat, reward) in batch.endings.seats.iter().zip(f32s(&batch.endings.rewards)) {
-        told[usize::from(*seat)] += reward;
+        received[usize::from(*seat)] += reward;
     }
     let counted: u32 = u32s(&batch.shifts.valid).iter().sum();
     assert_eq!(u32s(&batch.shifts.turns), [counted + turns]);
     // The rewards of the places match those received.
-    for (sum, told) in f32s(&batch.shifts.reward_sums).into_iter().zip(told) {
-        assert!((sum - told).abs() < 1e-4, "{sum} {told}");
+    for (sum, received) in f32s(&batch.shifts.reward_sums).into_iter().zip(received) {
+        assert!((sum - received).abs() < 1e-4, "{sum} {received}");
     }
 }
 

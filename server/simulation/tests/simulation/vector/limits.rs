@@ -226,7 +226,7 @@ fn records_in_memory_are_bounded() {
             Err(error) => break error,
         }
         steps += 1;
-        assert!(2 * steps <= MAX_KEPT, "nothing ends it");
+        assert!(2 * steps <= MAX_KEPT, "no limit was reached");
     };
     assert_eq!(error, StepError::Kept);
     assert_eq!(2 * (steps + 1), MAX_KEPT + 2);
@@ -252,5 +252,5 @@ fn a_step_has_bounded_work() {
         left_out += 16_384 - batch.rows;
         assert!(!batch.done);
     }
-    assert!(left_out > 0, "the bound was not reached, and nothing shown");
+    assert!(left_out > 0, "the limit was never reached");
 }

@@ -159,7 +159,7 @@ fn games_restart_on_request() {
     assert_eq!(
         u64s(&some.beginnings.indices),
         [4],
-        "game 1 goes on with index 1 + 3"
+        "game 1 continues with index 1 + 3"
     );
     assert_eq!(some.rows, 3);
     let part = |batch: &Batch, row: usize| batch.observations.hands[row * 12..][..12].to_vec();
@@ -169,7 +169,7 @@ fn games_restart_on_request() {
     assert_eq!(
         u64s(&again.beginnings.indices),
         [3, 7, 5],
-        "each goes on with its next index"
+        "each continues with its next index"
     );
     let again = games.reset(Some(Seeds::Base(7)));
     assert_eq!(u64s(&again.beginnings.indices), [0, 1, 2]);
