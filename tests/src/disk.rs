@@ -1,4 +1,4 @@
-//! A small disk of its own for a test, which can be filled up or made read-only without harm to anybody else.
+//! A small separate disk for a test, which can be filled up or made read-only without side effects.
 
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -9,13 +9,13 @@ use tempfile::TempDir;
 use tokio::io::{AsyncBufReadExt as _, BufReader};
 use tokio::process::{Child, Command};
 
-/// Says, also where the output of tests is captured, that a test cannot be run here.
+/// Reports, even if the output of tests is captured, that a test cannot run here.
 pub fn skip(test: &str, why: &str) {
-    // If nobody can be told, nobody is told.
+    // If the message cannot be written, there is nothing else to do.
     let _ = writeln!(std::io::stderr(), "SKIPPED {test}: {why}");
 }
 
-/// A file system in memory, mounted where only those see it who are let into its namespace; gone when dropped.
+/// An in-memory file system in its own mount namespace, unmounted when dropped.
 #[derive(Debug)]
 pub struct SmallDisk {
     holder: Child,
@@ -24,12 +24,12 @@ pub struct SmallDisk {
 }
 
 impl SmallDisk {
-    /// A disk of so many KiB.
+    /// Creates a disk of this size, in KiB.
     ///
     /// # Errors
-    /// Why this machine allows none.
+    /// This machine does not allow it.
     pub async fn new(kib: u32) -> Result<Self, String> {
-        // The right to mount is root's; others have it in a namespace of users of their own, where the system lets them make one.
+        // Only root may mount; other users may in a user namespace, if the system allows one.
         match Self::make(kib, false).await {
             Ok(disk) => Ok(disk),
             Err(as_root) => Self::make(kib, true)
@@ -57,7 +57,7 @@ impl SmallDisk {
             .kill_on_drop(true)
             .spawn()
             .map_err(|error| format!("unshare: {error}"))?;
-        let stdout = holder.stdout.take().expect("it is piped");
+        let stdout = holder.stdout.take().expect("a pipe");
         let mut line = String::new();
         let said = BufReader::new(stdout).read_line(&mut line).await;
         if said.is_ok() && line.trim() == "mounted" {
@@ -72,12 +72,12 @@ impl SmallDisk {
         Err(stderr.map_or_else(|error| error.to_string(), |text| text.trim().to_owned()))
     }
 
-    /// Where it is mounted, for those who are in its namespace.
+    /// The mount point, for processes in its namespace.
     pub fn mounted_at(&self) -> &Path {
         self.folder.path()
     }
 
-    /// The program that lets another one in, with its arguments.
+    /// The program that runs another one in the namespace, with its arguments.
     pub fn enter(&self) -> Vec<OsString> {
         let target = format!("--target={}", self.id());
         let mut words = vec!["nsenter".into(), target.into(), "--mount".into()];
@@ -87,7 +87,7 @@ impl SmallDisk {
         words
     }
 
-    /// The way to it from outside.
+    /// The path from outside the namespace.
     pub fn path(&self) -> PathBuf {
         let root = PathBuf::from(format!("/proc/{}/root", self.id()));
         let inside = self
@@ -100,12 +100,12 @@ impl SmallDisk {
 
     /// Fills it up with a file of this name.
     pub fn fill(&self, name: &str) {
-        let mut file = std::fs::File::create(self.path().join(name)).expect("it is made");
+        let mut file = std::fs::File::create(self.path().join(name)).expect("a new file");
         let piece = [0xa5; 4096];
         while file.write_all(&piece).is_ok() {}
     }
 
-    /// From now on nothing can be written to it.
+    /// Makes it read-only.
     pub async fn make_read_only(&self) {
         let mut enter = self.enter().into_iter();
         let status = Command::new(enter.next().expect("the program"))
@@ -118,6 +118,6 @@ impl SmallDisk {
     }
 
     fn id(&self) -> u32 {
-        self.holder.id().expect("it sleeps for ever")
+        self.holder.id().expect("it sleeps forever")
     }
 }

@@ -1,4 +1,5 @@
-//! What clients sent and what they were told, kept apart from any server, so that it can be compared with what a server says it has kept.
+//! Records what clients sent and received, independently of any server, for comparison with what a
+//! server has stored.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -10,7 +11,7 @@ use tokio::sync::watch;
 /// A decision: its game, its seat, its number.
 type Key = (String, u32, u64);
 
-/// Every answer of every agent, and every acknowledgement.
+/// All answers of all agents, and all acknowledgements.
 #[derive(Debug, Default)]
 pub struct Ledger {
     sent: Mutex<BTreeMap<Key, u32>>,
@@ -20,7 +21,7 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// An agent whose answers are noted here.
+    /// Wraps an agent whose answers are recorded here.
     pub fn noting<A: Agent>(self: &Arc<Self>, agent: A) -> Noted<A> {
         Noted {
             agent,
@@ -30,12 +31,12 @@ impl Ledger {
         }
     }
 
-    /// Decisions that were acknowledged so far.
+    /// Number of acknowledged decisions.
     pub fn count(&self) -> u64 {
         *self.count.borrow()
     }
 
-    /// Waits until so many decisions have been acknowledged.
+    /// Waits until this number of decisions have been acknowledged.
     pub async fn reaches(&self, count: u64) {
         let mut counted = self.count.subscribe();
         counted
@@ -44,28 +45,30 @@ impl Ledger {
             .expect("the ledger holds the sender");
     }
 
-    /// Notes something that ought not to have happened.
+    /// Records something that must not happen.
     pub fn surprise(&self, what: String) {
-        self.surprises.lock().expect("nobody panics").push(what);
+        self.surprises.lock().expect("no panic").push(what);
     }
 
-    /// Panics if something happened that ought not to.
+    /// Checks that nothing unexpected happened.
     ///
     /// # Panics
-    /// That is what it is for.
+    /// Something unexpected happened.
     pub fn assert_no_surprise(&self) {
-        let surprises = self.surprises.lock().expect("nobody panics");
+        let surprises = self.surprises.lock().expect("no panic");
         assert!(surprises.is_empty(), "{surprises:#?}");
     }
 
-    /// Compares the record of a game with what the clients know: every acknowledged decision stands in it once, as it was acknowledged, and
+    /// Compares the record of a game with the clients' knowledge: it contains every acknowledged decision
+    /// once, unchanged, and every decision it attributes to their agents was taken by one. Returns the
+    /// number of acknowledged decisions.
     /// every decision that it says an agent of theirs took is one that the agent took. Gives the number of acknowledged decisions.
     ///
     /// # Panics
     /// At the first difference.
-    pub fn assert_kept(&self, game: &str, record: &[v1::RecordLine]) -> usize {
-        let sent = self.sent.lock().expect("nobody panics");
-        let accepted = self.accepted.lock().expect("nobody panics");
+    pub fn assert_committed(&self, game: &str, record: &[v1::RecordLine]) -> usize {
+        let sent = self.sent.lock().expect("no panic");
+        let accepted = self.accepted.lock().expect("no panic");
         let mut found = BTreeSet::new();
         let mut acknowledged = 0;
         for line in record {
@@ -76,12 +79,12 @@ impl Ledger {
             if decision.source() == v1::DecisionSource::Agent
                 && let Some(action) = sent.get(&key)
             {
-                assert_eq!(*action, decision.action, "{key:?} is not what was answered");
+                assert_eq!(*action, decision.action, "{key:?} differs from the answer");
             }
             if let Some(action) = accepted.get(&key) {
                 assert_eq!(
                     *action, decision.action,
-                    "{key:?} was acknowledged otherwise"
+                    "{key:?} differs from its acknowledgement"
                 );
                 assert_eq!(decision.source(), v1::DecisionSource::Agent, "{key:?}");
                 acknowledged += 1;
@@ -94,7 +97,7 @@ impl Ledger {
     }
 }
 
-/// An agent whose answers and acknowledgements are noted.
+/// An agent whose answers and acknowledgements are recorded.
 #[derive(Debug)]
 pub struct Noted<A> {
     agent: A,
@@ -113,12 +116,12 @@ impl<A: Agent> Agent for Noted<A> {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let action = self.agent.decide(request);
         let key = self.key(request.decision_id);
-        let mut sent = self.ledger.sent.lock().expect("nobody panics");
+        let mut sent = self.ledger.sent.lock().expect("no panic");
         let before = sent.insert(key.clone(), action.0);
         drop(sent);
-        // An agent is asked again only if its answer was refused, and these are never.
+        // An agent is asked again only after a refused answer, and these answers are never refused.
         if before.is_some() {
-            self.ledger.surprise(format!("{key:?} was asked for twice"));
+            self.ledger.surprise(format!("{key:?} was requested twice"));
         }
         action
     }
@@ -144,7 +147,7 @@ impl<A: Agent> Agent for Noted<A> {
             let surprise = format!("{key:?} was answered with {result:?}");
             return self.ledger.surprise(surprise);
         }
-        let mut accepted = self.ledger.accepted.lock().expect("nobody panics");
+        let mut accepted = self.ledger.accepted.lock().expect("no panic");
         let before = accepted.insert(key.clone(), result.action);
         drop(accepted);
         match before {

@@ -1,5 +1,6 @@
-//! What the whole-system tests share: a server on a free port, in this process or in one of its own, rooms on it, seats that do exactly
-//! what a test tells them, over real sockets, and a ledger of what agents were told. Agents that play by themselves come from the SDKs.
+//! Shared by the system tests: a server on a free port, in this process or in its own, rooms on it,
+//! seats that a test controls step by step over real sockets, and a ledger of what agents received.
+//! Agents that play on their own come from the SDKs.
 
 /// The samples of the README, compiled.
 #[doc = include_str!("../../README.md")]
@@ -22,15 +23,15 @@ pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agent
 
 use std::time::Duration;
 
-/// How long a test waits for something that must happen before it says that it did not. Never a measure of speed.
+/// How long a test waits for something that must happen. Never a measure of speed.
 pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Waits for something that must happen.
 ///
 /// # Panics
-/// When it does not.
+/// It does not happen.
 pub async fn patiently<T>(what: &str, future: impl Future<Output = T>) -> T {
     tokio::time::timeout(PATIENCE, future)
         .await
-        .unwrap_or_else(|_| panic!("waited in vain for {what}"))
+        .unwrap_or_else(|_| panic!("timed out waiting for {what}"))
 }

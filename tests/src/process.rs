@@ -1,5 +1,5 @@
-//! A server in a process of its own: the real binary, started, killed and started again on the same address, as an operator or an accident
-//! would. A server within the test's own process is in `server`.
+//! A server in its own process: the real binary, started, killed and restarted on the same address.
+//! `server` runs one in the test's process.
 
 use std::ffi::OsString;
 use std::net::Ipv4Addr;
@@ -14,17 +14,18 @@ use tokio::task::JoinHandle;
 
 use crate::patiently;
 
-/// What `cargo xtask test` has set up and names in the environment: the binary, an interpreter, a folder.
+/// A path that `cargo xtask test` prepares and passes in the environment: the binary, an interpreter, a
+/// folder.
 ///
 /// # Panics
-/// When it is not named.
+/// The variable is not set.
 pub fn set_up(name: &str) -> PathBuf {
     std::env::var_os(name)
         .map(PathBuf::from)
-        .unwrap_or_else(|| panic!("{name} is not set: run this test by `cargo xtask test`"))
+        .unwrap_or_else(|| panic!("{name} is not set: run this test with `cargo xtask test`"))
 }
 
-/// How a server is started, again and again on the same folder and address.
+/// How to start a server, repeatedly on the same folder and address.
 #[derive(Debug)]
 pub struct Launch {
     data_dir: PathBuf,
@@ -34,7 +35,7 @@ pub struct Launch {
 }
 
 impl Launch {
-    /// A server on this folder, at an address of its own.
+    /// A server on this folder, at its own address.
     pub fn new(data_dir: &Path) -> Self {
         Self {
             data_dir: data_dir.to_path_buf(),
@@ -44,21 +45,21 @@ impl Launch {
         }
     }
 
-    /// With one more option of `chefshat serve`.
+    /// Adds an option of `chefshat serve`.
     #[must_use]
     pub fn with(mut self, name: &str, value: impl ToString) -> Self {
         self.arguments.extend([name.to_owned(), value.to_string()]);
         self
     }
 
-    /// Started by another program, which must become the server or pass its end on.
+    /// Starts it through another program, which must become the server or pass on its exit.
     #[must_use]
     pub fn through(mut self, program: impl IntoIterator<Item = impl Into<OsString>>) -> Self {
         self.through = program.into_iter().map(Into::into).collect();
         self
     }
 
-    /// No longer by another program.
+    /// Starts it directly again.
     pub fn by_itself(&mut self) {
         self.through.clear();
     }
@@ -68,12 +69,12 @@ impl Launch {
         &self.data_dir
     }
 
-    /// Where it listens: an address that stays the same from the first start on.
+    /// Its address, the same after every start.
     pub fn url(&self) -> String {
         format!("http://{}", self.listen)
     }
 
-    /// Starts the process, whatever becomes of it.
+    /// Starts the process without waiting for it.
     pub fn spawn(&self) -> Process {
         let mut words = self.through.iter().cloned();
         let binary = set_up("CHEFSHAT_BIN").into_os_string();
@@ -90,11 +91,11 @@ impl Launch {
             .stderr(Stdio::piped())
             .kill_on_drop(true)
             .spawn()
-            .expect("the binary runs");
-        let mut stderr = child.stderr.take().expect("it is piped");
+            .expect("the binary starts");
+        let mut stderr = child.stderr.take().expect("a pipe");
         let said = tokio::spawn(async move {
             let mut bytes = Vec::new();
-            // What was read before an error is all there is.
+            // Text read before an error is all there is.
             let _ = stderr.read_to_end(&mut bytes).await;
             String::from_utf8_lossy(&bytes).into_owned()
         });
@@ -104,14 +105,14 @@ impl Launch {
     /// Starts the server and waits until it listens.
     ///
     /// # Errors
-    /// How it ended if it does not come so far.
+    /// It exited before.
     pub async fn start(&mut self) -> Result<Process, Ended> {
         let mut process = self.spawn();
-        let stdout = process.child.stdout.take().expect("it is piped");
+        let stdout = process.child.stdout.take().expect("a pipe");
         let mut lines = BufReader::new(stdout).lines();
         let line = patiently("the server to listen", lines.next_line())
             .await
-            .expect("it writes text");
+            .expect("text");
         let Some(line) = line else {
             return Err(process.ended().await);
         };
@@ -125,61 +126,61 @@ impl Launch {
     }
 }
 
-/// A server that was started. Killed when dropped.
+/// A running server. Killed when dropped.
 #[derive(Debug)]
 pub struct Process {
     child: Child,
     said: JoinHandle<String>,
 }
 
-/// How a server ended.
+/// How a server exited.
 #[derive(Debug)]
 pub struct Ended {
     /// Its exit status.
     pub status: ExitStatus,
-    /// What it said on standard error.
+    /// Its standard error.
     pub said: String,
 }
 
 impl Process {
-    /// The number of the process that was started.
+    /// The id of the process.
     pub fn id(&self) -> u32 {
         self.child.id().expect("it has not been waited for")
     }
 
-    /// SIGKILL, and waits until there is nothing left of it.
+    /// Sends SIGKILL and waits until the process is gone.
     pub async fn kill(mut self) -> Ended {
-        self.child.start_kill().expect("it is a child of ours");
+        self.child.start_kill().expect("a child process");
         self.ended().await
     }
 
-    /// SIGTERM, as an operator would.
+    /// Sends SIGTERM.
     pub async fn request_stop(&self) {
         let id = self.id().to_string();
         let asked = Command::new("kill").args(["-TERM", &id]).status().await;
         assert!(asked.expect("kill runs").success());
     }
 
-    /// SIGTERM, and waits until it has ended.
+    /// Sends SIGTERM and waits until it has exited.
     pub async fn stop(self) -> Ended {
         self.request_stop().await;
         self.ended().await
     }
 
-    /// Waits until it has ended.
+    /// Waits until it has exited.
     pub async fn ended(mut self) -> Ended {
         let status = patiently("the server to end", self.child.wait())
             .await
-            .expect("it is a child of ours");
-        let said = patiently("its last words", self.said)
+            .expect("a child process");
+        let said = patiently("the rest of its output", self.said)
             .await
             .expect("reading does not panic");
         Ended { status, said }
     }
 }
 
-/// An address of the loopback network that no other test of this machine listens on. Connections come from 127.0.0.1: a client that tries
-/// to connect while the server is away can thus never be given the server's own port to connect from.
+/// A loopback address that no other test of this machine listens on. Connections come from 127.0.0.1,
+/// so a client that tries to connect while the server is down never gets the server's port.
 fn own_address() -> Ipv4Addr {
     static NEXT: AtomicU8 = AtomicU8::new(1);
     let [_, _, high, low] = std::process::id().to_be_bytes();

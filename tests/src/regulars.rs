@@ -1,5 +1,5 @@
-//! Rooms that are always being played, by agents of the SDK over real connections that find their way back by themselves: when a game
-//! ends, the next is made. What they were told stands in a `Ledger`.
+//! Rooms that are played all the time by agents of the SDK over real connections, which reconnect on
+//! their own: after each game the next room is created. A `Ledger` records what they receive.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,16 +17,16 @@ use tonic::Code;
 
 use crate::{Ledger, PATIENCE, patiently};
 
-/// Wait before a call is made again that did not reach the server.
+/// Pause before repeating a call that did not reach the server.
 const AGAIN_AFTER: Duration = Duration::from_millis(10);
-/// How the agents come back: soon, and as long as a test is patient.
+/// How the agents reconnect: fast, and as long as a test waits.
 const BACKOFF: Backoff = Backoff {
     first: Duration::from_millis(5),
     max: Duration::from_millis(40),
     give_up_after: PATIENCE,
 };
 
-/// What a regular's games are like.
+/// The games of a regular room.
 #[derive(Debug, Clone)]
 pub struct Habit {
     /// The rules.
@@ -37,9 +37,9 @@ pub struct Habit {
     pub built_in: usize,
     /// Whether the seats share a stream.
     pub one_stream: bool,
-    /// How events reach the seats.
+    /// How events are delivered to the seats.
     pub delivery: v1::EventDelivery,
-    /// Longest time an agent thinks.
+    /// Longest thinking time of an agent.
     pub pace: Duration,
 }
 
@@ -47,7 +47,7 @@ impl Default for Habit {
     fn default() -> Self {
         Self {
             rules: v1::RuleSet::default(),
-            // Nobody is to be late.
+            // Generous, so that no agent times out.
             policy: v1::RoomPolicy {
                 decision_time_ms: Some(3_600_000),
                 ..v1::RoomPolicy::default()
@@ -60,17 +60,17 @@ impl Default for Habit {
     }
 }
 
-/// Rooms that are always being played.
+/// Rooms that are played all the time.
 #[derive(Debug)]
 pub struct Regulars {
-    /// What they were told.
+    /// What they received.
     pub ledger: Arc<Ledger>,
     leaving: watch::Sender<bool>,
     rooms: JoinSet<Vec<String>>,
 }
 
 impl Regulars {
-    /// A room of each habit, on the server with this URL, which may be away at times.
+    /// Starts a room for each habit, on the server with this URL, which may be down at times.
     pub fn come(url: &str, habits: Vec<Habit>) -> Self {
         let ledger = Arc::new(Ledger::default());
         let leaving = watch::Sender::new(false);
@@ -91,7 +91,8 @@ impl Regulars {
         }
     }
 
-    /// They play what they have begun to its end, and go. Gives the ids of all their games, each of which they saw finish.
+    /// Lets the running games end and stops. Returns the ids of all their games, each of which ended with
+    /// a result.
     pub async fn leave(self) -> Vec<String> {
         self.leaving.send_replace(true);
         let games = patiently("the last games to end", self.rooms.join_all()).await;
@@ -127,7 +128,7 @@ impl Room {
         games
     }
 
-    /// A room with all its tickets. `None` where a seat was taken and the ticket for it was lost with the connection.
+    /// Creates a room and takes its seats. `None` if a ticket was lost with the connection.
     async fn open(&self, client: &Client) -> Option<(String, Vec<String>)> {
         let open = 4 - self.habit.built_in;
         let request = v1::CreateRoomRequest {
@@ -141,7 +142,7 @@ impl Room {
                 .collect(),
             ..v1::CreateRoomRequest::default()
         };
-        let created = again("making a room", || client.create_room(request.clone())).await;
+        let created = again("creating a room", || client.create_room(request.clone())).await;
         let room = created.room.expect("a room");
         let mut tickets = Vec::new();
         for seat in 0..open {
@@ -151,7 +152,7 @@ impl Room {
                 seat: u32::try_from(seat).ok(),
                 ..v1::JoinRoomRequest::default()
             };
-            // A room that was acknowledged is there, whatever has happened since.
+            // A room that was acknowledged exists, whatever has happened since.
             let joined = again("joining", || {
                 client.join(request.clone()).map(|joined| match joined {
                     Err(error) if error.reason() == Some("SEAT_TAKEN") => Ok(None),
@@ -200,7 +201,7 @@ impl Room {
     }
 }
 
-/// Makes a call until it reaches the server.
+/// Repeats a call until it reaches the server.
 async fn again<T, F>(what: &str, call: impl Fn() -> F) -> T
 where
     F: Future<Output = Result<T, Error>>,
@@ -209,7 +210,7 @@ where
         loop {
             match call().await {
                 Ok(done) => return done,
-                // A broken connection has no reason; what is unavailable has one, and says that it may be tried again.
+                // A broken connection has no reason; UNAVAILABLE has one and may be repeated.
                 Err(error)
                     if error.reason().is_none()
                         || error.code() == Code::Unavailable
@@ -224,7 +225,7 @@ where
     patiently(what, reaching).await
 }
 
-/// An agent that thinks for a while.
+/// An agent that takes some time to decide.
 struct Paced<A> {
     agent: A,
     pace: Duration,

@@ -1,4 +1,4 @@
-//! A seat on a Play stream that does exactly what a test tells it.
+//! A seat on a Play stream that a test controls step by step.
 
 use std::collections::VecDeque;
 
@@ -12,26 +12,26 @@ use tonic::{Status, Streaming};
 
 use crate::TestServer;
 
-/// One Play stream with one seat attached, or more if the test attaches more.
+/// A Play stream with one seat attached, or more if the test attaches more.
 #[derive(Debug)]
 pub struct StreamSeat {
     requests: Option<mpsc::Sender<v1::PlayRequest>>,
     responses: Streaming<v1::PlayResponse>,
     waiting: VecDeque<v1::SeatUpdate>,
-    /// Number of the last event seen.
+    /// Number of the last event received.
     pub last_event: u64,
-    /// Every event seen, in order.
+    /// All events received, in order.
     pub events: Vec<v1::GameEvent>,
 }
 
 impl StreamSeat {
-    /// A stream with nothing attached.
+    /// A stream without attached seats.
     pub async fn open(channel: Channel) -> Self {
         let (requests, receiver) = mpsc::channel(64);
         let responses = PlayServiceClient::new(channel)
             .play(ReceiverStream::new(receiver))
             .await
-            .expect("the stream opens")
+            .expect("a stream")
             .into_inner();
         Self {
             requests: Some(requests),
@@ -47,7 +47,7 @@ impl StreamSeat {
         Self::attached_from(channel, ticket, 0).await
     }
 
-    /// A stream with a seat attached from a certain event on.
+    /// A stream with a seat attached from this event on.
     pub async fn attached_from(channel: Channel, ticket: &str, from_sequence: u64) -> Self {
         let mut seat = Self::open(channel).await;
         seat.last_event = from_sequence.saturating_sub(1);
@@ -68,7 +68,7 @@ impl StreamSeat {
         self.send_to(0, command).await;
     }
 
-    /// Sends a command.
+    /// Sends a command for a handle.
     pub async fn send_to(&self, handle: u32, command: Command) {
         let request = v1::PlayRequest {
             commands: vec![v1::SeatCommand {
@@ -104,28 +104,29 @@ impl StreamSeat {
         self.requests = None;
     }
 
-    /// The next update that is not a batch of events; those are kept in `events`. A stream that ends is a failure.
+    /// The next update that is not a batch of events; those are stored in `events`. Panics if the stream
+    /// ends.
     pub async fn next(&mut self) -> Update {
         self.next_or_end()
             .await
             .expect("no error")
-            .expect("the stream goes on")
+            .expect("the stream continues")
     }
 
-    /// The same; `None` when the stream ends.
+    /// Like `next`, but returns `None` when the stream ends.
     ///
     /// # Errors
-    /// The status by which the stream ends otherwise.
+    /// The stream ends with this status.
     pub async fn next_or_end(&mut self) -> Result<Option<Update>, Status> {
         loop {
             while let Some(update) = self.waiting.pop_front() {
-                match update.update.expect("an update says something") {
+                match update.update.expect("an update") {
                     Update::Events(batch) => {
                         for event in batch.events {
                             assert_eq!(
                                 event.sequence,
                                 self.last_event + 1,
-                                "no gap, nothing twice"
+                                "no gap and no repetition"
                             );
                             self.last_event = event.sequence;
                             self.events.push(event);
@@ -141,7 +142,7 @@ impl StreamSeat {
         }
     }
 
-    /// The next decision; results of answers are passed over.
+    /// The next decision request; results of answers are skipped.
     pub async fn decision(&mut self) -> v1::DecisionRequest {
         loop {
             match self.next().await {
@@ -163,7 +164,7 @@ impl StreamSeat {
 
 /// Index of the first legal action.
 pub fn first_legal(decision: &v1::DecisionRequest) -> u32 {
-    (0..8 * u32::try_from(decision.action_mask.len()).expect("a mask is short"))
+    (0..8 * u32::try_from(decision.action_mask.len()).expect("a short mask"))
         .find(|action| is_legal(decision, *action))
         .expect("a decision has a legal action")
 }
@@ -177,7 +178,7 @@ pub fn is_legal(decision: &v1::DecisionRequest, action: u32) -> bool {
         .is_some_and(|bits| bits & (1 << (action % 8)) != 0)
 }
 
-/// Answers every decision with the first legal action until the seat is detached; says why it was.
+/// Answers every decision with the first legal action until the seat is detached; returns the reason.
 pub async fn play_on(seat: &mut StreamSeat) -> v1::DetachReason {
     loop {
         match seat.next().await {
@@ -192,14 +193,14 @@ pub async fn play_on(seat: &mut StreamSeat) -> v1::DetachReason {
     }
 }
 
-/// The first update that any of the seats hears, and which seat heard it.
+/// The first update that any of the seats receives, and that seat's index.
 pub async fn first_to_hear(seats: &mut [StreamSeat]) -> (Update, usize) {
     let listening = seats.iter_mut().map(|seat| Box::pin(seat.next()));
     let (update, index, _) = futures::future::select_all(listening).await;
     (update, index)
 }
 
-/// A stream of its own for each ticket, attached from its seat's first event on.
+/// Opens a stream for each ticket, attached from its seat's first event on.
 pub async fn attach_all(server: &TestServer, tickets: &[String]) -> Vec<StreamSeat> {
     let mut seats = Vec::new();
     for ticket in tickets {

@@ -18,19 +18,19 @@ use tonic::transport::Channel;
 /// A server that runs until it is stopped or dropped.
 #[derive(Debug)]
 pub struct TestServer {
-    /// Where it listens.
+    /// Its address.
     pub address: SocketAddr,
     data: TempDir,
     host: Host,
 }
 
 impl TestServer {
-    /// A server with a memory store and records in a folder of its own.
+    /// A server with a memory store and its own data folder.
     pub async fn start() -> Self {
         Self::with(|_| {}, Arc::new(MemoryStore::default())).await
     }
 
-    /// A server configured by `configure`, with a store of the test's choice.
+    /// A server configured by `configure`, with this store.
     pub async fn with(configure: impl FnOnce(&mut ServerConfig), store: Arc<dyn Store>) -> Self {
         let data = tempfile::tempdir().expect("a temporary folder");
         let mut config = ServerConfig {
@@ -57,7 +57,7 @@ impl TestServer {
         self.data.path()
     }
 
-    /// A connection of its own to the server.
+    /// A separate connection to the server.
     pub async fn channel(&self) -> Channel {
         Channel::from_shared(self.url())
             .expect("a URL")
@@ -66,22 +66,22 @@ impl TestServer {
             .expect("the server listens")
     }
 
-    /// An SDK client with a connection of its own.
+    /// An SDK client with a separate connection.
     pub async fn client(&self) -> Client {
         Client::connect(&self.url())
             .await
             .expect("the server listens")
     }
 
-    /// Asks the server to stop.
+    /// Requests a stop of the server.
     pub fn request_stop(&self) {
         self.host.request_stop();
     }
 
-    /// Waits until the server has ended by itself.
+    /// Waits until the server has ended on its own.
     ///
     /// # Errors
-    /// Why it did.
+    /// The reason why it ended.
     pub async fn ended(self) -> Result<(), ServeError> {
         match self.host.ended().await {
             Ok(()) => Ok(()),
@@ -90,16 +90,16 @@ impl TestServer {
         }
     }
 
-    /// Stops the server and waits until it has ended; gives the folder it leaves behind.
+    /// Stops the server and waits until it has ended; returns its data folder.
     pub async fn stop(self) -> TempDir {
         crate::patiently("the server to stop", self.host.stop())
             .await
-            .expect("the server ends well");
+            .expect("a clean end");
         self.data
     }
 }
 
-/// Asks for a game of one Shift.
+/// Rules for games of one Shift.
 pub fn one_shift() -> v1::RuleSet {
     v1::RuleSet {
         stop: Some(v1::rule_set::Stop::TargetShifts(1)),
@@ -107,7 +107,7 @@ pub fn one_shift() -> v1::RuleSet {
     }
 }
 
-/// A room of four open seats with this policy and these rules, and the four tickets in seat order.
+/// Creates a room with four open seats, this policy and these rules; returns the tickets in seat order.
 pub async fn room_of_four(
     client: &Client,
     rules: v1::RuleSet,
@@ -120,7 +120,7 @@ pub async fn room_of_four(
             ..v1::CreateRoomRequest::default()
         })
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let mut tickets = Vec::new();
     for seat in 0..4 {
         let joined = client
@@ -131,13 +131,13 @@ pub async fn room_of_four(
                 ..v1::JoinRoomRequest::default()
             })
             .await
-            .expect("the seat is free");
+            .expect("a free seat");
         tickets.push(joined.ticket);
     }
     (created, tickets)
 }
 
-/// A random agent of the SDK for each ticket, each with a seed of its own.
+/// A random agent of the SDK for each ticket, each with its own seed.
 pub fn random_agents(tickets: Vec<String>) -> Vec<(String, RandomAgent)> {
     tickets
         .into_iter()
@@ -155,7 +155,8 @@ pub async fn play_out(server: &TestServer, tickets: Vec<String>) {
     }
 }
 
-/// A spectator that need not read: its window is small, so that what it does not read waits at the server, not in this process.
+/// A spectator that does not read: its window is small, so that unread data waits at the server, not in
+/// this process.
 pub async fn narrow_spectator(
     server: &TestServer,
     room_id: String,
@@ -172,6 +173,6 @@ pub async fn narrow_spectator(
             ..v1::SpectatorServiceWatchRequest::default()
         })
         .await
-        .expect("it may watch")
+        .expect("a stream")
         .into_inner()
 }

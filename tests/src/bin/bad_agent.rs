@@ -1,5 +1,6 @@
-//! An agent that plays well but for one fault, which it is told to have: what the examiner must find. `bad_agent none ADDRESS CODE` plays
-//! without one; with another word behind, in a tournament. It speaks the protocol as it is, for an SDK would keep it from most of this.
+//! An agent that plays well except for one fault, given by name: the examiner must find it. `bad_agent
+//! none ADDRESS CODE` plays without a fault; a further argument makes it play in a tournament. It uses
+//! the protocol directly, because an SDK would prevent most of these faults.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -15,12 +16,12 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;
 
-/// Longer than any examination waits.
+/// Longer than any examination.
 const FOREVER: Duration = Duration::from_secs(600);
 
 type Failure = Box<dyn std::error::Error>;
 
-/// What is known across connections.
+/// State kept across connections.
 struct Agent {
     fault: String,
     tournament: bool,
@@ -127,7 +128,7 @@ async fn enter(channel: &Channel, code: &str, fault: &str) -> Result<String, Fai
     Ok(joined.into_inner().ticket)
 }
 
-/// Sends commands on a stream.
+/// The sending side of a stream.
 struct Voice(mpsc::Sender<v1::PlayRequest>);
 
 impl Voice {
@@ -136,7 +137,7 @@ impl Voice {
             handle,
             command: Some(command),
         };
-        // When the stream is lost the other side of it says so.
+        // If the stream is lost, the receiving side reports it.
         let _lost = self
             .0
             .send(v1::PlayRequest {
@@ -160,7 +161,7 @@ fn answer(decision_id: u64, action: u32) -> v1::Answer {
 }
 
 impl Agent {
-    /// One stream, until it is lost or the game is over.
+    /// Plays on one stream until it is lost or the game is over.
     async fn play(&mut self, channel: Channel) -> Result<End, Failure> {
         let (requests, queue) = mpsc::channel(16);
         let mut responses = PlayServiceClient::new(channel)
@@ -237,13 +238,13 @@ impl Agent {
         let id = decision.decision_id;
         let legal = first_legal(decision);
         let illegal = (0..).find(|action| !is_legal(decision, *action));
-        let illegal = illegal.expect("a mask has an end");
+        let illegal = illegal.expect("some action is illegal");
         match self.fault.as_str() {
             "silent" => {}
-            // As if the seats that the server attaches were somebody else's.
+            // As if the seats attached by the server belonged to another client.
             "own-handles" if handle > 0 => {}
             "always-illegal" => voice.answer(handle, id, illegal).await,
-            // As if all decisions were alike.
+            // As if all masks were the same.
             "ignores-mask" => {
                 voice
                     .answer(handle, id, u32::try_from(id % 7).expect("small"))
@@ -290,7 +291,7 @@ impl Agent {
                 voice.say(handle, Command::Answer(answer)).await;
             }
             "bad-expression" => {
-                // Without a label it says nothing.
+                // Without a label it is invalid.
                 let expression = v1::Expression::default();
                 voice.say(handle, Command::Express(expression)).await;
                 voice.answer(handle, id, legal).await;

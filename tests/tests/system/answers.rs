@@ -1,4 +1,4 @@
-//! Answers that are late, wrong, repeated, or for another decision.
+//! Answers that are late, illegal, repeated, or for another decision.
 
 use chefshat_proto::Timestamp;
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
@@ -7,7 +7,7 @@ use chefshat_tests::{
     room_of_four,
 };
 
-/// The seat whose decision is open first, on a stream of its own, with its decision; and the others.
+/// Attaches all seats; returns the seat with the first open decision, that decision, and the others.
 async fn first_to_act(
     server: &TestServer,
     policy: v1::RoomPolicy,
@@ -15,7 +15,7 @@ async fn first_to_act(
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), policy).await;
     let mut seats = attach_all(server, &tickets).await;
-    // Events come with decisions: only the seat that is asked hears anything.
+    // Events come with decisions: only the seat that is asked receives anything.
     let (update, index) = first_to_hear(&mut seats).await;
     let Update::Decision(decision) = update else {
         panic!("no decision, but {update:?}");
@@ -27,7 +27,7 @@ async fn first_to_act(
 fn illegal(decision: &v1::DecisionRequest) -> u32 {
     (0..300)
         .find(|action| !is_legal(decision, *action))
-        .expect("not everything is legal")
+        .expect("some action is illegal")
 }
 
 async fn finish(mut seats: Vec<StreamSeat>) -> Vec<StreamSeat> {
@@ -48,7 +48,7 @@ fn sources(seat: &StreamSeat) -> Vec<v1::DecisionSource> {
 }
 
 #[tokio::test]
-async fn a_deadline_that_passes_takes_the_default_and_says_so() {
+async fn a_passed_deadline_takes_the_default_and_reports_it() {
     let server = TestServer::start().await;
     let policy = v1::RoomPolicy {
         decision_time_ms: Some(10),
@@ -57,7 +57,7 @@ async fn a_deadline_that_passes_takes_the_default_and_says_so() {
         ..v1::RoomPolicy::default()
     };
     let (mut late, decision, others) = first_to_act(&server, policy).await;
-    // The seat keeps silent until it is told of its next decision: the first was taken for it.
+    // The seat does not answer until its next decision: the default was taken for the first.
     let next = late.decision().await;
     assert_eq!(next.decision_id, decision.decision_id + 1);
     assert_eq!(sources(&late)[0], v1::DecisionSource::Timeout);
@@ -71,7 +71,7 @@ async fn a_deadline_that_passes_takes_the_default_and_says_so() {
         }
     };
     assert_eq!(result.status(), v1::AnswerStatus::Closed);
-    assert_eq!(result.invalid_attempts_left, None, "no strike");
+    assert_eq!(result.invalid_attempts_left, None, "not an invalid attempt");
     drop((late, others));
 }
 
@@ -85,7 +85,7 @@ async fn ten_invalid_answers_take_the_default() {
         let result = wrong.result().await;
         assert_eq!(result.status(), v1::AnswerStatus::Invalid);
         assert_eq!(result.invalid_attempts_left, Some(left));
-        assert!(!result.detail.is_empty(), "it says why");
+        assert!(!result.detail.is_empty(), "it gives a reason");
     }
     others.push(wrong);
     let seats = finish(others).await;
@@ -99,7 +99,7 @@ async fn ten_invalid_answers_take_the_default() {
 }
 
 #[tokio::test]
-async fn an_answer_counts_once_however_often_it_comes() {
+async fn a_repeated_answer_counts_once() {
     let server = TestServer::start().await;
     let (mut seat, decision, mut others) = first_to_act(&server, v1::RoomPolicy::default()).await;
     let action = first_legal(&decision);
@@ -136,7 +136,7 @@ async fn an_answer_counts_once_however_often_it_comes() {
 }
 
 #[tokio::test]
-async fn nothing_said_along_with_an_answer_spoils_the_record() {
+async fn bad_annotations_and_expressions_do_not_spoil_the_record() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -167,7 +167,7 @@ async fn nothing_said_along_with_an_answer_spoils_the_record() {
         }),
     }))
     .await;
-    // The same again is acknowledged at once, and the same.
+    // A repetition is acknowledged at once, with the same result.
     seat.answer(decision.decision_id, first_legal(&decision))
         .await;
     let first = seat.result().await;
@@ -178,6 +178,6 @@ async fn nothing_said_along_with_an_answer_spoils_the_record() {
     let game_id = created.room.expect("a room").game_id;
     let data = server.stop().await;
     let path = chefshat_record::jsonl::path_of(data.path(), &game_id);
-    let record = chefshat_record::jsonl::read(&path).expect("it was written and reads back");
-    chefshat_record::replay::replay(&record).expect("it replays");
+    let record = chefshat_record::jsonl::read(&path).expect("a readable record");
+    chefshat_record::replay::replay(&record).expect("a valid record");
 }

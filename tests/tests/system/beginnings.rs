@@ -1,4 +1,4 @@
-//! Games from given hands, recorded players in games that they do not know, and beginnings that are refused.
+//! Games from given hands, recorded players in unfamiliar games, and invalid starts.
 
 use chefshat_proto::v1::{self, create_room_request::Start, game_event::Kind};
 use chefshat_record::convert::{script_from_proto, script_to_proto};
@@ -14,7 +14,7 @@ async fn recorded_players_play_other_games_too() {
     let mut courses = Vec::new();
     for _ in 0..2 {
         let request = v1::CreateRoomRequest {
-            // Another deck and another table than the one they know.
+            // Another deck and number of players than in their own game.
             rules: Some(v1::RuleSet {
                 players: Some(3),
                 faces: Some(9),
@@ -29,16 +29,17 @@ async fn recorded_players_play_other_games_too() {
     assert!(courses[0].len() > 30);
     assert_eq!(
         courses[0], courses[1],
-        "they are functions of what they see"
+        "they depend only on their observations"
     );
 }
 
 #[tokio::test]
-async fn a_game_begins_with_the_hands_it_is_given() {
+async fn a_game_starts_with_given_hands() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
-    // The hands of the second Shift, to begin another game with: once as its first Shift, once as a later one with roles and points.
+    // The hands of the second Shift start another game: once as its first Shift, once as a later one with
+    // roles and points.
     let dealt = first
         .deals_and_results()
         .into_iter()
@@ -46,7 +47,7 @@ async fn a_game_begins_with_the_hands_it_is_given() {
             Kind::ShiftStarted(started) if started.shift == 2 => Some(started.hands),
             _ => None,
         });
-    let hands = dealt.expect("it has a second Shift");
+    let hands = dealt.expect("a second Shift");
     let scripts = [
         v1::ScriptedShift {
             hands: hands.clone(),
@@ -68,7 +69,7 @@ async fn a_game_begins_with_the_hands_it_is_given() {
         };
         let game = ended(&client, request).await;
         let Some(Kind::ShiftStarted(started)) = game.deals_and_results().into_iter().next() else {
-            panic!("a game begins with a deal");
+            panic!("a game starts with a deal");
         };
         assert_eq!(started.hands, hands);
         assert_eq!(started.shift, script.shift.max(1));
@@ -85,11 +86,11 @@ async fn a_game_begins_with_the_hands_it_is_given() {
         }
         assert_eq!(game.room.origin(), v1::GameOrigin::Scripted);
         let rules = *game.positions()[0].rules();
-        let given = script_from_proto(&script, &rules).expect("it was accepted");
-        let start = game.header().start.clone().expect("how it began");
+        let given = script_from_proto(&script, &rules).expect("an accepted script");
+        let start = game.header().start.clone().expect("a start");
         assert_eq!(start.scripted, Some(script_to_proto(&given, rules.faces())));
 
-        // And branches from there, which keeps the hands.
+        // A branch of it has the same hands.
         let branch = ended(
             &client,
             v1::CreateRoomRequest {
@@ -105,7 +106,7 @@ async fn a_game_begins_with_the_hands_it_is_given() {
 }
 
 #[tokio::test]
-async fn beginnings_that_make_no_sense_are_refused_with_the_reason() {
+async fn invalid_starts_are_refused_with_a_reason() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
@@ -113,7 +114,7 @@ async fn beginnings_that_make_no_sense_are_refused_with_the_reason() {
     let waiting = client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let running = waiting.room.expect("a room").game_id;
     let unknown = "00".repeat(16);
     let branch = |start| v1::CreateRoomRequest {
@@ -184,7 +185,7 @@ async fn beginnings_that_make_no_sense_are_refused_with_the_reason() {
     ];
     for (request, reason, field) in cases {
         let refused = client.create_room(request.clone()).await;
-        let error = refused.expect_err("it makes no sense");
+        let error = refused.expect_err("an invalid start");
         assert_eq!(error.reason(), Some(reason), "{request:?}");
         let named = error.metadata().get("field").map(String::as_str);
         assert_eq!(named, Some(field), "{request:?}");
@@ -193,6 +194,6 @@ async fn beginnings_that_make_no_sense_are_refused_with_the_reason() {
     let info = client.server_info().await.expect("the server answers");
     assert_eq!(
         info.open_rooms, 1,
-        "nothing was made beyond the one that waits"
+        "nothing was created except the waiting room"
     );
 }

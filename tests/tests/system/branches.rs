@@ -1,4 +1,4 @@
-//! Games that go on where recorded ones stood, with the recorded players in their seats and with others.
+//! Games that branch from recorded ones, with the recorded players in their seats and with others.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, game_event::Kind, seat_config::FilledBy};
@@ -10,7 +10,7 @@ use crate::played::{
 };
 
 #[tokio::test]
-async fn a_branch_with_its_players_and_deals_is_the_game_again() {
+async fn a_branch_with_its_players_and_deals_repeats_the_game() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
@@ -47,7 +47,7 @@ async fn a_branch_with_its_players_and_deals_is_the_game_again() {
         assert_eq!(branch.room.branched_from, said);
         assert_eq!(branch.room.origin(), v1::GameOrigin::Branched);
         assert_eq!(branch.header().origin(), v1::GameOrigin::Branched);
-        let start = branch.header().start.clone().expect("how it began");
+        let start = branch.header().start.clone().expect("a start");
         assert_eq!(start.branched_from, said);
         let players: Vec<_> = (branch.room.seats.iter())
             .map(|seat| {
@@ -62,7 +62,7 @@ async fn a_branch_with_its_players_and_deals_is_the_game_again() {
 }
 
 #[tokio::test]
-async fn others_in_the_seats_make_another_game_of_the_same_beginning() {
+async fn other_players_continue_a_branch_differently() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
@@ -82,7 +82,7 @@ async fn others_in_the_seats_make_another_game_of_the_same_beginning() {
         .await;
         let other = branch.course();
         assert_eq!(other[..decisions], course[..decisions]);
-        // The Shift that was being played has the hands that it had.
+        // The Shift of the point has the same hands.
         let position = |game: &EndedGame| game.positions()[decisions].clone();
         let (then, now) = (position(&first), position(&branch));
         assert_eq!((then.hands(), then.scores()), (now.hands(), now.scores()));
@@ -91,7 +91,7 @@ async fn others_in_the_seats_make_another_game_of_the_same_beginning() {
         }
         assert_eq!(branch.room.seed_commitment.len(), 32, "later deals are new");
 
-        // The branch is a record like any other: branch from it in turn, at its own part.
+        // The branch has a record like any other: branch from it in turn, within its own part.
         let again = other.len() - 1;
         let twig = ended(
             &client,
@@ -108,7 +108,7 @@ async fn others_in_the_seats_make_another_game_of_the_same_beginning() {
 }
 
 #[tokio::test]
-async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
+async fn a_participant_of_a_branch_receives_the_past_and_continues() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
@@ -125,7 +125,7 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
             ..v1::CreateRoomRequest::default()
         })
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let joined = client
         .join(v1::JoinRoomRequest {
             join_code: created.join_code,
@@ -133,11 +133,11 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
             ..v1::JoinRoomRequest::default()
         })
         .await
-        .expect("a seat is free");
+        .expect("a free seat");
     assert_eq!(joined.seat, 2);
     let mut seat = StreamSeat::attached(server.channel().await, &joined.ticket).await;
     let asked = seat.decision().await;
-    // What it was asked first is what its predecessor was asked then.
+    // Its first request is what its predecessor was asked at that point.
     let before = first.decisions();
     let own_before = before[..mid_shift].iter().filter(|one| one.seat == 2);
     let next = before[mid_shift..].iter().find(|one| one.seat == 2);
@@ -147,7 +147,7 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
         (asked.decision_id, asked.action_mask.clone()),
         (next.decision_id, next.action_mask.clone())
     );
-    // All that happened before is told, as it may see it.
+    // It receives all earlier events, redacted for it.
     let taken_over = seat.events.iter().filter(|event| {
         let source = match &event.kind {
             Some(Kind::Play(play)) => play.source(),
@@ -168,12 +168,12 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
     for hand in hands {
         assert_eq!(hand.iter().map(|hand| hand.seat).collect::<Vec<_>>(), [2]);
     }
-    // It plays as its predecessor did once more, and then as it likes.
+    // It repeats one more decision of its predecessor, and then decides on its own.
     seat.answer(asked.decision_id, next.action).await;
     assert_eq!(play_on(&mut seat).await, v1::DetachReason::GameOver);
     let room_id = created.room.expect("a room").room_id;
     let ended = patiently("the game to end", until_over(&client, room_id)).await;
-    replay(&ended.lines).expect("its record fits");
+    replay(&ended.lines).expect("a valid record");
     let course = first.course();
     let same = ended
         .course()
@@ -185,16 +185,18 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
 }
 
 #[tokio::test]
-async fn a_branch_and_its_players_outlive_the_server() {
+async fn a_branch_and_its_players_survive_a_restart() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut launch = Launch::new(folder.path());
-    let mut server = launch.start().await.expect("it starts");
-    let mut client = Client::connect(launch.url()).await.expect("it listens");
+    let mut server = launch.start().await.expect("the server starts");
+    let mut client = Client::connect(launch.url())
+        .await
+        .expect("the server listens");
     let first = original(&client).await;
     let course = first.course();
     let [_, decisions, ..] = points(&first);
     let mut restarts = 0;
-    // Killed at once, while decisions are taken over or told, and later.
+    // Killed at once, while decisions are taken over or published, and later.
     for further in [0, 1, 10, 40] {
         let created = client
             .create_room(v1::CreateRoomRequest {
@@ -207,13 +209,13 @@ async fn a_branch_and_its_players_outlive_the_server() {
                 ..v1::CreateRoomRequest::default()
             })
             .await
-            .expect("the room is made");
+            .expect("a new room");
         let room = created.room.expect("a room");
         let mut watching = client.spectate(&room.room_id, 0);
         let mut own = 0;
         while own < further {
-            let event = watching.next().await.expect("it can be watched");
-            let source = match event.expect("it goes on").kind {
+            let event = watching.next().await.expect("a watched room");
+            let source = match event.expect("an event").kind {
                 Some(Kind::Play(play)) => play.source(),
                 Some(Kind::Pass(pass)) => pass.source(),
                 _ => continue,
@@ -221,10 +223,12 @@ async fn a_branch_and_its_players_outlive_the_server() {
             own += u32::from(source == v1::DecisionSource::Agent);
         }
         server.kill().await;
-        server = launch.start().await.expect("it starts again");
-        client = Client::connect(launch.url()).await.expect("it listens");
+        server = launch.start().await.expect("the server restarts");
+        client = Client::connect(launch.url())
+            .await
+            .expect("the server listens");
         let branch = patiently("the game to end", until_over(&client, room.room_id)).await;
-        replay(&branch.lines).expect("its record fits");
+        replay(&branch.lines).expect("a valid record");
         assert_eq!(branch.course(), course, "killed after {further}");
         assert_eq!(branch.deals_and_results(), first.deals_and_results());
         restarts += branch.events(|kind| matches!(kind, Kind::ServerRestarted(_)));

@@ -1,4 +1,4 @@
-//! Connections that come, go, and come twice.
+//! Connections that are lost, re-established or duplicated.
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
@@ -23,7 +23,7 @@ async fn until_asked(seats: &mut [StreamSeat], seat: usize) -> v1::DecisionReque
 }
 
 #[tokio::test]
-async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
+async fn a_reconnected_seat_receives_missed_events_and_its_open_decision() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -34,9 +34,9 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
     let first_half = gone.events.clone();
     drop(gone);
 
-    // Everybody hears of it; a spectator that starts now too.
+    // All seats learn of it, and a spectator that starts now.
     let mut watching = client.spectate(room_id(&created), 0);
-    while let Some(event) = watching.next().await.expect("the room can be watched") {
+    while let Some(event) = watching.next().await.expect("a watched room") {
         if matches!(
             event.kind,
             Some(Kind::Disconnected(v1::Disconnected { seat: 2 }))
@@ -51,7 +51,7 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
     assert_eq!(again.action_mask, decision.action_mask);
     assert!(
         again.time_left_ms <= decision.time_left_ms,
-        "the clock ran on"
+        "the clock kept running"
     );
     let action = first_legal(&again);
     back.answer(again.decision_id, action).await;
@@ -59,8 +59,8 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
     let reasons = futures::future::join_all(seats.iter_mut().map(play_on)).await;
     assert_eq!(reasons, [v1::DetachReason::GameOver; 4]);
 
-    // What the seat saw in two parts is what another saw in one, but for private fields.
-    let back = seats.pop().expect("it came back");
+    // The events in two parts equal those of another seat in one, except for private fields.
+    let back = seats.pop().expect("the reconnected seat");
     let all: Vec<u64> = first_half
         .iter()
         .chain(&back.events)
@@ -76,7 +76,7 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
 }
 
 #[tokio::test]
-async fn the_newest_connection_wins_and_the_older_is_told() {
+async fn the_newest_connection_wins_and_the_older_is_detached() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -90,7 +90,7 @@ async fn the_newest_connection_wins_and_the_older_is_told() {
         }
         other => panic!("not detached, but {other:?}"),
     }
-    // What the older one still says is not heard: this would be a strike, or the answer.
+    // Messages of the older one are ignored: this would be an invalid attempt, or the answer.
     older.answer(decision.decision_id, 9999).await;
     let again = newer.decision().await;
     assert_eq!(again.decision_id, decision.decision_id);
@@ -103,7 +103,7 @@ async fn the_newest_connection_wins_and_the_older_is_told() {
 }
 
 #[tokio::test]
-async fn leaving_by_word_or_by_half_close_ends_what_it_should() {
+async fn detaching_and_half_closing_end_the_right_things() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -113,7 +113,7 @@ async fn leaving_by_word_or_by_half_close_ends_what_it_should() {
         Update::Detached(detached) => assert_eq!(detached.reason(), v1::DetachReason::Requested),
         other => panic!("not detached, but {other:?}"),
     }
-    // The handle means nothing any more; the stream goes on.
+    // The handle is no longer valid; the stream continues.
     seat.answer(1, 0).await;
     match seat.next().await {
         Update::Refused(refused) => assert_eq!(refused.reason, "HANDLE_UNKNOWN"),
@@ -124,7 +124,7 @@ async fn leaving_by_word_or_by_half_close_ends_what_it_should() {
 }
 
 #[tokio::test]
-async fn a_snapshot_stands_in_for_the_events_so_far() {
+async fn a_snapshot_replaces_the_past_events() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -156,10 +156,5 @@ async fn a_snapshot_stands_in_for_the_events_so_far() {
 }
 
 fn room_id(created: &v1::CreateRoomResponse) -> String {
-    created
-        .room
-        .as_ref()
-        .expect("a room was made")
-        .room_id
-        .clone()
+    created.room.as_ref().expect("a new room").room_id.clone()
 }

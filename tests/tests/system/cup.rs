@@ -1,5 +1,6 @@
-//! A tournament of sixteen as it is in life: agents in three languages and processes of their own, one that crashes, one that is silent, one
-//! that floods, one that never comes; and a server that is killed in the middle, twice.
+//! A realistic tournament of sixteen: agents in three languages and their own processes, one that
+//! crashes, one that is silent, one that floods, one that never joins its games; and a server that is
+//! killed twice in the middle.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -19,15 +20,15 @@ use tokio_stream::wrappers::ReceiverStream;
 
 const PARTICIPANTS: u32 = 16;
 const ROUNDS: u32 = 3;
-/// Tables of a round.
+/// Tables per round.
 const TABLES: u32 = 4;
-/// Agents of the SDK in this process.
+/// SDK agents in this process.
 const REGULARS: u32 = 6;
-/// How long the agent that crashes lives at first, and by how much it lives longer each time: however slow the machine is, it is there at
-/// some time.
+/// Lifetime of the crashing agent at first, and how much longer it lives each time, so that it is
+/// present at some point even on a slow machine.
 const LIFE: Duration = Duration::from_millis(150);
 const LIVES_LONGER: Duration = Duration::from_millis(10);
-/// What the agent that floods sends at a time, and how long it waits then.
+/// Messages per burst of the flooding agent, and the pause between bursts.
 const FLOOD: u32 = 500;
 const BETWEEN_FLOODS: Duration = Duration::from_millis(20);
 
@@ -69,14 +70,14 @@ async fn ticket(client: &Client, code: &str, name: &str, max_games: u32) -> Stri
         ..v1::JoinTournamentRequest::default()
     };
     let joined = client.join_tournament(request).await;
-    joined.expect("there is a place").ticket
+    joined.expect("joined").ticket
 }
 
 /// Plays to the end with the SDK.
 fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcome>, PlayError>> {
     let url = url.to_owned();
     tokio::spawn(async move {
-        // The server may be away just now.
+        // The server may be down at this moment.
         let client = loop {
             match Client::connect(&url).await {
                 Ok(client) => break client,
@@ -88,7 +89,7 @@ fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcom
     })
 }
 
-/// Dies again and again, and comes back each time knowing nothing but its ticket.
+/// An agent that crashes repeatedly and returns with nothing but its ticket.
 fn crashing(url: &str, ticket: String) -> JoinHandle<()> {
     let url = url.to_owned();
     tokio::spawn(async move {
@@ -105,12 +106,12 @@ fn crashing(url: &str, ticket: String) -> JoinHandle<()> {
     })
 }
 
-/// Attaches, listens and never says a word; comes back when the connection is lost.
+/// An agent that attaches and never sends an answer; it reconnects when the connection is lost.
 fn silent(url: &str, ticket: String) -> JoinHandle<()> {
     noisy(url, ticket, 0)
 }
 
-/// Sends rubbish faster than anybody can read it, and never an answer to what it is asked.
+/// An agent that sends garbage faster than it can be processed, and never a valid answer.
 fn flooding(url: &str, ticket: String) -> JoinHandle<()> {
     noisy(url, ticket, FLOOD)
 }
@@ -120,7 +121,7 @@ fn noisy(url: &str, ticket: String, at_a_time: u32) -> JoinHandle<()> {
     tokio::spawn(async move {
         loop {
             if let Ok(client) = Client::connect(&url).await {
-                // However it ends, it begins again.
+                // However it ends, it starts again.
                 let _ = make_noise(client, &ticket, at_a_time).await;
             }
             tokio::time::sleep(BETWEEN_FLOODS).await;
@@ -166,7 +167,7 @@ async fn make_noise(client: Client, ticket: &str, at_a_time: u32) -> Result<(), 
     }
 }
 
-/// Agents in processes of their own, in the languages of the SDKs.
+/// Agents in their own processes, in the languages of the SDKs.
 fn processes(url: &str, code: &str) -> Vec<(String, Child)> {
     let address = url.trim_start_matches("http://");
     let way_in = ["--address", address, "--tournament", code];
@@ -190,7 +191,7 @@ fn processes(url: &str, code: &str) -> Vec<(String, Child)> {
     let started = commands.into_iter().map(|(name, mut command)| {
         command.stdin(Stdio::null()).stdout(Stdio::piped());
         let child = command.kill_on_drop(true).spawn();
-        let child = child.unwrap_or_else(|error| panic!("{name} does not run: {error}"));
+        let child = child.unwrap_or_else(|error| panic!("{name} does not start: {error}"));
         (name, child)
     });
     started.collect()
@@ -207,11 +208,11 @@ async fn games(client: &Client, tournament_id: &str) -> Vec<v1::TournamentGame> 
     page.games
 }
 
-/// Waits until so many games are over and others are being played.
+/// Waits until this number of games are over and others are running.
 async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
     let reached = async {
         loop {
-            let now = client.tournament(tournament_id).await.expect("it is there");
+            let now = client.tournament(tournament_id).await.expect("it exists");
             let is_over = now.state() == v1::TournamentState::Finished;
             assert!(!is_over, "it ended before the server could be killed");
             if now.games_over >= games_over && now.games_playing > 0 {
@@ -223,7 +224,7 @@ async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
     patiently("the middle", reached).await;
 }
 
-/// Places by seat of a finished game, read from its record and from nothing else.
+/// Places by seat of a finished game, from nothing but its record.
 fn places(lines: &[v1::RecordLine]) -> BTreeMap<u32, u32> {
     let events = lines.iter().filter_map(|line| match &line.line {
         Some(Line::Event(event)) => event.kind.as_ref(),
@@ -234,27 +235,27 @@ fn places(lines: &[v1::RecordLine]) -> BTreeMap<u32, u32> {
         _ => None,
     });
     let standings = ends.next().expect("the game ended");
-    assert!(ends.next().is_none(), "and once");
+    assert!(ends.next().is_none(), "only once");
     let placed = standings
         .iter()
         .map(|standing| (standing.seat, standing.place));
     placed.collect()
 }
 
-/// What every participant scored, from the records of the games alone.
+/// The score of every participant, from nothing but the records of the games.
 fn scores(data: &Path, games: &[v1::TournamentGame]) -> BTreeMap<u32, u64> {
     let mut scores = BTreeMap::new();
     for game in games {
         let path = chefshat_record::jsonl::path_of(data, &game.game_id);
-        let lines = chefshat_record::jsonl::read(&path).expect("it was written");
-        chefshat_record::replay::replay(&lines).expect("it replays");
+        let lines = chefshat_record::jsonl::read(&path).expect("a record file");
+        chefshat_record::replay::replay(&lines).expect("a valid record");
         let mut placed: Vec<(bool, u32, u32)> = (places(&lines).into_iter())
             .map(|(seat, place)| {
                 let line = &game.seats[seat as usize];
                 (line.forfeited, place, line.participant)
             })
             .collect();
-        // Those who came stand before those who did not, in the order of the game.
+        // Participants who were present are placed before absent ones, in the order of the game.
         placed.sort_unstable();
         for ((forfeited, _, participant), score) in placed.into_iter().zip([5, 3, 1, 0]) {
             *scores.entry(participant).or_default() += if forfeited { 0 } else { score };
@@ -264,14 +265,14 @@ fn scores(data: &Path, games: &[v1::TournamentGame]) -> BTreeMap<u32, u64> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_tournament_of_sixteen_goes_on_after_sigkill_and_counts_every_game_once() {
+async fn a_tournament_of_sixteen_resumes_after_sigkill_and_counts_every_game_once() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let mut server = launch.start().await.expect("it starts");
+    let mut server = launch.start().await.expect("the server starts");
     let url = launch.url();
-    let client = Client::connect(&url).await.expect("it listens");
+    let client = Client::connect(&url).await.expect("the server listens");
     let made = client.create_tournament(settings()).await;
-    let made = made.expect("it is made");
+    let made = made.expect("created");
     let id = made.tournament.expect("a tournament").tournament_id;
     let code = made.join_code;
     let mut regulars = Vec::new();
@@ -291,29 +292,29 @@ async fn a_tournament_of_sixteen_goes_on_after_sigkill_and_counts_every_game_onc
     for games_over in [2, 7] {
         in_the_middle(&client, &id, games_over).await;
         server.kill().await;
-        server = launch.start().await.expect("it starts again");
+        server = launch.start().await.expect("the server restarts");
     }
     let mut follow = client.follow_tournament(&id);
     let mut last = None;
     while let Some(now) = patiently("the end", follow.next())
         .await
-        .expect("it goes on")
+        .expect("an update")
     {
         last = now.tournament.or(last);
     }
     assert_eq!(
-        last.expect("it was told of").state(),
+        last.expect("an update").state(),
         v1::TournamentState::Finished
     );
     for playing in regulars {
         let played = patiently("a regular", playing).await.expect("no panic");
         for outcome in played.expect("it played to the end") {
-            assert!(outcome.standing().is_some(), "no game was given up");
+            assert!(outcome.standing().is_some(), "no game was aborted");
         }
     }
     for (name, child) in processes {
         let ended = patiently(&name, child.wait_with_output()).await;
-        let ended = ended.expect("it runs");
+        let ended = ended.expect("it has started");
         assert!(ended.status.success(), "{name}: {}", ended.status);
     }
     for task in strange {
@@ -327,9 +328,9 @@ async fn a_tournament_of_sixteen_goes_on_after_sigkill_and_counts_every_game_onc
     for game in &games {
         assert_eq!(game.state(), v1::TournamentGameState::Counted, "{game:?}");
     }
-    // No other game was played in its name.
+    // There are no other records of the tournament.
     let mut kept = BTreeSet::new();
-    for entry in std::fs::read_dir(folder.path().join("records")).expect("there are records") {
+    for entry in std::fs::read_dir(folder.path().join("records")).expect("a folder of records") {
         let path = entry.expect("an entry").path();
         let lines = chefshat_record::jsonl::read(&path).expect("a record");
         if let Some(Line::Header(header)) = &lines[0].line

@@ -21,10 +21,10 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// What is known of the fixture.
+/// The expected content of the fixture.
 fn known() -> Value {
     let text = std::fs::read_to_string(fixture("known.json")).expect("the fixture");
-    serde_json::from_str(&text).expect("it is JSON")
+    serde_json::from_str(&text).expect("JSON")
 }
 
 fn texts(list: &Value) -> Vec<String> {
@@ -37,7 +37,7 @@ fn text(value: &Value) -> String {
 }
 
 async fn start(data_dir: &Path) -> Host {
-    let store = SqliteStore::open(data_dir).await.expect("it opens");
+    let store = SqliteStore::open(data_dir).await.expect("a store");
     let config = ServerConfig {
         data_dir: Some(data_dir.to_path_buf()),
         grace: Duration::ZERO,
@@ -53,8 +53,8 @@ async fn verified(client: &Client, game_id: &str, folder: &Path) -> (v1::RoomSta
     let lines = lines.unwrap_or_else(|error| panic!("{game_id}: {error}"));
     let replayed = replay::replay(&lines).unwrap_or_else(|error| panic!("{game_id}: {error}"));
     let path = folder.join(game_id);
-    jsonl::write(&path, &lines).expect("it is written");
-    (replayed.state, std::fs::read(path).expect("it is there"))
+    jsonl::write(&path, &lines).expect("a record file");
+    (replayed.state, std::fs::read(path).expect("it exists"))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -68,9 +68,11 @@ async fn a_database_of_an_earlier_version_resumes_and_verifies() {
     )
     .expect("copied");
     let host = start(folder.path()).await;
-    let client = Client::connect(host.url()).await.expect("it listens");
+    let client = Client::connect(host.url())
+        .await
+        .expect("the server listens");
 
-    // Records of games that had ended are to the byte what that version wrote.
+    // Records of finished games are byte for byte what that version wrote.
     let records: BTreeMap<String, Value> =
         serde_json::from_value(known["records"].clone()).expect("an object");
     for (game_id, hash) in &records {
@@ -82,7 +84,7 @@ async fn a_database_of_an_earlier_version_resumes_and_verifies() {
         assert_eq!(state, v1::RoomState::Aborted);
     }
 
-    // Unfinished games resume where they stood and are played to the end with the tickets of their seats.
+    // Unfinished games resume and are played to the end with the tickets of their seats.
     let unfinished = known["unfinished"].as_array().expect("a list");
     for game in unfinished {
         let room = client.get_room(text(&game["room_id"])).await;
@@ -97,7 +99,7 @@ async fn a_database_of_an_earlier_version_resumes_and_verifies() {
         assert_eq!(state, v1::RoomState::Finished, "{}", game["name"]);
     }
 
-    // A tournament that had ended is there; one that had not continues to its end with its participants.
+    // A finished tournament exists; an unfinished one continues to its end with its participants.
     let tournaments = known["tournaments"].as_array().expect("a list");
     for tournament in tournaments {
         let id = text(&tournament["tournament_id"]);
@@ -132,5 +134,5 @@ async fn a_database_of_an_earlier_version_resumes_and_verifies() {
 
     patiently("the server to stop", host.stop())
         .await
-        .expect("it ends well");
+        .expect("a clean end");
 }

@@ -1,4 +1,4 @@
-//! Who is let in, and what those who are not are told.
+//! Joining, attaching, closing and leaving rooms: who may, and the errors for others.
 
 use chefshat_proto::v1::{self, room_service_client::RoomServiceClient, seat_update::Update};
 use chefshat_tests::{StreamSeat, TestServer, attach_all, first_to_hear, one_shift, room_of_four};
@@ -19,7 +19,7 @@ async fn joining_needs_the_code_and_a_free_seat() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let room_id = created.room.expect("a room was made").room_id;
+    let room_id = created.room.expect("a new room").room_id;
     let code = created.join_code;
     let cases = [
         (join("WRONG"), Code::PermissionDenied, "JOIN_CODE_WRONG"),
@@ -74,7 +74,7 @@ async fn joining_needs_the_code_and_a_free_seat() {
         let error = client
             .join(request.clone())
             .await
-            .expect_err("nobody is let in");
+            .expect_err("joining is refused");
         assert_eq!(error.reason(), Some(reason), "{request:?}");
         assert_eq!(error.code(), status, "{request:?}");
     }
@@ -106,7 +106,7 @@ async fn attaching_needs_a_ticket_of_this_room() {
             other => panic!("not refused, but {other:?}"),
         }
     }
-    // The stream has taken no harm.
+    // The stream is unaffected.
     seat.attach(v1::Attach {
         ticket: tickets[0].clone(),
         request_id: 10,
@@ -126,12 +126,7 @@ async fn only_its_owner_closes_a_room() {
     let (mine, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let (other, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let id = |created: &v1::CreateRoomResponse| {
-        created
-            .room
-            .as_ref()
-            .expect("a room was made")
-            .room_id
-            .clone()
+        created.room.as_ref().expect("a new room").room_id.clone()
     };
     for token in [other.owner_token.as_str(), tickets[0].as_str(), ""] {
         let error = client
@@ -144,7 +139,7 @@ async fn only_its_owner_closes_a_room() {
     let closed = client
         .close_room(id(&mine), mine.owner_token.clone())
         .await
-        .expect("the owner may");
+        .expect("closed");
     assert_eq!(closed.state(), v1::RoomState::Aborted);
     match seat.next().await {
         Update::Detached(detached) => assert_eq!(detached.reason(), v1::DetachReason::GameOver),
@@ -153,13 +148,13 @@ async fn only_its_owner_closes_a_room() {
 }
 
 #[tokio::test]
-async fn who_was_given_a_code_can_look_before_joining() {
+async fn a_room_can_be_looked_up_by_its_code_before_joining() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let created = client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let room = created.room.expect("a room");
     let mut service = RoomServiceClient::new(server.channel().await);
     let mut look = async |room_id: &str, code: &str| {
@@ -186,22 +181,25 @@ async fn who_was_given_a_code_can_look_before_joining() {
 }
 
 #[tokio::test]
-async fn a_seat_can_be_given_back_until_the_game_begins() {
+async fn a_seat_can_be_freed_until_the_game_starts() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let created = client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let mut tickets = Vec::new();
     for _ in 0..4 {
         let joined = client.join(join(&created.join_code)).await;
-        tickets.push(joined.expect("a seat is free").ticket);
+        tickets.push(joined.expect("a free seat").ticket);
     }
-    // One that is attached is told; one that never was is not.
+    // An attached seat is notified; one that never was is not.
     let mut attached = StreamSeat::attached(server.channel().await, &tickets[1]).await;
     for seat in [1, 2] {
-        let room = client.leave_room(&*tickets[seat]).await.expect("it waits");
+        let room = client
+            .leave_room(&*tickets[seat])
+            .await
+            .expect("a waiting room");
         assert_eq!(room.seats[seat].name, "");
         let error = client.leave_room(&*tickets[seat]).await;
         assert_eq!(
@@ -223,7 +221,7 @@ async fn a_seat_can_be_given_back_until_the_game_begins() {
     let (_, to_play) = first_to_hear(&mut seats).await;
     let error = client.leave_room(&*tickets[to_play]).await;
     assert_eq!(
-        error.expect_err("it has begun").reason(),
+        error.expect_err("the game has started").reason(),
         Some("GAME_STARTED")
     );
 }

@@ -1,4 +1,4 @@
-//! The examiner passes agents that play well, in all languages, and names the fault of those that have one.
+//! The examiner passes good agents in all languages, and names the faults of bad ones.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -9,12 +9,12 @@ use futures::{StreamExt as _, stream};
 use serde_json::Value;
 use tokio::process::Command;
 
-/// Examinations at a time; they mostly wait.
+/// Concurrent examinations; they mostly wait.
 const AT_A_TIME: usize = 8;
-/// Seconds that an agent without a fault is waited for, however busy the machine.
+/// Patience for a good agent in seconds, even on a busy machine.
 const PATIENCE: &str = "30";
 
-/// What came of an examination.
+/// The result of an examination.
 struct Examined {
     passed: bool,
     cases: Vec<Value>,
@@ -42,7 +42,7 @@ async fn examine(options: &[&str], agent: &[&str], folder: Option<&Path>) -> Exa
     let output = command.stdin(Stdio::null()).kill_on_drop(true).output();
     let output = patiently("the examination", output)
         .await
-        .expect("the binary runs");
+        .expect("the binary starts");
     let text = String::from_utf8(output.stdout).expect("text");
     let said = format!("{text}{}", String::from_utf8_lossy(&output.stderr));
     let lines = text
@@ -61,7 +61,7 @@ async fn examine(options: &[&str], agent: &[&str], folder: Option<&Path>) -> Exa
     }
 }
 
-/// All cases, passed. `many`: the command line of the same for tournaments.
+/// Checks that all cases pass. `many`: the command line for tournaments.
 async fn passes(agent: &[&str], many: &str, folder: Option<&Path>) {
     let options = ["--patience", PATIENCE, "--start", PATIENCE, "--many", many];
     let examined = examine(&options, agent, folder).await;
@@ -122,7 +122,7 @@ async fn an_agent_without_an_sdk_passes() {
     passes(&agent, &in_a_tournament("none"), None).await;
 }
 
-/// At the same time, for they mostly wait.
+/// All at the same time, because they mostly wait.
 #[tokio::test]
 async fn good_agents_of_all_languages_pass() {
     tokio::join!(
@@ -134,7 +134,7 @@ async fn good_agents_of_all_languages_pass() {
     );
 }
 
-/// Agents with a fault, the case in which it shows, and the code by which it must be named first.
+/// Agents with a fault, the case in which it shows, and the code that must be reported first.
 const FAULTY: [(&str, &str, &str); 32] = [
     ("never-joins", "game", "NEVER_JOINED"),
     ("wrong-code", "game", "JOIN_REFUSED"),
@@ -175,7 +175,7 @@ async fn every_fault_is_named() {
     let examined = stream::iter(FAULTY)
         .map(|(fault, case, code)| async move {
             let agent = [BAD_AGENT, fault, "{address}", "{code}"];
-            // Whoever joins at all has the standard time for it.
+            // Agents that join have the default time for it.
             let start = if fault == "never-joins" { "1" } else { "30" };
             let options = ["--start", start, "--only", case];
             (fault, code, examine(&options, &agent, None).await)
@@ -191,7 +191,7 @@ async fn every_fault_is_named() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The case of many seats, with the agent that has this fault.
+/// Runs the many-seats case with the agent that has this fault.
 async fn examine_in_a_tournament(fault: &str) -> Examined {
     examine(&["--many", &in_a_tournament(fault)], &[], None).await
 }

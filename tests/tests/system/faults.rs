@@ -1,5 +1,6 @@
-//! Disks and databases that fail under the real binary: nothing is acknowledged that is not kept, the server ends and says what to do, and
-//! once the fault is gone every game goes on. Deaths of a server whose disk is well are in `restarts`.
+//! Failing disks and databases under the real binary: nothing uncommitted is acknowledged, the server
+//! exits with advice, and once the fault is gone every game resumes. `restarts` tests crashes without
+//! failing disks.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,13 +19,14 @@ use tokio::process::Command;
 
 /// Name of the database in a data directory.
 const DATABASE: &str = "games.sqlite3";
-/// A disk that the write-ahead log of a few games does not fill by itself, KiB.
+/// Size of a disk that the write-ahead log of a few games does not fill, KiB.
 const DISK_KIB: u32 = 16 * 1024;
-/// How long another program has the database locked for a while.
+/// How long another program locks the database.
 const LOCKED_FOR: Duration = Duration::from_secs(3);
-/// Time for a decision meanwhile.
+/// Decision time while it is locked.
 const DECISION_TIME_MS: u32 = 2_000;
-/// Acknowledgements that four rooms may have on the way when the database is locked: one for each seat.
+/// Acknowledgements that may be on their way when the database is locked: one for each seat of four
+/// rooms.
 const ON_THE_WAY: u64 = 16;
 
 fn rooms(count: usize, policy: v1::RoomPolicy) -> Vec<Habit> {
@@ -43,7 +45,7 @@ fn unhurried() -> v1::RoomPolicy {
     Habit::default().policy
 }
 
-/// Whoever is charged for a locked database is late.
+/// A policy under which a seat that is charged for a locked database times out.
 fn hurried() -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(DECISION_TIME_MS),
@@ -52,7 +54,7 @@ fn hurried() -> v1::RoomPolicy {
     }
 }
 
-/// A server that has failed says so, and what to do.
+/// Checks that a failed server reports the failure with this advice.
 fn assert_failed(ended: &Ended, advice: &str) {
     assert!(!ended.status.success(), "{ended:?}");
     assert!(
@@ -67,13 +69,15 @@ fn assert_failed(ended: &Ended, advice: &str) {
     );
 }
 
-/// Plays on for a while, lets the games end, and finds every acknowledged decision in the records.
-async fn assert_goes_on(launch: &Launch, server: Process, regulars: Regulars, data_dir: &Path) {
+/// Lets games continue for a while and end, and finds every acknowledged decision in the records.
+async fn assert_continues(launch: &Launch, server: Process, regulars: Regulars, data_dir: &Path) {
     let ledger = Arc::clone(&regulars.ledger);
     patiently("decisions", ledger.reaches(ledger.count() + 100)).await;
     let games = regulars.leave().await;
-    let client = Client::connect(launch.url()).await.expect("it listens");
-    let acknowledged = assert_kept(&client, &ledger, &games).await;
+    let client = Client::connect(launch.url())
+        .await
+        .expect("the server listens");
+    let acknowledged = assert_committed(&client, &ledger, &games).await;
     assert_eq!(
         u64::try_from(acknowledged),
         Ok(ledger.count()),
@@ -82,18 +86,19 @@ async fn assert_goes_on(launch: &Launch, server: Process, regulars: Regulars, da
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
     for game in &games {
-        jsonl::read(&jsonl::path_of(data_dir, game)).expect("the record is written");
+        jsonl::read(&jsonl::path_of(data_dir, game)).expect("a record file");
     }
 }
 
-/// Every game finished, every record replays, every acknowledged decision is in one; nobody was late. Gives their number.
-async fn assert_kept(client: &Client, ledger: &Ledger, games: &[String]) -> usize {
+/// Checks that every game finished, every record is valid and contains every acknowledged decision, and
+/// no agent timed out. Returns the number of decisions.
+async fn assert_committed(client: &Client, ledger: &Ledger, games: &[String]) -> usize {
     let mut acknowledged = 0;
     for game in games {
-        let record = client.record(game).await.expect("it is kept");
+        let record = client.record(game).await.expect("a stored record");
         let replayed = replay::replay(&record).unwrap_or_else(|error| panic!("{game}: {error}"));
         assert_eq!(replayed.state, v1::RoomState::Finished, "{game}");
-        acknowledged += ledger.assert_kept(game, &record);
+        acknowledged += ledger.assert_committed(game, &record);
         for line in &record {
             if let Some(Line::Decision(decision)) = &line.line {
                 assert_eq!(decision.source(), v1::DecisionSource::Agent, "{decision:?}");
@@ -103,7 +108,7 @@ async fn assert_kept(client: &Client, ledger: &Ledger, games: &[String]) -> usiz
     acknowledged
 }
 
-/// Another program that works on the database.
+/// Another program's connection to the database.
 async fn other_program(data_dir: &Path) -> SqliteConnection {
     let options = SqliteConnectOptions::new().filename(data_dir.join(DATABASE));
     SqliteConnection::connect_with(&options)
@@ -112,7 +117,7 @@ async fn other_program(data_dir: &Path) -> SqliteConnection {
 }
 
 async fn execute(connection: &mut SqliteConnection, statement: &'static str) {
-    connection.execute(statement).await.expect("it is done");
+    connection.execute(statement).await.expect("executed");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -122,24 +127,24 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
         Err(why) => return skip("a_full_disk_ends_the_server_and_loses_nothing", &why),
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let regulars = Regulars::come(&launch.url(), rooms(4, unhurried()));
     patiently("decisions", regulars.ledger.reaches(50)).await;
     disk.fill("filler");
     assert_failed(&server.ended().await, "the disk is full: free some space");
-    // Started again too early, it fails again; what it needs at once may be there, and a little later it is not.
+    // A restart while the disk is full fails again: at once, or a little later when its space runs out.
     let ended = match launch.start().await {
         Ok(server) => server.ended().await,
         Err(ended) => ended,
     };
     assert_failed(&ended, "free some space");
-    std::fs::remove_file(disk.path().join("filler")).expect("it is removed");
-    let server = launch.start().await.expect("it starts again");
-    assert_goes_on(&launch, server, regulars, &disk.path()).await;
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    let server = launch.start().await.expect("the server restarts");
+    assert_continues(&launch, server, regulars, &disk.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_disk_that_is_nearly_full_is_left_to_games_that_go_on() {
+async fn a_nearly_full_disk_is_reserved_for_running_games() {
     let disk = match SmallDisk::new(DISK_KIB).await {
         Ok(disk) => disk,
         Err(why) => {
@@ -150,19 +155,21 @@ async fn a_disk_that_is_nearly_full_is_left_to_games_that_go_on() {
         }
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
-    let server = launch.start().await.expect("it starts");
-    let client = Client::connect(launch.url()).await.expect("it listens");
+    let server = launch.start().await.expect("the server starts");
+    let client = Client::connect(launch.url())
+        .await
+        .expect("the server listens");
     client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect("there is space");
+        .expect("a new room");
     disk.fill("filler");
     let refused = client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect_err("there is no space");
+        .expect_err("no space");
     assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
-    std::fs::remove_file(disk.path().join("filler")).expect("it is removed");
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
     client
         .create_room(v1::CreateRoomRequest::default())
         .await
@@ -172,10 +179,10 @@ async fn a_disk_that_is_nearly_full_is_left_to_games_that_go_on() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_database_that_is_locked_for_a_while_is_waited_for_and_nobody_is_late() {
+async fn a_temporarily_locked_database_delays_nobody() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let regulars = Regulars::come(&launch.url(), rooms(4, hurried()));
     patiently("decisions", regulars.ledger.reaches(50)).await;
     let mut other = other_program(folder.path()).await;
@@ -186,17 +193,19 @@ async fn a_database_that_is_locked_for_a_while_is_waited_for_and_nobody_is_late(
     execute(&mut other, "ROLLBACK").await;
     assert!(
         meanwhile <= ON_THE_WAY,
-        "{meanwhile} were acknowledged although nothing can be kept"
+        "{meanwhile} were acknowledged although nothing can be committed"
     );
-    assert_goes_on(&launch, server, regulars, folder.path()).await;
+    assert_continues(&launch, server, regulars, folder.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_seat_that_waits_for_the_database_to_have_its_answer_refused_may_still_answer() {
+async fn a_seat_that_waits_for_the_database_may_still_answer() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let server = launch.start().await.expect("it starts");
-    let client = Client::connect(launch.url()).await.expect("it listens");
+    let server = launch.start().await.expect("the server starts");
+    let client = Client::connect(launch.url())
+        .await
+        .expect("the server listens");
     let (_, tickets) = room_of_four(&client, one_shift(), hurried()).await;
     let mut other = other_program(folder.path()).await;
     let mut seats = Vec::new();
@@ -212,11 +221,11 @@ async fn a_seat_that_waits_for_the_database_to_have_its_answer_refused_may_still
         seats.push(seat);
     }
     let (Update::Decision(decision), asked) = first_to_hear(&mut seats).await else {
-        panic!("the first thing told is a decision");
+        panic!("the first update is a decision");
     };
     execute(&mut other, "BEGIN IMMEDIATE").await;
     let wrong = (0..500).find(|action| !is_legal(&decision, *action));
-    let wrong = wrong.expect("not everything is legal");
+    let wrong = wrong.expect("some action is illegal");
     seats[asked].answer(decision.decision_id, wrong).await;
     tokio::time::sleep(LOCKED_FOR).await;
     execute(&mut other, "ROLLBACK").await;
@@ -235,7 +244,7 @@ async fn a_seat_that_waits_for_the_database_to_have_its_answer_refused_may_still
 async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
     patiently("decisions", regulars.ledger.reaches(50)).await;
     let mut other = other_program(folder.path()).await;
@@ -243,13 +252,13 @@ async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
     let advice = "another program has kept games.sqlite3 locked for more than 10 s";
     assert_failed(&server.ended().await, advice);
     execute(&mut other, "ROLLBACK").await;
-    other.close().await.expect("it is closed");
-    let server = launch.start().await.expect("it starts again");
-    assert_goes_on(&launch, server, regulars, folder.path()).await;
+    other.close().await.expect("closed");
+    let server = launch.start().await.expect("the server restarts");
+    assert_continues(&launch, server, regulars, folder.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
+async fn a_disk_that_fails_to_sync_ends_the_server_and_loses_nothing() {
     let name = "a_disk_that_does_not_sync_ends_the_server_and_loses_nothing";
     let mut tried = Command::new("strace");
     match tried.args(["-o", "/dev/null", "true"]).output().await {
@@ -259,7 +268,7 @@ async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let log = folder.path().join("strace.log");
-    // Once some games are going on, nothing is synced any more. The tracer is a process apart: the server remains our child.
+    // Once some games are running, syncs fail. The tracer is a separate process: the server stays our child.
     let strace = [
         "strace".as_ref(),
         "-D".as_ref(),
@@ -272,7 +281,7 @@ async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
     ];
     let data_dir = folder.path().join("data");
     let mut launch = Launch::new(&data_dir).through(strace);
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
     let ended = server.ended().await;
     assert_failed(&ended, "the disk fails to read or write");
@@ -280,27 +289,27 @@ async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
     let log = std::fs::read_to_string(log).expect("strace wrote it");
     assert!(log.contains("(INJECTED)"), "{log}");
     launch.by_itself();
-    let server = launch.start().await.expect("it starts again");
-    assert_goes_on(&launch, server, regulars, &data_dir).await;
+    let server = launch.start().await.expect("the server restarts");
+    assert_continues(&launch, server, regulars, &data_dir).await;
 }
 
-/// What a server says that does not start, and that it leaves the database as it is.
+/// The message of a server that does not start. Checks that it leaves the database unchanged.
 async fn refusal(launch: &mut Launch, file: &Path) -> String {
     let before = std::fs::read(file).expect("readable");
     let ended = launch.start().await.expect_err("it does not start");
     assert!(!ended.status.success(), "{ended:?}");
     assert!(
         std::fs::read(file).expect("readable") == before,
-        "left as it is"
+        "left unchanged"
     );
     ended.said
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_database_that_cannot_be_used_is_left_as_it_is() {
+async fn an_unusable_database_is_left_unchanged() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let file = folder.path().join(DATABASE);
 
     // A second server would listen elsewhere.
@@ -321,30 +330,33 @@ async fn a_database_that_cannot_be_used_is_left_as_it_is() {
     let said = refusal(&mut launch, &file).await;
     assert!(said.contains("newer version"), "{said}");
 
-    // Its first page is whole, so that it is known as ours; what that points to is not there.
+    // The first page is intact, so the file is recognised; the pages it refers to are missing.
     let mut damaged = well.clone();
     damaged[4_096..].fill(0xa5);
     std::fs::write(&file, damaged).expect("written");
     let said = refusal(&mut launch, &file).await;
-    assert!(said.contains("damaged") && said.contains("copy"), "{said}");
+    assert!(
+        said.contains("damaged") && said.contains("backup"),
+        "{said}"
+    );
 
     std::fs::write(&file, "shopping list: flour, tomatoes".repeat(500)).expect("written");
     let said = refusal(&mut launch, &file).await;
     assert!(said.contains("not a database of chefshat"), "{said}");
 
     std::fs::write(&file, well).expect("written");
-    let server = launch.start().await.expect("it is well again");
+    let server = launch.start().await.expect("the server starts again");
     assert!(server.stop().await.status.success());
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_folder_that_cannot_be_written_is_named() {
+async fn a_folder_that_is_not_writable_is_named() {
     let disk = match SmallDisk::new(DISK_KIB).await {
         Ok(disk) => disk,
         Err(why) => return skip("a_folder_that_cannot_be_written_is_named", &why),
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     assert!(server.stop().await.status.success());
     disk.make_read_only().await;
     let said = refusal(&mut launch, &disk.path().join(DATABASE)).await;

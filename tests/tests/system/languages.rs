@@ -1,4 +1,4 @@
-//! The main job: one game of four processes in three languages, played against the binary over its port.
+//! One game of four processes in three languages, against the binary over its port.
 
 use std::process::{Output, Stdio};
 
@@ -9,12 +9,12 @@ use chefshat_tests::{Launch, patiently, set_up};
 use serde_json::Value;
 use tokio::process::Command;
 
-/// Runs a participant and waits for what it prints.
+/// Runs a participant and returns its output.
 async fn participant(name: &str, mut command: Command) -> Output {
     let output = command.stdin(Stdio::null()).kill_on_drop(true).output();
     let output = patiently(name, output)
         .await
-        .unwrap_or_else(|error| panic!("{name} does not run: {error}"));
+        .unwrap_or_else(|error| panic!("{name} does not start: {error}"));
     assert!(
         output.status.success(),
         "{name}: {}\n{}\n{}",
@@ -32,13 +32,13 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     let node = set_up("CHEFSHAT_NODE_DIR");
     let data = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(data.path());
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let url = launch.url();
-    let client = Client::connect(&url).await.expect("it listens");
+    let client = Client::connect(&url).await.expect("the server listens");
     let created = client
         .create_room(v1::CreateRoomRequest::default())
         .await
-        .expect("the room is made");
+        .expect("a new room");
     let room = created.room.expect("a room");
     let address = url.trim_start_matches("http://");
     let code = created.join_code.as_str();
@@ -65,19 +65,19 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     );
     for output in [outputs.0, outputs.1, outputs.2, outputs.3] {
         let text = String::from_utf8(output.stdout).expect("text");
-        let last = text.lines().last().expect("it prints its result");
+        let last = text.lines().last().expect("a printed result");
         serde_json::from_str::<Value>(last).expect("a JSON line");
     }
 
-    let over = client.get_room(&room.room_id).await.expect("it is shown");
+    let over = client.get_room(&room.room_id).await.expect("still listed");
     assert_eq!(over.state(), v1::RoomState::Finished);
     let names: Vec<&str> = over.seats.iter().map(|seat| seat.name.as_str()).collect();
     for name in ["greedy", "random", "python", "node"] {
         assert!(names.contains(&name), "{name} is not among {names:?}");
     }
     assert!(server.stop().await.status.success());
-    let record = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("it was written");
-    let replayed = replay::replay(&record).expect("it replays to the same result");
+    let record = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("a record file");
+    let replayed = replay::replay(&record).expect("a valid record");
     assert_eq!(replayed.state, v1::RoomState::Finished);
     assert!(replayed.standings[0].points >= 15);
     let from_agents = record
@@ -93,6 +93,6 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     assert_eq!(
         u64::try_from(from_agents),
         Ok(replayed.decisions),
-        "nobody was late or wrong"
+        "no timeouts and no illegal actions"
     );
 }

@@ -1,5 +1,5 @@
-//! The lists of rooms and of tournaments: newest first, page by page, by state; what is made while somebody pages does not come up. The list of
-//! records is in `records`.
+//! The lists of rooms and of tournaments: newest first, page by page, by state; items created during
+//! paging do not appear. `records` tests the list of records.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
@@ -12,7 +12,7 @@ const MADE: usize = 5;
 
 async fn room(client: &Client) -> String {
     let created = client.create_room(v1::CreateRoomRequest::default()).await;
-    let room = created.expect("the room is made").room;
+    let room = created.expect("a new room").room;
     room.expect("a room").room_id
 }
 
@@ -72,7 +72,7 @@ async fn tournaments_are_listed_newest_first() {
                 tournament_id: id_of(&created),
                 owner_token: created.owner_token.clone(),
             };
-            service.close_tournament(close).await.expect("it is closed");
+            service.close_tournament(close).await.expect("closed");
         }
         made.insert(0, id_of(&created));
     }
@@ -112,7 +112,7 @@ async fn tournaments_are_listed_newest_first() {
         ..v1::ListTournamentsRequest::default()
     };
     let refused = service.list_tournaments(no_state).await;
-    let refused = refused.expect_err("there is no such state");
-    let info = refused.get_details_error_info().expect("it says why");
+    let refused = refused.expect_err("an unknown state");
+    let info = refused.get_details_error_info().expect("error info");
     assert_eq!(info.reason, "STATE_REFUSED");
 }

@@ -1,4 +1,4 @@
-//! Whole-system tests over real sockets: what a participant, a spectator or a stranger can do to a server, and what it makes of it.
+//! System tests over real sockets, from the view of participants, spectators and strangers.
 
 mod answers;
 mod beginnings;

@@ -1,5 +1,5 @@
-//! Games that play by themselves to their end, recorded ones and others, and what their records say. What is made of them is in `branches`
-//! and `beginnings`.
+//! Games without clients, between recorded players and others, and their records. `branches` and
+//! `beginnings` build on them.
 
 use chefshat_client::Client;
 use chefshat_engine::{DecisionKind, Game};
@@ -66,7 +66,7 @@ impl EndedGame {
             .collect()
     }
 
-    /// Who decided what.
+    /// The seat and action of every decision.
     pub(crate) fn course(&self) -> Vec<(u32, u32)> {
         let decisions = self.decisions().into_iter();
         decisions
@@ -74,7 +74,7 @@ impl EndedGame {
             .collect()
     }
 
-    /// What happened after every decision, without how and when.
+    /// The events after every decision, without source and time.
     pub(crate) fn deals_and_results(&self) -> Vec<Kind> {
         let events = self.lines.iter().filter_map(|line| match &line.line {
             Some(Line::Event(event)) => event.kind.clone(),
@@ -108,30 +108,30 @@ impl EndedGame {
                 positions.push(game.clone());
             }
         })
-        .expect("it replays");
+        .expect("a valid record");
         positions
     }
 }
 
-/// Makes a room that plays by itself, and waits for its end.
+/// Creates a room that plays on its own, and waits for its end.
 pub(crate) async fn ended(client: &Client, request: v1::CreateRoomRequest) -> EndedGame {
-    let created = client.create_room(request).await.expect("the room is made");
+    let created = client.create_room(request).await.expect("a new room");
     let room = created.room.expect("a room");
     let ended = patiently("the game to end", until_over(client, room.room_id)).await;
-    replay(&ended.lines).expect("its record fits");
+    replay(&ended.lines).expect("a valid record");
     ended
 }
 
 pub(crate) async fn until_over(client: &Client, room_id: String) -> EndedGame {
     let mut watching = client.spectate(&room_id, 0);
-    while watching.next().await.expect("it can be watched").is_some() {}
-    let room = client.get_room(&room_id).await.expect("it is still shown");
+    while watching.next().await.expect("a watched room").is_some() {}
+    let room = client.get_room(&room_id).await.expect("still listed");
     assert_eq!(room.state(), v1::RoomState::Finished);
-    let lines = client.record(&room.game_id).await.expect("the record");
+    let lines = client.record(&room.game_id).await.expect("a record");
     EndedGame { room, lines }
 }
 
-/// A game of four Shifts between built-in agents, always the same one.
+/// A game of four Shifts between built-in agents, the same every time.
 pub(crate) async fn original(client: &Client) -> EndedGame {
     let request = v1::CreateRoomRequest {
         rules: Some(v1::RuleSet {
@@ -147,7 +147,8 @@ pub(crate) async fn original(client: &Client) -> EndedGame {
     ended(client, request).await
 }
 
-/// Points of a game worth branching at: its beginning, within an exchange, in the middle of a Shift, right after a Shift, its last decision.
+/// Points worth branching at: the start, within an exchange, in the middle of a Shift, right after a
+/// Shift, the last decision.
 pub(crate) fn points(game: &EndedGame) -> [usize; 5] {
     let positions = game.positions();
     let find = |is: &dyn Fn(&Game) -> bool| {

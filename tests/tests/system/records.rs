@@ -1,4 +1,5 @@
-//! Records of games that have ended: listed, read, streamed, and carried from one server to another. The same over both stores.
+//! Records of finished games: listed, read, streamed, and copied from one server to another, with both
+//! stores.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,7 +20,7 @@ use crate::played::{built_in, ended};
 
 const GAMES: usize = 5;
 
-/// A server with some finished games of one Shift, and their ids in the order in which they were made.
+/// A server with some finished games of one Shift, and their ids in the order of creation.
 async fn server_with_games(store: Arc<dyn Store>) -> (TestServer, Vec<String>) {
     let server = TestServer::with(|config| config.allow_import = true, store).await;
     let client = server.client().await;
@@ -36,7 +37,7 @@ async fn server_with_games(store: Arc<dyn Store>) -> (TestServer, Vec<String>) {
         let (created, tickets) = room_of_four(&client, one_shift(), policy).await;
         let room = created.room.expect("a room");
         play_out(&server, tickets).await;
-        // The game is told to be over once it is kept.
+        // The end of the game is sent after its commit.
         games.push(room.game_id);
     }
     (server, games)
@@ -121,7 +122,7 @@ async fn listed(
 }
 
 #[tokio::test]
-async fn records_are_listed_in_pages_and_streamed_whole() {
+async fn records_are_listed_in_pages_and_streamed_completely() {
     for (store, _folder) in stores().await {
         let (server, games) = server_with_games(store).await;
         let mut service = service(&server).await;
@@ -149,8 +150,10 @@ async fn records_are_listed_in_pages_and_streamed_whole() {
             .collect();
         let mut apart = Vec::new();
         for summary in &oldest_first {
-            let lines = record(&mut service, &summary.game_id).await.expect("held");
-            let replayed = chefshat_record::replay::replay(&lines).expect("it replays");
+            let lines = record(&mut service, &summary.game_id)
+                .await
+                .expect("a stored record");
+            let replayed = chefshat_record::replay::replay(&lines).expect("a valid record");
             assert_eq!(replayed.standings, summary.standings);
             assert_eq!(replayed.decisions, summary.decisions);
             assert_eq!(summary.shifts, 1);
@@ -158,7 +161,7 @@ async fn records_are_listed_in_pages_and_streamed_whole() {
             assert!(summary.ended_at_ms >= summary.created_at_ms);
             apart.extend(lines);
         }
-        assert_eq!(streamed, apart, "one after the other, as each alone");
+        assert_eq!(streamed, apart, "the same as each one alone");
 
         for (filter, found) in [
             (
@@ -202,19 +205,24 @@ async fn records_are_listed_in_pages_and_streamed_whole() {
 }
 
 #[tokio::test]
-async fn a_record_is_carried_from_one_server_to_another() {
+async fn a_record_is_copied_from_one_server_to_another() {
     let (first, games) = server_with_games(Arc::new(MemoryStore::default())).await;
     let lines = record(&mut service(&first).await, &games[0])
         .await
-        .expect("held");
+        .expect("a stored record");
     for (store, _folder) in stores().await {
         let second = TestServer::with(|config| config.allow_import = true, store).await;
         let mut service = service(&second).await;
-        let summary = import(&mut service, &lines).await.expect("it is taken");
+        let summary = import(&mut service, &lines).await.expect("imported");
         assert_eq!(summary.game_id, games[0]);
         assert_eq!(summary.seats.len(), 4);
-        assert_eq!(record(&mut service, &games[0]).await.expect("held"), lines);
-        let again = import(&mut service, &lines).await.expect_err("it is there");
+        assert_eq!(
+            record(&mut service, &games[0])
+                .await
+                .expect("a stored record"),
+            lines
+        );
+        let again = import(&mut service, &lines).await.expect_err("a taken id");
         assert_eq!(
             (again.code(), reason(&again).as_str()),
             (Code::AlreadyExists, "GAME_KNOWN")
@@ -224,7 +232,7 @@ async fn a_record_is_carried_from_one_server_to_another() {
         let line = damaged
             .iter()
             .position(|line| matches!(line.line, Some(Line::Decision(_))))
-            .expect("there is a decision");
+            .expect("a decision");
         if let Some(Line::Decision(decision)) = &mut damaged[line].line {
             decision.action_mask[0] ^= 1;
         }
@@ -242,7 +250,7 @@ async fn a_record_is_carried_from_one_server_to_another() {
 }
 
 #[tokio::test]
-async fn what_is_not_held_or_not_wanted_is_refused() {
+async fn unknown_and_unwanted_records_are_refused() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -259,7 +267,9 @@ async fn what_is_not_held_or_not_wanted_is_refused() {
         let refused = record(&mut service, game).await.expect_err(game);
         assert_eq!((refused.code(), reason(&refused).as_str()), expected);
     }
-    let refused = import(&mut service, &[]).await.expect_err("it is off");
+    let refused = import(&mut service, &[])
+        .await
+        .expect_err("imports are off");
     assert_eq!(
         (refused.code(), reason(&refused).as_str()),
         (Code::PermissionDenied, "IMPORT_OFF")
@@ -273,13 +283,16 @@ async fn what_is_not_held_or_not_wanted_is_refused() {
             ..v1::CreateRoomRequest::default()
         })
         .await
-        .expect_err("a store in memory cannot keep that promise");
+        .expect_err("a memory store cannot promise this");
     assert_eq!(promised.reason(), Some("POLICY_REFUSED"));
     let request = v1::ListRecordsRequest {
         page_token: "nonsense".into(),
         ..v1::ListRecordsRequest::default()
     };
-    let refused = service.list_records(request).await.expect_err("no token");
+    let refused = service
+        .list_records(request)
+        .await
+        .expect_err("not a token");
     assert_eq!(reason(&refused), "PAGE_TOKEN_REFUSED");
     let request = v1::StreamRecordsRequest {
         filter: Some(v1::RecordFilter {
@@ -287,18 +300,21 @@ async fn what_is_not_held_or_not_wanted_is_refused() {
             ..v1::RecordFilter::default()
         }),
     };
-    let refused = service.stream_records(request).await.expect_err("no kind");
+    let refused = service
+        .stream_records(request)
+        .await
+        .expect_err("not a kind");
     assert_eq!(reason(&refused), "FILTER_REFUSED");
     server.stop().await;
 }
 
 #[tokio::test]
-async fn the_leaderboard_learns_of_games_that_end_after_it_was_asked() {
+async fn the_leaderboard_includes_games_that_end_after_a_request() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     for games in 0..=2 {
-        // It is told a moment later.
+        // It is updated a moment later.
         let learnt = async {
             loop {
                 let request = v1::GetLeaderboardRequest::default();

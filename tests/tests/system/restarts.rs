@@ -1,5 +1,5 @@
-//! The death of the server, sudden or in good order: what it acknowledged is kept, what was going on goes on, and agents come back by
-//! themselves. A server whose disk or database fails is in `faults`.
+//! Crashes and stops of the server: everything acknowledged is stored, unfinished games resume, and
+//! agents reconnect on their own. `faults` tests failing disks and databases.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -15,13 +15,13 @@ use rand::rngs::SmallRng;
 use rand::{RngExt as _, SeedableRng as _};
 use tokio::task::JoinSet;
 
-/// How often the server is killed; `CHEFSHAT_KILLS` names another number.
+/// Number of kills; `CHEFSHAT_KILLS` overrides it.
 const KILLS: u64 = 100;
 /// Most decisions acknowledged between two kills.
 const MOST_BETWEEN: u64 = 40;
-/// After so many kills the next server is killed as well, while it starts.
+/// After every so many kills the next server is also killed while it starts.
 const KILLED_AT_START: u64 = 8;
-/// Longest time given to a server that is killed while it starts.
+/// Longest time before a starting server is killed.
 const LONGEST_START: Duration = Duration::from_millis(100);
 
 fn shifts(count: u32) -> v1::RuleSet {
@@ -31,7 +31,8 @@ fn shifts(count: u32) -> v1::RuleSet {
     }
 }
 
-/// Eight rooms of every make: long and short games, streams shared and apart, events at once and with decisions, with built-in agents.
+/// Eight rooms of all kinds: long and short games, shared and separate streams, events at once and with
+/// decisions, with built-in agents.
 fn eight_rooms() -> Vec<Habit> {
     let mut habits: Vec<Habit> = (0..8)
         .map(|number| Habit {
@@ -71,7 +72,9 @@ async fn playing(client: &Client) -> usize {
 }
 
 async fn connect(launch: &Launch) -> Client {
-    Client::connect(launch.url()).await.expect("it listens")
+    Client::connect(launch.url())
+        .await
+        .expect("the server listens")
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -82,7 +85,7 @@ async fn every_acknowledged_decision_survives_sigkill() {
     let begun = Instant::now();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
-    let mut server = launch.start().await.expect("it starts");
+    let mut server = launch.start().await.expect("the server starts");
     let regulars = Regulars::come(&launch.url(), eight_rooms());
     let ledger = &regulars.ledger;
     let mut random = SmallRng::seed_from_u64(kills);
@@ -96,7 +99,7 @@ async fn every_acknowledged_decision_survives_sigkill() {
             tokio::time::sleep(LONGEST_START.mul_f64(random.random())).await;
             starting.kill().await;
         }
-        server = launch.start().await.expect("it starts again");
+        server = launch.start().await.expect("the server restarts");
         found_playing += usize::from(playing(&connect(&launch).await).await > 0);
         if kill % kills.div_ceil(10) == 0 {
             let (decisions, seconds) = (ledger.count(), begun.elapsed().as_secs());
@@ -106,13 +109,13 @@ async fn every_acknowledged_decision_survives_sigkill() {
     let ledger = Arc::clone(&regulars.ledger);
     let games = regulars.leave().await;
     let client = connect(&launch).await;
-    assert_eq!(playing(&client).await, 0, "nothing goes on");
+    assert_eq!(playing(&client).await, 0, "no game is running");
 
     let mut acknowledged = 0;
     let mut restarts = 0;
     let mut records = Vec::new();
     for game in &games {
-        let record = client.record(game).await.expect("it is kept");
+        let record = client.record(game).await.expect("a stored record");
         let replayed = replay::replay(&record).unwrap_or_else(|error| panic!("{game}: {error}"));
         assert_eq!(replayed.state, v1::RoomState::Finished, "{game}");
         acknowledged += ledger.assert_kept(game, &record);
@@ -125,18 +128,18 @@ async fn every_acknowledged_decision_survives_sigkill() {
         "all of them"
     );
     assert_eq!(listed(&client).await, games.iter().cloned().collect());
-    // Every death found games going on: mostly all eight.
+    // Every kill hit running games: mostly all eight.
     assert_eq!(u64::try_from(found_playing), Ok(kills));
     assert!(u64::try_from(restarts).expect("small") >= kills);
 
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
     for (game, record) in games.iter().zip(&records) {
-        let file = jsonl::read(&jsonl::path_of(folder.path(), game)).expect("it is written");
-        assert!(file == *record, "the file of {game} is the record");
+        let file = jsonl::read(&jsonl::path_of(folder.path(), game)).expect("a record file");
+        assert!(file == *record, "the file of {game} equals the record");
     }
     eprintln!(
-        "{kills} kills, {} games, {acknowledged} decisions acknowledged, {restarts} times a game went on; {:.1} s",
+        "{kills} kills, {} games, {acknowledged} decisions acknowledged, {restarts} times a game resumed; {:.1} s",
         games.len(),
         begun.elapsed().as_secs_f64()
     );
@@ -150,7 +153,7 @@ fn restarts_in(record: &[v1::RecordLine]) -> usize {
     record.iter().filter(is_restart).count()
 }
 
-/// The games of which a server holds records.
+/// The games whose records a server has.
 async fn listed(client: &Client) -> BTreeSet<String> {
     use v1::record_service_client::RecordServiceClient;
     let mut service = RecordServiceClient::new(client.channel());
@@ -175,10 +178,10 @@ async fn listed(client: &Client) -> BTreeSet<String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_stop_puts_durable_games_down_and_aborts_the_others() {
+async fn a_stop_suspends_durable_games_and_aborts_the_others() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path()).with("--grace", 0);
-    let mut server = launch.start().await.expect("it starts");
+    let mut server = launch.start().await.expect("the server starts");
     let mut habits = eight_rooms();
     habits.truncate(4);
     let regulars = Regulars::come(&launch.url(), habits);
@@ -215,32 +218,32 @@ async fn a_stop_puts_durable_games_down_and_aborts_the_others() {
         let ended = server.ended().await;
         assert!(ended.status.success(), "{ended:?}");
         aborted.push(created.room.expect("a room").game_id);
-        server = launch.start().await.expect("it starts again");
+        server = launch.start().await.expect("the server restarts");
     }
-    // Had a durable game been aborted, its agents would have seen it.
+    // If a durable game had been aborted, its agents would have received that.
     let ledger = Arc::clone(&regulars.ledger);
     let games = regulars.leave().await;
     let client = connect(&launch).await;
     for game in &games {
-        let record = client.record(game).await.expect("it is kept");
+        let record = client.record(game).await.expect("a stored record");
         ledger.assert_kept(game, &record);
     }
     for game in &aborted {
-        let record = client.record(game).await.expect("it is kept");
-        let replayed = replay::replay(&record).expect("it replays");
+        let record = client.record(game).await.expect("a stored record");
+        let replayed = replay::replay(&record).expect("a valid record");
         assert_eq!(replayed.state, v1::RoomState::Aborted);
-        let file = jsonl::read(&jsonl::path_of(folder.path(), game)).expect("it is written");
+        let file = jsonl::read(&jsonl::path_of(folder.path(), game)).expect("a record file");
         assert!(file == record);
     }
     assert!(server.stop().await.status.success());
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn agents_that_wait_come_back_after_a_stop_and_are_not_sent_away_during_it() {
+async fn waiting_agents_return_after_a_stop_and_are_not_refused_during_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // Long enough for the agents to try again while the server is still there; a game that nobody plays keeps it there.
+    // The stop takes long enough for the agents to retry meanwhile: a game without clients delays it.
     let mut launch = Launch::new(folder.path()).with("--grace", 2);
-    let server = launch.start().await.expect("it starts");
+    let server = launch.start().await.expect("the server starts");
     let client = connect(&launch).await;
     let policy = v1::RoomPolicy {
         decision_time_ms: Some(3_600_000),
@@ -269,7 +272,7 @@ async fn agents_that_wait_come_back_after_a_stop_and_are_not_sent_away_during_it
     let room_id = waiting.room.expect("a room").room_id;
     let all_here = async {
         loop {
-            let room = client.get_room(&room_id).await.expect("it is shown");
+            let room = client.get_room(&room_id).await.expect("still listed");
             if room.seats.iter().filter(|seat| seat.connected).count() == 3 {
                 return;
             }
@@ -279,7 +282,7 @@ async fn agents_that_wait_come_back_after_a_stop_and_are_not_sent_away_during_it
     patiently("three agents to wait", all_here).await;
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
-    let server = launch.start().await.expect("it starts again");
+    let server = launch.start().await.expect("the server restarts");
     let mut left = random_agents(idle);
     left.push((last, RandomAgent::new(9)));
     for (ticket, agent) in left {
@@ -287,7 +290,7 @@ async fn agents_that_wait_come_back_after_a_stop_and_are_not_sent_away_during_it
         playing.spawn(async move { client.play_with(ticket, agent, &options).await });
     }
     for outcome in patiently("both games to end", playing.join_all()).await {
-        let outcome = outcome.expect("nobody was sent away");
+        let outcome = outcome.expect("no agent was refused");
         assert_eq!(outcome.aborted(), None);
     }
     assert!(server.stop().await.status.success());

@@ -1,4 +1,4 @@
-//! Making and finding rooms, and the promises about seeds, rewards and records.
+//! Creating and finding rooms; seeds, rewards and records.
 
 use chefshat_client::Client;
 use chefshat_engine::RuleSetSpec;
@@ -14,12 +14,12 @@ use crate::played::{built_in, ended};
 
 async fn until_over(client: &Client, room_id: &str) -> v1::Room {
     let mut watching = client.spectate(room_id, 0);
-    while watching.next().await.expect("it can be watched").is_some() {}
-    client.get_room(room_id).await.expect("it is still shown")
+    while watching.next().await.expect("a watched room").is_some() {}
+    client.get_room(room_id).await.expect("still listed")
 }
 
 #[tokio::test]
-async fn what_makes_no_sense_is_refused_with_the_field() {
+async fn invalid_requests_are_refused_with_the_field() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = |rules| v1::CreateRoomRequest {
@@ -116,7 +116,7 @@ async fn what_makes_no_sense_is_refused_with_the_field() {
         let error = client
             .create_room(request.clone())
             .await
-            .expect_err("it makes no sense");
+            .expect_err("an invalid request");
         assert_eq!(error.reason(), Some(reason), "{request:?}");
         assert_eq!(
             error.metadata().get("field").map(String::as_str),
@@ -125,12 +125,12 @@ async fn what_makes_no_sense_is_refused_with_the_field() {
         );
     }
     let info = client.server_info().await.expect("the server answers");
-    assert_eq!(info.open_rooms, 0, "nothing was made");
+    assert_eq!(info.open_rooms, 0, "no room was created");
     assert_eq!(info.presets.len(), RuleSetSpec::PRESETS.len());
 }
 
 #[tokio::test]
-async fn a_room_of_built_in_agents_plays_by_itself_and_a_fixed_seed_repeats() {
+async fn a_room_of_built_in_agents_plays_on_its_own_and_a_fixed_seed_repeats() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let mut ends = Vec::new();
@@ -144,12 +144,12 @@ async fn a_room_of_built_in_agents_plays_by_itself_and_a_fixed_seed_repeats() {
                 ..v1::CreateRoomRequest::default()
             })
             .await
-            .expect("the room is made");
+            .expect("a new room");
         let room = created.room.expect("a room");
         assert!(room.seed_fixed && room.seed_commitment.is_empty());
         let over = until_over(&client, &room.room_id).await;
         assert_eq!(over.state(), v1::RoomState::Finished);
-        let record = client.record(&room.game_id).await.expect("the record");
+        let record = client.record(&room.game_id).await.expect("a record");
         ends.push(
             record
                 .into_iter()
@@ -165,7 +165,7 @@ async fn a_room_of_built_in_agents_plays_by_itself_and_a_fixed_seed_repeats() {
 }
 
 #[tokio::test]
-async fn the_record_on_disk_is_the_record_told_and_replays() {
+async fn the_record_file_equals_the_served_record_and_is_valid() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(
@@ -184,36 +184,36 @@ async fn the_record_on_disk_is_the_record_told_and_replays() {
     let unknown = client
         .record("00".repeat(16))
         .await
-        .expect_err("no such game");
+        .expect_err("an unknown game");
     assert_eq!(unknown.reason(), Some("GAME_UNKNOWN"));
     let playing = client.play_many(random_agents(tickets));
     let outcomes = patiently("the game to end", playing).await;
     for outcome in outcomes {
         assert_eq!(outcome.expect("it ended").standings().len(), 4);
     }
-    let told = client.record(&room.game_id).await.expect("the record");
+    let served = client.record(&room.game_id).await.expect("a record");
     let data = server.stop().await;
-    let kept = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("it was written");
-    assert_eq!(kept, told);
-    let replayed = replay::replay(&kept).expect("it replays");
+    let stored = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("a record file");
+    assert_eq!(stored, served);
+    let replayed = replay::replay(&stored).expect("a valid record");
     assert_eq!(replayed.state, v1::RoomState::Finished);
     assert!(replayed.decisions > 50);
 
-    // A record that was tampered with does not.
-    let mut tampered = kept.clone();
+    // A changed record is invalid.
+    let mut tampered = stored.clone();
     let decision = tampered
         .iter_mut()
         .find_map(|line| match line.line.as_mut() {
             Some(Line::Decision(decision)) if decision.action != 199 => Some(decision),
             _ => None,
         })
-        .expect("somebody played");
+        .expect("a decision");
     decision.action = 199;
     assert!(replay::replay(&tampered).is_err());
 }
 
 #[tokio::test]
-async fn rewards_are_told_to_their_own_seat_alone() {
+async fn rewards_are_only_sent_to_their_own_seat() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(
@@ -227,7 +227,7 @@ async fn rewards_are_told_to_their_own_seat_alone() {
     .await;
     let mut seats = attach_all(&server, &tickets).await;
     let room_id = created.room.expect("a room").room_id;
-    // What it has from the start on it is told while the game goes on: no hands.
+    // A spectator from the start sees no hands while the game runs.
     let mut watching = client.spectate(&room_id, 0);
     let mut watched = Vec::new();
     while !matches!(
@@ -237,7 +237,7 @@ async fn rewards_are_told_to_their_own_seat_alone() {
             ..
         })
     ) {
-        watched.extend(watching.next().await.expect("it can be watched"));
+        watched.extend(watching.next().await.expect("a watched room"));
     }
     futures::future::join_all(seats.iter_mut().map(play_on)).await;
     for (seat, number) in seats.iter().zip(0..) {
@@ -262,7 +262,7 @@ async fn rewards_are_told_to_their_own_seat_alone() {
         let (reward, points) = points.expect("the Shift ended");
         assert!((f64::from(reward) - f64::from(points)).abs() < 1e-6);
     }
-    while let Some(event) = watching.next().await.expect("it can be watched") {
+    while let Some(event) = watching.next().await.expect("a watched room") {
         watched.push(event);
     }
     let hands = |events: &[v1::GameEvent]| -> usize {
@@ -274,18 +274,18 @@ async fn rewards_are_told_to_their_own_seat_alone() {
     };
     assert_eq!(hands(&watched), 0);
     assert!(watched.iter().all(|event| event.rewards.is_empty()));
-    // One that comes when the game has ended sees everybody's.
+    // A spectator that starts after the end sees the rewards of all seats.
     let mut late = client.spectate(&room_id, 0);
-    let mut told = Vec::new();
-    while let Some(event) = late.next().await.expect("it can be watched") {
-        told.push(event);
+    let mut served = Vec::new();
+    while let Some(event) = late.next().await.expect("a watched room") {
+        served.push(event);
     }
-    assert_eq!(hands(&told), 4);
-    assert!(told.iter().all(|event| event.rewards.is_empty()));
+    assert_eq!(hands(&served), 4);
+    assert!(served.iter().all(|event| event.rewards.is_empty()));
 }
 
 #[tokio::test]
-async fn built_in_agents_go_by_the_names_they_are_given() {
+async fn built_in_agents_use_their_display_names() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let named = |agent: &str, name: &str| v1::SeatConfig {
@@ -306,7 +306,10 @@ async fn built_in_agents_go_by_the_names_they_are_given() {
             ],
             ..v1::CreateRoomRequest::default()
         };
-        let error = client.create_room(request).await.expect_err("no such seat");
+        let error = client
+            .create_room(request)
+            .await
+            .expect_err("an unknown seat");
         assert_eq!(error.reason(), Some("SEATS_REFUSED"));
     }
     let seats = vec![
@@ -353,7 +356,7 @@ async fn built_in_agents_go_by_the_names_they_are_given() {
 }
 
 #[tokio::test]
-async fn a_person_is_given_time_and_can_follow() {
+async fn built_in_agents_slow_down_for_people() {
     let server = TestServer::start().await;
     let client = server.client().await;
     for (kind, time_ms, bank_ms, pace_ms) in [
@@ -369,9 +372,9 @@ async fn a_person_is_given_time_and_can_follow() {
                 .into(),
             ..v1::CreateRoomRequest::default()
         };
-        let created = client.create_room(request).await.expect("the room is made");
+        let created = client.create_room(request).await.expect("a new room");
         let room = created.room.expect("a room");
-        assert_eq!(room.policy.expect("a policy").pace_ms, None, "it depends");
+        assert_eq!(room.policy.expect("a policy").pace_ms, None, "not yet set");
         let joined = client
             .join(v1::JoinRoomRequest {
                 join_code: created.join_code,
@@ -380,12 +383,12 @@ async fn a_person_is_given_time_and_can_follow() {
                 ..v1::JoinRoomRequest::default()
             })
             .await
-            .expect("the seat is free");
+            .expect("a free seat");
         let mut seat = StreamSeat::attached(server.channel().await, &joined.ticket).await;
         let decision = patiently("a decision", seat.decision()).await;
         assert_eq!(decision.bank_left_ms, bank_ms);
         assert!(decision.time_left_ms <= time_ms);
-        let room = client.get_room(&room.room_id).await.expect("it is there");
+        let room = client.get_room(&room.room_id).await.expect("it exists");
         assert_eq!(room.policy.expect("a policy").pace_ms, Some(pace_ms));
     }
 }

@@ -1,4 +1,4 @@
-//! Those who watch: live, late, delayed, and not at all.
+//! Spectators: live, late, delayed, and not admitted.
 
 use chefshat_proto::v1::{
     self, SpectatorServiceWatchRequest, game_event::Kind,
@@ -9,7 +9,7 @@ use tonic::Code;
 use tonic_types::StatusExt as _;
 
 #[tokio::test]
-async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
+async fn a_spectator_that_stops_reading_is_disconnected_and_the_game_continues() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
@@ -18,14 +18,14 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
-    let mut deaf = narrow_spectator(&server, room_id).await;
+    let mut not_reading = narrow_spectator(&server, room_id).await;
     // It does not read while two hundred Shifts are played.
     play_out(&server, tickets).await;
     let mut events = 0;
     let status = loop {
-        match patiently("the end of the stream", deaf.message()).await {
+        match patiently("the end of the stream", not_reading.message()).await {
             Ok(Some(message)) => events += message.events.len(),
-            Ok(None) => panic!("it saw all {events} events without reading"),
+            Ok(None) => panic!("it received all {events} events without reading"),
             Err(status) => break status,
         }
     };
@@ -37,7 +37,7 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
 }
 
 #[tokio::test]
-async fn spectators_see_everything_public_from_the_event_they_name() {
+async fn spectators_receive_all_public_events_from_the_requested_one() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -45,7 +45,7 @@ async fn spectators_see_everything_public_from_the_event_they_name() {
     play_out(&server, tickets).await;
     let mut all = Vec::new();
     let mut watching = client.spectate(&room_id, 0);
-    while let Some(event) = watching.next().await.expect("it can be watched") {
+    while let Some(event) = watching.next().await.expect("a watched room") {
         all.push(event);
     }
     let numbers: Vec<u64> = all.iter().map(|event| event.sequence).collect();
@@ -56,12 +56,12 @@ async fn spectators_see_everything_public_from_the_event_they_name() {
         Some(Kind::GameEnded(_))
     ));
     let mut late = client.spectate(&room_id, 20);
-    let first = late.next().await.expect("it can be watched");
+    let first = late.next().await.expect("a watched room");
     assert_eq!(first.as_ref(), all.get(19));
 }
 
 #[tokio::test]
-async fn a_policy_can_close_the_door_or_delay() {
+async fn a_policy_can_refuse_or_delay_spectators() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let watch = |room: v1::CreateRoomResponse, snapshot| {
@@ -74,7 +74,7 @@ async fn a_policy_can_close_the_door_or_delay() {
                     ..SpectatorServiceWatchRequest::default()
                 })
                 .await
-                .expect_err("it may not")
+                .expect_err("spectators are refused")
                 .get_details_error_info()
                 .expect("a reason")
                 .reason

@@ -15,7 +15,7 @@ use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus}
 use tonic_types::StatusExt as _;
 
 #[tokio::test]
-async fn a_shutdown_in_mid_game_aborts_it_as_such() {
+async fn a_shutdown_aborts_a_running_game() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -36,22 +36,19 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
             panic!("not aborted, but {last:?}");
         };
         assert_eq!(aborted.reason(), v1::AbortReason::Shutdown);
-        assert!(
-            aborted.reveal.is_some(),
-            "the deals can be checked all the same"
-        );
-        // The server ends the stream by itself.
+        assert!(aborted.reveal.is_some(), "the deals can be checked even so");
+        // The server ends the stream on its own.
         assert!(seat.next_or_end().await.expect("a clean end").is_none());
     }
     let data = server.stop().await;
     let path = chefshat_record::jsonl::path_of(data.path(), &game_id);
     let record = chefshat_record::jsonl::read(&path).expect("an aborted game has a record");
-    let replayed = chefshat_record::replay::replay(&record).expect("it replays");
+    let replayed = chefshat_record::replay::replay(&record).expect("a valid record");
     assert_eq!(replayed.state, v1::RoomState::Aborted);
 }
 
 #[tokio::test]
-async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
+async fn a_running_game_gets_its_grace_and_no_new_rooms_are_created() {
     let server = TestServer::with(
         |config| config.grace = Duration::from_secs(3600),
         Arc::new(MemoryStore::default()),
@@ -69,12 +66,12 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
         .into_inner();
     assert_eq!(status.status(), ServingStatus::Serving);
     server.request_stop();
-    // The room that waited is aborted at once; from then on the shutdown is under way.
+    // The waiting room is aborted at once; from then on the shutdown is in progress.
     let waiting = waiting.room.expect("a room").room_id;
     while client
         .get_room(&waiting)
         .await
-        .expect("it is still shown")
+        .expect("still listed")
         .state()
         != v1::RoomState::Aborted
     {
@@ -104,7 +101,7 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
 }
 
 #[tokio::test]
-async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
+async fn a_client_that_does_not_read_cannot_delay_a_shutdown() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
@@ -112,18 +109,18 @@ async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
         ..v1::RuleSet::default()
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
-    // It answers pings but never reads its stream: what it is told fills its window and then the server's outbox.
+    // It answers pings but never reads its stream: data fills its window and then the server's outbox.
     let room_id = created.room.expect("a room").room_id;
-    let deaf = narrow_spectator(&server, room_id).await;
+    let not_reading = narrow_spectator(&server, room_id).await;
     play_out(&server, tickets).await;
     server.request_stop();
     server.stop().await;
-    drop(deaf);
+    drop(not_reading);
 }
 
 #[tokio::test]
-async fn a_store_that_fails_ends_the_server_and_tells_nobody_of_the_decision() {
-    // Four joins and the start are kept, then ten decisions; the next is not.
+async fn a_failing_store_ends_the_server_and_the_decision_is_not_published() {
+    // Four joins and the start are committed, then ten decisions; the next is not.
     let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(15))).await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
@@ -143,7 +140,7 @@ async fn a_store_that_fails_ends_the_server_and_tells_nobody_of_the_decision() {
     }))
     .await;
     for status in ends {
-        // What the SDKs try again after, until the server is back.
+        // The code after which SDKs retry until the server is back.
         assert_eq!(status.code(), Code::Unavailable, "{status}");
         let reason = status.get_details_error_info().map(|info| info.reason);
         assert_eq!(reason.as_deref(), Some("STORE_FAILED"));
@@ -154,12 +151,15 @@ async fn a_store_that_fails_ends_the_server_and_tells_nobody_of_the_decision() {
             .iter()
             .filter(|event| matches!(event.kind, Some(Kind::Play(_) | Kind::Pass(_))))
             .count();
-        assert!(turns <= 10, "{turns} decisions were told, ten were kept");
+        assert!(
+            turns <= 10,
+            "{turns} decisions were published, ten were committed"
+        );
     }
     let failure = patiently("the server to end", server.ended()).await;
-    let failure = failure.expect_err("it cannot go on").to_string();
+    let failure = failure.expect_err("it cannot continue").to_string();
     assert!(
         failure.contains("started again"),
-        "it says what to do: {failure}"
+        "it gives advice: {failure}"
     );
 }

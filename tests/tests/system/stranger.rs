@@ -1,4 +1,4 @@
-//! Bytes that are no messages, and messages that are no sense: no panic, no change, and everybody else plays on.
+//! Malformed bytes and meaningless messages: no panic, no change, and other clients are unaffected.
 
 use bytes::{Buf, BufMut, Bytes};
 use chefshat_proto::v1;
@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use tonic::Status;
 use tonic::codec::{Codec, DecodeBuf, Decoder, EncodeBuf, Encoder};
 
-/// Sends bytes as they are, and takes whatever comes.
+/// A codec that passes bytes through.
 #[derive(Debug, Clone, Copy, Default)]
 struct Raw;
 
@@ -47,7 +47,7 @@ impl Decoder for Raw {
 }
 
 /// Random bytes, and valid messages with some bytes changed.
-fn nonsense(generator: &mut ChaCha8Rng, ticket: &str) -> Bytes {
+fn garbage(generator: &mut ChaCha8Rng, ticket: &str) -> Bytes {
     use prost_message::encode;
     let mut bytes = match generator.random_range(0..4) {
         0 => (0..generator.random_range(0..200))
@@ -99,7 +99,7 @@ async fn no_bytes_harm_a_server_or_a_game() {
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let mut seats = attach_all(&server, &tickets[..3]).await;
     let room_id = created.room.expect("a room").room_id;
-    let before = client.get_room(&room_id).await.expect("it is there");
+    let before = client.get_room(&room_id).await.expect("it exists");
 
     let mut generator = ChaCha8Rng::seed_from_u64(5);
     let paths = [
@@ -120,14 +120,14 @@ async fn no_bytes_harm_a_server_or_a_game() {
     for round in 0..40 {
         for path in paths {
             let messages: Vec<Bytes> = (0..3)
-                .map(|_| nonsense(&mut generator, &tickets[3]))
+                .map(|_| garbage(&mut generator, &tickets[3]))
                 .collect();
             grpc.ready().await.expect("the connection holds");
             let request = tonic::Request::new(tokio_stream::iter(messages));
             let path = http::uri::PathAndQuery::from_static(path);
             match grpc.streaming(request, path, Raw).await {
                 Ok(mut response) => {
-                    // One message or the end: what it says does not matter, that it comes does. Watch goes on for ever.
+                    // One message or the end: only that it arrives matters, not what it says. Watch has no end.
                     if chefshat_tests::patiently("an answer", response.get_mut().message())
                         .await
                         .is_err()
@@ -141,7 +141,7 @@ async fn no_bytes_harm_a_server_or_a_game() {
         assert!(round < 40);
     }
     assert!(refused > 100, "only {refused} were refused");
-    let after = client.get_room(&room_id).await.expect("it is there");
+    let after = client.get_room(&room_id).await.expect("it exists");
     assert_eq!(after, before, "nothing has changed");
     seats.push(StreamSeat::attached(server.channel().await, &tickets[3]).await);
     let reasons = futures::future::join_all(seats.iter_mut().map(play_on)).await;
@@ -149,7 +149,7 @@ async fn no_bytes_harm_a_server_or_a_game() {
 }
 
 #[tokio::test]
-async fn a_message_over_the_limit_ends_its_stream_alone() {
+async fn a_message_over_the_limit_ends_only_its_stream() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;

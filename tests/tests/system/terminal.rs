@@ -1,4 +1,5 @@
-//! `chefshat play` and `chefshat watch` in a real terminal (see `tmux`). What the screens say in detail is tested beside their code.
+//! `chefshat play` and `chefshat watch` in a real terminal (see `tmux`). The tests beside their code
+//! check the screens in detail.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,7 +36,7 @@ async fn a_person_plays_two_shifts_with_one_command() {
     terminal.press("?");
     terminal.wait_for("to another card").await;
     terminal.press("?");
-    // Two sizes it must bear with, and the first again.
+    // Two sizes it must cope with, and the first again.
     terminal.tmux(&["resize-window", "-x", "60", "-y", "20"]);
     terminal.wait_for("The table needs").await;
     terminal.tmux(&["resize-window", "-x", "120", "-y", "40"]);
@@ -53,14 +54,14 @@ async fn a_person_plays_two_shifts_with_one_command() {
     let verified = verify
         .args(["verify", record])
         .output()
-        .expect("the program runs");
+        .expect("the program starts");
     assert!(verified.status.success(), "{verified:?}");
-    let text = std::fs::read_to_string(record).expect("the record is there");
-    // What the person's side measured stands with the decisions.
+    let text = std::fs::read_to_string(record).expect("a record file");
+    // The record has what the person's terminal measured.
     assert!(text.contains("person_decision_time_ms"), "{text}");
 
     let watched =
-        Terminal::start("and watches the record", &["watch", record]).expect("tmux is there");
+        Terminal::start("and watches the record", &["watch", record]).expect("tmux is installed");
     watched.wait_for("hands").await;
     watched.press("End");
     watched.wait_for("wins the game").await;
@@ -72,7 +73,7 @@ async fn a_person_plays_two_shifts_with_one_command() {
 }
 
 #[tokio::test]
-async fn a_game_goes_on_when_the_server_comes_back_and_is_watched() {
+async fn a_game_continues_when_the_server_returns_and_is_watched() {
     let data = TempDir::new().expect("a temporary folder");
     let mut launch = Launch::new(data.path());
     let server = launch.start().await.expect("the server listens");
@@ -85,7 +86,7 @@ async fn a_game_goes_on_when_the_server_comes_back_and_is_watched() {
         return;
     };
     let spectator =
-        Terminal::start(test, &["watch", &room_id, "--server", &url]).expect("tmux is there");
+        Terminal::start(test, &["watch", &room_id, "--server", &url]).expect("tmux is installed");
     terminal.wait_for("Your turn").await;
     spectator.wait_for("● live").await;
     let spectated = spectator.wait_for("Ada").await;
@@ -102,7 +103,7 @@ async fn a_game_goes_on_when_the_server_comes_back_and_is_watched() {
     server.stop().await;
 }
 
-/// A room for one person and three built-in agents, without hurry: its join code and its id.
+/// A room for one person and three built-in agents, without time pressure: its join code and its id.
 async fn room(client: &Client) -> (String, String) {
     use v1::seat_config::FilledBy::{BuiltInAgent, ReservedFor};
     let person = ReservedFor(v1::ParticipantKind::Human.into());
@@ -125,19 +126,16 @@ async fn room(client: &Client) -> (String, String) {
             ..v1::CreateRoomRequest::default()
         })
         .await
-        .expect("the room is made");
-    (
-        made.join_code,
-        made.room.expect("the server says which").room_id,
-    )
+        .expect("a new room");
+    (made.join_code, made.room.expect("a room").room_id)
 }
 
 #[tokio::test]
-async fn leaving_gives_the_terminal_back() {
+async fn leaving_restores_the_terminal() {
     let data = TempDir::new().expect("a temporary folder");
     let folder = data.path().to_str().expect("a path of text");
     let play = ["play", "--local", "--data-dir", folder];
-    let Some(terminal) = Terminal::start("leaving_gives_the_terminal_back", &play) else {
+    let Some(terminal) = Terminal::start("leaving_restores_the_terminal", &play) else {
         return;
     };
     terminal.wait_for("your hand").await;
@@ -147,14 +145,14 @@ async fn leaving_gives_the_terminal_back() {
     let said = terminal.ended(1).await;
     assert!(said.contains("you left"), "{said}");
 
-    let terminated = Terminal::start("and so does being ended", &play).expect("tmux is there");
+    let terminated = Terminal::start("and so does a signal", &play).expect("tmux is installed");
     terminated.wait_for("your hand").await;
     terminated.signal("-TERM");
     terminated.ended(1).await;
 }
 
-/// Joins a tournament of built-in agents by its code, leaves in the middle, goes on with the ticket, through a restart of the server, to the
-/// end.
+/// Joins a tournament of built-in agents by its code, leaves in the middle, and resumes with the ticket,
+/// through a restart of the server, to the end.
 #[tokio::test]
 async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     let data = TempDir::new().expect("a temporary folder");
@@ -168,18 +166,18 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     let Some(terminal) = Terminal::start(test, &join) else {
         return;
     };
-    // A game that nobody else is awaited for begins by itself, and its result is shown.
+    // A game that waits for nobody else starts on its own, and its result is shown.
     terminal.wait_for("your hand").await;
     terminal.play("the game is over").await;
     terminal.press("q");
     terminal.wait_for("Leave the tournament?").await;
     terminal.press("y");
     let said = terminal.ended(1).await;
-    let (_, ticket) = said.split_once("--ticket ").expect("how one comes back");
+    let (_, ticket) = said.split_once("--ticket ").expect("the option to resume");
     let ticket = ticket.split_whitespace().next().expect("a ticket");
 
     let back = ["play", "--server", &url, "--ticket", ticket];
-    let terminal = Terminal::start(test, &back).expect("tmux is there");
+    let terminal = Terminal::start(test, &back).expect("tmux is installed");
     terminal.wait_for("your hand").await;
     server.kill().await;
     terminal.wait_for("connection is lost").await;
@@ -195,14 +193,15 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
 
     let client = Client::connect(&url).await.expect("the server listens");
     let results = client.tournament_results(tournament_id).await;
-    let results = results.expect("there are some");
+    let results = results.expect("results");
     let games: Vec<u32> = results.standings.iter().map(|line| line.games).collect();
     let forfeited: u32 = results.standings.iter().map(|line| line.forfeited).sum();
     assert_eq!((games, forfeited), (vec![3; 4], 0));
     server.stop().await;
 }
 
-/// A tournament of three rounds for one person and three built-in agents, without hurry: its join code and its id.
+/// A tournament of three rounds for one person and three built-in agents, without time pressure: its
+/// join code and its id.
 async fn tournament(client: &Client) -> (String, String) {
     let made = client
         .create_tournament(v1::TournamentSettings {
@@ -221,14 +220,14 @@ async fn tournament(client: &Client) -> (String, String) {
             ..v1::TournamentSettings::default()
         })
         .await
-        .expect("the tournament is made");
-    let tournament = made.tournament.expect("the server says which");
+        .expect("created");
+    let tournament = made.tournament.expect("a tournament");
     (made.join_code, tournament.tournament_id)
 }
 
-/// What is refused ends with a sentence that says what to do.
+/// Refusals end with a sentence that gives advice.
 #[tokio::test]
-async fn what_is_refused_says_what_to_do() {
+async fn refusals_give_advice() {
     let data = TempDir::new().expect("a temporary folder");
     let mut launch = Launch::new(data.path());
     let server = launch.start().await.expect("the server listens");
@@ -241,7 +240,7 @@ async fn what_is_refused_says_what_to_do() {
         kind: v1::ParticipantKind::Human.into(),
         ..v1::JoinRoomRequest::default()
     });
-    taken.await.expect("there is a seat");
+    taken.await.expect("a free seat");
     let long = "x".repeat(65);
     let table: [(&[&str], &str); 5] = [
         (&["--code", "ZZZZZZZZ"], "check the code"),
@@ -259,7 +258,7 @@ async fn what_is_refused_says_what_to_do() {
             true => play,
             false => [play.as_slice(), &["--server", &url]].concat(),
         };
-        let Some(terminal) = Terminal::start("what_is_refused_says_what_to_do", &play) else {
+        let Some(terminal) = Terminal::start("refusals_give_advice", &play) else {
             return;
         };
         let said = terminal.ended(1).await;
@@ -268,11 +267,11 @@ async fn what_is_refused_says_what_to_do() {
     server.stop().await;
 }
 
-/// The one record in a data folder.
+/// The only record in a data folder.
 fn only_record(data_dir: &Path) -> PathBuf {
-    let records = std::fs::read_dir(data_dir.join("records")).expect("records were written");
+    let records = std::fs::read_dir(data_dir.join("records")).expect("a folder of records");
     let mut records = records.map(|entry| entry.expect("an entry").path());
-    let record = records.next().expect("a record was written");
+    let record = records.next().expect("a record");
     assert_eq!(records.next(), None);
     record
 }

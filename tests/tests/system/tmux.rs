@@ -1,4 +1,4 @@
-//! A real terminal for tests: tmux, whose keys a test presses and whose screen it reads. What is to be seen there is the tests' own.
+//! A real terminal for tests: tmux, controlled by keys, with a readable screen.
 
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -7,24 +7,25 @@ use chefshat_tests::{PATIENCE, set_up, skip};
 use tempfile::TempDir;
 use tokio::time::sleep;
 
-/// Time between two looks at the screen.
+/// Interval between two reads of the screen.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// A terminal; gone when dropped.
+/// A terminal; closed when dropped.
 pub(crate) struct Terminal {
-    /// tmux's socket, in a folder of its own.
+    /// tmux's socket, in its own folder.
     folder: TempDir,
 }
 
 impl Terminal {
-    /// Starts the program in a terminal of 80 columns and 24 rows; `None`, said, where there is no tmux.
+    /// Starts the program in a terminal of 80 columns and 24 rows; without tmux reports that and returns
+    /// `None`.
     pub(crate) fn start(test: &str, arguments: &[&str]) -> Option<Self> {
         let there = Command::new("tmux")
             .arg("-V")
             .stdout(Stdio::null())
             .status();
         if !there.is_ok_and(|status| status.success()) {
-            skip(test, "there is no tmux; `apt-get install tmux` brings it");
+            skip(test, "tmux is not installed; run `apt-get install tmux`");
             return None;
         }
         let terminal = Self {
@@ -34,7 +35,7 @@ impl Terminal {
         let words = words.collect::<Vec<_>>().join(" ");
         let binary = set_up("CHEFSHAT_BIN");
         let binary = binary.display();
-        // What the program says after its screen, its end, and how it left the terminal stay to be read.
+        // The program's last output, its exit code and the restored terminal stay readable.
         let line = format!(
             "before=$(stty -g); '{binary}' {words}; echo \"ended with $?\"; \
              [ \"$before\" = \"$(stty -g)\" ] && echo 'terminal as before'; exec cat"
@@ -64,7 +65,10 @@ impl Terminal {
         }
         command.env("LC_ALL", "C.UTF-8").arg("-S");
         command.arg(self.folder.path().join("socket"));
-        command.args(arguments).output().expect("the program runs")
+        command
+            .args(arguments)
+            .output()
+            .expect("the program starts")
     }
 
     pub(crate) fn press(&self, key: &str) {
@@ -72,30 +76,30 @@ impl Terminal {
         assert!(pressed.status.success(), "{pressed:?}");
     }
 
-    /// Sends the program a signal from outside, as no key does: the terminal gives keys to it as they are.
+    /// Sends the program a signal; keys cannot, because the terminal passes them on unchanged.
     pub(crate) fn signal(&self, signal: &str) {
         let shell = self.tmux(&["display-message", "-p", "#{pane_pid}"]).stdout;
-        let shell = String::from_utf8(shell).expect("a number is text");
-        let told = Command::new("pkill")
+        let shell = String::from_utf8(shell).expect("a process id");
+        let sent = Command::new("pkill")
             .args([signal, "-P", shell.trim()])
             .status();
-        assert!(told.is_ok_and(|status| status.success()), "{shell}");
+        assert!(sent.is_ok_and(|status| status.success()), "{shell}");
     }
 
-    /// The screen, lines that were too long for it put together again.
+    /// The screen, with wrapped lines joined.
     fn screen(&self) -> String {
         let screen = self.tmux(&["capture-pane", "-p", "-J"]).stdout;
-        String::from_utf8(screen).expect("a screen is text")
+        String::from_utf8(screen).expect("text")
     }
 
-    /// Waits for the program's end, with this exit code, and for the terminal to be what it was before.
+    /// Waits until the program has exited with this code and the terminal is restored.
     pub(crate) async fn ended(&self, code: u8) -> String {
         let said = self.wait_for("terminal as before").await;
         assert!(said.contains(&format!("ended with {code}")), "{said}");
         said
     }
 
-    /// Waits until the screen is as wanted.
+    /// Waits until the screen meets a condition.
     async fn wait(&self, what: &str, wanted: impl Fn(&str) -> bool) -> String {
         let begun = Instant::now();
         loop {
@@ -103,7 +107,10 @@ impl Terminal {
             if wanted(&screen) {
                 return screen;
             }
-            assert!(begun.elapsed() < PATIENCE, "no {what}:\n{screen}");
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "timed out waiting for {what}:\n{screen}"
+            );
             sleep(PAUSE).await;
         }
     }
@@ -112,7 +119,7 @@ impl Terminal {
         self.wait(words, |screen| screen.contains(words)).await
     }
 
-    /// Plays as a person would, by what the screen says, until it says `until`; gives the number of decisions.
+    /// Plays by what the screen says until it says `until`; returns the number of decisions.
     pub(crate) async fn play(&self, until: &str) -> usize {
         let begun = Instant::now();
         let mut decisions = 0;
@@ -136,7 +143,7 @@ impl Terminal {
             if let Some(key) = key {
                 decisions += 1;
                 self.press(key);
-                // The next look is for what came of it.
+                // The next iteration reads the result.
                 self.wait("answer", |now| now != screen).await;
             }
             assert!(begun.elapsed() < PATIENCE, "no end:\n{screen}");

@@ -1,4 +1,5 @@
-//! Agents of the Rust SDK in tournaments: several games at a time, every outcome told, connections that are cut in mid-game.
+//! Agents of the Rust SDK in tournaments: several games at a time, an outcome for each game, and lost
+//! connections in mid-game.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -25,10 +26,7 @@ async fn round_robin(client: &Client) -> (String, Vec<String>) {
         start_when_joined: AGENTS,
         ..v1::TournamentSettings::default()
     };
-    let made = client
-        .create_tournament(settings)
-        .await
-        .expect("it is made");
+    let made = client.create_tournament(settings).await.expect("created");
     let tournament = made.tournament.expect("a tournament");
     let mut tickets = Vec::new();
     for number in 0..AGENTS {
@@ -45,7 +43,7 @@ async fn round_robin(client: &Client) -> (String, Vec<String>) {
     (tournament.tournament_id, tickets)
 }
 
-/// What participants have told of their games is what the server has counted.
+/// Checks that the participants' outcomes equal what the server has counted.
 async fn compare(client: &Client, tournament_id: &str, played: &[Vec<Outcome>]) {
     let request = v1::ListTournamentGamesRequest {
         tournament_id: tournament_id.to_owned(),
@@ -59,15 +57,15 @@ async fn compare(client: &Client, tournament_id: &str, played: &[Vec<Outcome>]) 
     assert_eq!(games.len(), 6);
     for game in &games {
         assert_eq!(game.state(), v1::TournamentGameState::Counted);
-        assert!(game.rated, "nobody forfeited or was substituted");
+        assert!(game.rated, "no forfeit and no substitute");
         for (seat, line) in (0..).zip(&game.seats) {
             let outcomes = &played[line.participant as usize];
             let outcome = outcomes
                 .iter()
                 .find(|outcome| outcome.game_id == game.game_id);
-            let outcome = outcome.expect("every game has an outcome for each who played");
+            let outcome = outcome.expect("every participant has an outcome for each game");
             assert_eq!((outcome.seat, &outcome.room_id), (seat, &game.room_id));
-            let standing = outcome.standing().expect("it has a result");
+            let standing = outcome.standing().expect("a result");
             assert_eq!((standing.place, standing.points), (line.place, line.points),);
         }
     }
@@ -91,7 +89,7 @@ async fn four_agents_play_a_tournament_to_its_end() {
     let mut follower = client.follow_tournament(tournament_id.as_str());
     let following = async {
         let mut last = None;
-        while let Some(report) = follower.next().await.expect("it can be followed") {
+        while let Some(report) = follower.next().await.expect("an update") {
             last = report.tournament;
         }
         last.expect("at least one report")
@@ -111,7 +109,7 @@ async fn four_agents_play_a_tournament_to_its_end() {
     let leaderboard = (client
         .leaderboard(v1::GetLeaderboardRequest::default())
         .await)
-        .expect("there is one");
+        .expect("an outcome");
     assert_eq!((leaderboard.games, leaderboard.rated.len()), (6, 4));
 }
 
@@ -132,7 +130,7 @@ impl Proxy {
         let now = Arc::clone(&cut);
         tokio::spawn(async move {
             while let Ok((mut near, _)) = listener.accept().await {
-                let cut = now.lock().expect("nobody panics").clone();
+                let cut = now.lock().expect("no panic").clone();
                 tokio::spawn(async move {
                     let mut far = TcpStream::connect(server)
                         .await
@@ -145,14 +143,14 @@ impl Proxy {
         Self { address, cut }
     }
 
-    /// Cuts the connections there are; new ones are forwarded.
+    /// Cuts the current connections; new ones are forwarded.
     fn cut(&self) {
-        let mut cut = self.cut.lock().expect("nobody panics");
+        let mut cut = self.cut.lock().expect("no panic");
         std::mem::take(&mut *cut).cancel();
     }
 }
 
-/// Has its connection cut before every fifth decision of a game, and looks at what it is told.
+/// An agent whose connection is cut before every fifth decision of a game; it checks what it receives.
 struct Cutting {
     proxy: Proxy,
     cuts: Arc<AtomicUsize>,
@@ -166,7 +164,7 @@ impl Agent for Cutting {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         assert!(
             self.asked.insert(request.decision_id),
-            "asked once for each"
+            "one request for each"
         );
         self.decisions += 1;
         if self.decisions.is_multiple_of(5) {
@@ -182,7 +180,7 @@ impl Agent for Cutting {
 }
 
 #[tokio::test]
-async fn a_participant_whose_connection_is_cut_goes_on_in_all_its_games() {
+async fn a_participant_whose_connection_is_cut_continues_in_all_its_games() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (tournament_id, mut tickets) = round_robin(&client).await;
@@ -191,7 +189,8 @@ async fn a_participant_whose_connection_is_cut_goes_on_in_all_its_games() {
         client.play_tournament(ticket, move |_: &v1::Attached| RandomAgent::new(seed))
     }));
     let proxy = Proxy::start(server.address).await;
-    let through = (Client::connect(proxy.address.to_string()).await).expect("it forwards");
+    let through =
+        (Client::connect(proxy.address.to_string()).await).expect("a forwarded connection");
     let made = Arc::new(AtomicUsize::new(0));
     let cuts = Arc::new(AtomicUsize::new(0));
     let cutting = through.play_tournament(last, |_: &v1::Attached| {

@@ -1,4 +1,5 @@
-//! Deals that others still play: nobody is told anything by which they could be known, and afterwards everybody.
+//! Deals that others still play: nothing that could reveal them is published before the last game with
+//! the deal has ended, and everything afterwards.
 
 use std::collections::BTreeSet;
 
@@ -17,12 +18,12 @@ use crate::tournaments::{
 };
 use crate::vectors::setup;
 
-/// A game of the tournament that has been counted, as soon as there is one.
+/// The first counted game of the tournament.
 async fn counted(service: &mut Tournaments, tournament_id: &str) -> v1::TournamentGame {
     let request = v1::FollowTournamentRequest {
         tournament_id: tournament_id.to_owned(),
     };
-    let follow = service.follow_tournament(request).await.expect("it may");
+    let follow = service.follow_tournament(request).await.expect("a stream");
     let mut follow = follow.into_inner();
     loop {
         let games = games(service, tournament_id).await;
@@ -30,19 +31,19 @@ async fn counted(service: &mut Tournaments, tournament_id: &str) -> v1::Tourname
         if let Some(game) = games.into_iter().find(counted) {
             return game;
         }
-        let told = follow.message().await.expect("no error");
-        assert!(told.is_some(), "it goes on");
+        let update = follow.message().await.expect("no error");
+        assert!(update.is_some(), "the tournament continues");
     }
 }
 
-/// Checks that nothing can be had by which the deals of a game could be known.
+/// Checks that nothing that could reveal the deals of a game is accessible.
 async fn withheld(server: &TestServer, client: &Client, game: &v1::TournamentGame) {
     let id = game.game_id.as_str();
-    let refused = client.record(id).await.expect_err("it is closed");
+    let refused = client.record(id).await.expect_err("a withheld record");
     assert_eq!(refused.reason(), Some("SERIES_OPEN"));
     assert_eq!(streamed(server).await, BTreeSet::new());
     let watched = client.spectate(&game.room_id, 0).next().await;
-    let refused = watched.expect_err("nobody may watch");
+    let refused = watched.expect_err("spectators are refused");
     assert_eq!(refused.reason(), Some("SPECTATORS_NOT_ADMITTED"));
     let from_it = v1::CreateRoomRequest {
         start: point(id, 1, true),
@@ -53,7 +54,10 @@ async fn withheld(server: &TestServer, client: &Client, game: &v1::TournamentGam
         ..v1::CreateRoomRequest::default()
     };
     for request in [from_it, with_its_players] {
-        let refused = client.create_room(request).await.expect_err("it is closed");
+        let refused = client
+            .create_room(request)
+            .await
+            .expect_err("a withheld record");
         assert_eq!(refused.reason(), Some("SERIES_OPEN"));
     }
     let games = v1::VectorSetup {
@@ -64,11 +68,11 @@ async fn withheld(server: &TestServer, client: &Client, game: &v1::TournamentGam
         })),
         ..setup(1, 1)
     };
-    let refused = client.vector(games).await.expect_err("it is closed");
+    let refused = client.vector(games).await.expect_err("a withheld record");
     assert_eq!(refused.reason(), Some("SERIES_OPEN"));
 }
 
-/// The games whose records are given out together.
+/// The games whose records a stream contains.
 async fn streamed(server: &TestServer) -> BTreeSet<String> {
     let mut service = RecordServiceClient::new(server.channel().await);
     let stream = service.stream_records(v1::StreamRecordsRequest::default());
@@ -86,12 +90,15 @@ async fn streamed(server: &TestServer) -> BTreeSet<String> {
         .collect()
 }
 
-/// Checks that all games of a tournament that is over can be had, and were dealt alike.
+/// Checks that all records of a finished tournament are accessible, and have the same deals.
 async fn open_and_alike(server: &TestServer, client: &Client, games: &[v1::TournamentGame]) {
     let mut seeds = BTreeSet::new();
     for game in games {
-        let lines = client.record(&game.game_id).await.expect("it is open now");
-        chefshat_record::replay::replay(&lines).expect("it replays");
+        let lines = client
+            .record(&game.game_id)
+            .await
+            .expect("an accessible record");
+        chefshat_record::replay::replay(&lines).expect("a valid record");
         let reveal = lines.iter().rev().find_map(|line| match &line.line {
             Some(Line::Event(event)) => match &event.kind {
                 Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
@@ -99,16 +106,16 @@ async fn open_and_alike(server: &TestServer, client: &Client, games: &[v1::Tourn
             },
             _ => None,
         });
-        seeds.insert(reveal.expect("the record reveals it").game_seed);
+        seeds.insert(reveal.expect("a revealed seed").game_seed);
         assert_eq!(game.series_id, games[0].series_id);
     }
-    assert_eq!(seeds.len(), 1, "all games were dealt alike");
+    assert_eq!(seeds.len(), 1, "all games had the same deals");
     let all: BTreeSet<String> = games.iter().map(|game| game.game_id.clone()).collect();
     assert_eq!(streamed(server).await, all);
 }
 
 #[tokio::test]
-async fn deals_that_other_tables_still_play_are_told_to_nobody() {
+async fn deals_that_other_tables_still_play_are_withheld() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(
@@ -128,7 +135,7 @@ async fn deals_that_other_tables_still_play_are_told_to_nobody() {
     stream
         .attach(v1::Attach {
             ticket: joined.ticket,
-            // What one table adds to the seed must not make its deals other ones.
+            // A table's contribution to the seed must not change its deals.
             entropy: vec![1; 32],
             ..v1::Attach::default()
         })
@@ -136,15 +143,17 @@ async fn deals_that_other_tables_still_play_are_told_to_nobody() {
     start(&mut service, &created).await;
     assert!(matches!(stream.next().await, Update::Entered(_)));
     let (_, decision) = seated(&mut stream).await;
-    let client = Client::connect(server.url()).await.expect("it listens");
-    // The built-in agents' table has ended, or will without us.
+    let client = Client::connect(server.url())
+        .await
+        .expect("the server listens");
+    // The built-in agents' table ends without this client.
     let id = id_of(&created);
     let done = patiently("the other table's end", counted(&mut service, &id)).await;
     withheld(&server, &client, &done).await;
-    // Then we play on.
+    // Then this client plays on.
     let ended = play_game(&mut stream, CALLED, decision).await;
     match ended.kind {
-        Some(Kind::GameEnded(ended)) => assert_eq!(ended.reveal, None, "it stands in the record"),
+        Some(Kind::GameEnded(ended)) => assert_eq!(ended.reveal, None, "it is only in the record"),
         other => panic!("the game did not end: {other:?}"),
     }
     over(&mut service, &id).await;
@@ -154,7 +163,7 @@ async fn deals_that_other_tables_still_play_are_told_to_nobody() {
 }
 
 #[tokio::test]
-async fn a_deal_that_is_played_again_is_told_to_nobody_before_its_last_game_has_ended() {
+async fn a_deal_that_is_played_again_is_withheld_until_its_last_game_has_ended() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(
@@ -178,7 +187,9 @@ async fn a_deal_that_is_played_again_is_told_to_nobody_before_its_last_game_has_
     let joined = join_as(&mut service, ada).await;
     let mut stream = entered(&server, &joined.ticket).await;
     start(&mut service, &created).await;
-    let client = Client::connect(server.url()).await.expect("it listens");
+    let client = Client::connect(server.url())
+        .await
+        .expect("the server listens");
     let id = id_of(&created);
     for game in 0..4 {
         let (room, decision) = seated(&mut stream).await;

@@ -1,4 +1,4 @@
-//! What a tournament cannot be and what nobody may do to it: refused by name, with the field at fault.
+//! Invalid settings and forbidden actions of tournaments: refused with a reason and the field at fault.
 
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
 use chefshat_tests::TestServer;
@@ -8,7 +8,7 @@ use tonic_types::StatusExt as _;
 use crate::tournaments::{create, id_of};
 
 #[tokio::test]
-async fn what_cannot_be_is_refused_by_name() {
+async fn invalid_requests_are_refused_with_the_field() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let swiss = v1::TournamentFormat::Swiss.into();
@@ -114,9 +114,9 @@ async fn what_cannot_be_is_refused_by_name() {
             ..Default::default()
         };
         let refused = service.create_tournament(request).await;
-        let refused = refused.expect_err("it is refused");
+        let refused = refused.expect_err("a refusal");
         assert_eq!(refused.code(), Code::InvalidArgument, "{refused:?}");
-        let info = refused.get_details_error_info().expect("it says why");
+        let info = refused.get_details_error_info().expect("error info");
         assert_eq!(info.reason, reason);
         assert_eq!(info.metadata["field"], field);
     }
@@ -137,7 +137,7 @@ async fn what_cannot_be_is_refused_by_name() {
         ..v1::JoinTournamentRequest::default()
     };
     let first = service.join_tournament(ask("Ada")).await;
-    let first = first.expect("there is a place").into_inner();
+    let first = first.expect("joined").into_inner();
     let described = first.tournament.expect("a tournament");
     assert_eq!(described.participants.len(), 1);
     let listed = service
@@ -152,8 +152,11 @@ async fn what_cannot_be_is_refused_by_name() {
         kind: 77,
         ..v1::GetLeaderboardRequest::default()
     };
-    let refused = service.get_leaderboard(no_kind).await.expect_err("no kind");
-    let info = refused.get_details_error_info().expect("it says why");
+    let refused = service
+        .get_leaderboard(no_kind)
+        .await
+        .expect_err("an unknown kind");
+    let info = refused.get_details_error_info().expect("error info");
     assert_eq!(info.reason, "KIND_REFUSED");
     let joins = [
         (
@@ -196,8 +199,8 @@ async fn what_cannot_be_is_refused_by_name() {
     ];
     for (request, reason) in joins {
         let refused = service.join_tournament(request).await;
-        let refused = refused.expect_err("it is refused");
-        let info = refused.get_details_error_info().expect("it says why");
+        let refused = refused.expect_err("a refusal");
+        let info = refused.get_details_error_info().expect("error info");
         assert_eq!(info.reason, reason);
     }
     let early = v1::StartTournamentRequest {
@@ -213,19 +216,16 @@ async fn what_cannot_be_is_refused_by_name() {
         (early, "TOO_FEW_PARTICIPANTS"),
     ] {
         let refused = service.start_tournament(request).await;
-        let refused = refused.expect_err("it is refused");
-        let info = refused.get_details_error_info().expect("it says why");
+        let refused = refused.expect_err("a refusal");
+        let info = refused.get_details_error_info().expect("error info");
         assert_eq!(info.reason, reason);
     }
-    // Closed, it takes nobody any more.
+    // A closed tournament accepts no participants.
     let close = v1::CloseTournamentRequest {
         tournament_id: id_of(&created),
         owner_token: created.owner_token.clone(),
     };
-    let closed = service
-        .close_tournament(close)
-        .await
-        .expect("its owner may");
+    let closed = service.close_tournament(close).await.expect("closed");
     let closed = closed.into_inner().tournament.expect("a tournament");
     assert_eq!(closed.state(), v1::TournamentState::Closed);
     let refused = service.join_tournament(ask("Bo")).await;

@@ -1,5 +1,5 @@
-//! Tournaments as participants live them, over real connections: seated by the server, placed last when they do not come.
-//! What is told of deals that others still play is in `tournament_deals`, what is refused in `tournament_refusals`.
+//! Tournaments from the view of participants, over real connections: seated by the server, placed last
+//! if absent. `tournament_deals` tests withheld deals, `tournament_refusals` refusals.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
@@ -25,7 +25,7 @@ pub(crate) async fn create(
         ..Default::default()
     };
     let created = service.create_tournament(request).await;
-    created.expect("the tournament is made").into_inner()
+    created.expect("created").into_inner()
 }
 
 pub(crate) async fn join(
@@ -46,7 +46,7 @@ pub(crate) async fn join_as(
     request: v1::JoinTournamentRequest,
 ) -> v1::JoinTournamentResponse {
     let joined = service.join_tournament(request).await;
-    joined.expect("there is a place").into_inner()
+    joined.expect("joined").into_inner()
 }
 
 pub(crate) async fn start(service: &mut Tournaments, created: &v1::CreateTournamentResponse) {
@@ -54,7 +54,7 @@ pub(crate) async fn start(service: &mut Tournaments, created: &v1::CreateTournam
         tournament_id: id_of(created),
         owner_token: created.owner_token.clone(),
     };
-    service.start_tournament(request).await.expect("it begins");
+    service.start_tournament(request).await.expect("started");
 }
 
 pub(crate) fn id_of(created: &v1::CreateTournamentResponse) -> String {
@@ -67,7 +67,7 @@ pub(crate) async fn over(service: &mut Tournaments, tournament_id: &str) -> v1::
     let request = v1::FollowTournamentRequest {
         tournament_id: tournament_id.to_owned(),
     };
-    let follow = service.follow_tournament(request).await.expect("it may");
+    let follow = service.follow_tournament(request).await.expect("a stream");
     let mut follow = follow.into_inner();
     let mut last = None;
     while let Some(now) = patiently("the end", follow.message())
@@ -76,7 +76,7 @@ pub(crate) async fn over(service: &mut Tournaments, tournament_id: &str) -> v1::
     {
         last = now.tournament.or(last);
     }
-    last.expect("it was told of")
+    last.expect("an update")
 }
 
 async fn results(
@@ -87,7 +87,7 @@ async fn results(
         tournament_id: tournament_id.to_owned(),
     };
     let results = service.get_tournament_results(request).await;
-    results.expect("there are some").into_inner()
+    results.expect("results").into_inner()
 }
 
 pub(crate) async fn games(
@@ -112,7 +112,7 @@ pub(crate) async fn games(
     }
 }
 
-/// A stream attached to a participant, which is told so.
+/// A stream attached to a participant, after its confirmation.
 pub(crate) async fn entered(server: &TestServer, ticket: &str) -> StreamSeat {
     let mut stream = StreamSeat::open(server.channel().await).await;
     let attach = v1::Attach {
@@ -131,7 +131,7 @@ pub(crate) async fn entered(server: &TestServer, ticket: &str) -> StreamSeat {
 /// First handle of seats that the server attaches.
 pub(crate) const CALLED: u32 = 1 << 31;
 
-/// A game of three built-in agents and one who joins.
+/// A game of three built-in agents and one participant.
 fn three_and_one() -> v1::TournamentSettings {
     v1::TournamentSettings {
         format: v1::TournamentFormat::RoundRobin.into(),
@@ -142,7 +142,7 @@ fn three_and_one() -> v1::TournamentSettings {
     }
 }
 
-/// Nobody loses a decision to the clock.
+/// A policy under which no decision times out.
 pub(crate) fn unhurried() -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(3_600_000),
@@ -150,9 +150,9 @@ pub(crate) fn unhurried() -> v1::RoomPolicy {
     }
 }
 
-/// The room in which the server seats a participant next, and its first decision there.
+/// The next room in which the server seats a participant, and its first decision there.
 pub(crate) async fn seated(stream: &mut StreamSeat) -> (String, v1::DecisionRequest) {
-    // The numbers of events begin anew.
+    // The numbers of events start again.
     stream.last_event = 0;
     let room = match stream.next().await {
         Update::Attached(attached) => attached.room_id,
@@ -161,7 +161,7 @@ pub(crate) async fn seated(stream: &mut StreamSeat) -> (String, v1::DecisionRequ
     (room, stream.decision().await)
 }
 
-/// Plays a game from this decision to its end, by the first action that is legal; gives the last event.
+/// Plays a game from this decision to its end with first legal actions; returns the last event.
 pub(crate) async fn play_game(
     stream: &mut StreamSeat,
     handle: u32,
@@ -214,7 +214,7 @@ async fn the_server_seats_a_participant_in_each_of_its_games() {
         };
         assert_eq!(attached.tournament_id, id_of(&created));
         rooms.push(attached.room_id);
-        // The numbers of events begin anew.
+        // The numbers of events start again.
         stream.last_event = 0;
         let mut reason = None;
         while reason.is_none() {
@@ -259,21 +259,23 @@ async fn the_server_seats_a_participant_in_each_of_its_games() {
             (3, Some(3))
         );
     }
-    // The records are those of games of this tournament, by the names under which its participants joined.
-    let client = Client::connect(server.url()).await.expect("it listens");
+    // The records belong to games of this tournament, with the names of its participants.
+    let client = Client::connect(server.url())
+        .await
+        .expect("the server listens");
     for game in &games {
-        let lines = client.record(&game.game_id).await.expect("it has ended");
+        let lines = client.record(&game.game_id).await.expect("a record");
         let Some(Line::Header(header)) = &lines[0].line else {
             panic!("no header");
         };
         assert_eq!(header.tournament_id, id_of(&created));
         assert!(header.seats.iter().any(|seat| seat.name == "Ada"));
-        chefshat_record::replay::replay(&lines).expect("it replays");
+        chefshat_record::replay::replay(&lines).expect("a valid record");
     }
 }
 
 #[tokio::test]
-async fn who_does_not_come_forfeits_and_the_others_play() {
+async fn an_absent_participant_forfeits_and_the_others_play() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(
@@ -305,7 +307,7 @@ async fn who_does_not_come_forfeits_and_the_others_play() {
 }
 
 #[tokio::test]
-async fn the_newest_stream_has_the_participant() {
+async fn the_newest_stream_gets_the_participant() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(&mut service, three_and_one()).await;
@@ -325,7 +327,7 @@ async fn the_newest_stream_has_the_participant() {
     }
     let (again, decision) = seated(&mut newer).await;
     assert_eq!((&again, decision.decision_id), (&room, asked.decision_id));
-    // What the older one still says is not heard: this would be a strike, or the answer.
+    // Messages of the older one are ignored: this would be an invalid attempt, or the answer.
     let nonsense = Answer {
         decision_id: decision.decision_id,
         action: 9_999,
@@ -337,13 +339,13 @@ async fn the_newest_stream_has_the_participant() {
     let tournament = over(&mut service, &id_of(&created)).await;
     assert_eq!(tournament.state(), v1::TournamentState::Finished);
     let games = games(&mut service, &id_of(&created)).await;
-    assert!(games[0].rated, "nobody took a decision for it");
+    assert!(games[0].rated, "no substitute took a decision");
     let wrong = games[0].seats.iter().map(|seat| seat.wrong_actions);
     assert_eq!(wrong.sum::<u64>(), 0);
 }
 
 #[tokio::test]
-async fn what_is_closed_while_it_is_played_counts_no_more_games() {
+async fn a_tournament_closed_in_mid_game_counts_no_more_games() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(
@@ -364,7 +366,7 @@ async fn what_is_closed_while_it_is_played_counts_no_more_games() {
         tournament_id: id_of(&created),
         owner_token: created.owner_token.clone(),
     };
-    let closed = service.close_tournament(close).await.expect("it may");
+    let closed = service.close_tournament(close).await.expect("closed");
     let closed = closed.into_inner().tournament.expect("a tournament");
     assert_eq!(closed.state(), v1::TournamentState::Closed);
     let results = results(&mut service, &id_of(&created)).await;
@@ -379,7 +381,7 @@ async fn what_is_closed_while_it_is_played_counts_no_more_games() {
     );
     assert_eq!(states, [counted, void]);
     assert_eq!(games[1].room_id, room);
-    // Who plays is told of both ends, in whichever order.
+    // The client receives both ends, in either order.
     let mut reasons = Vec::new();
     while reasons.len() < 2 {
         match stream.next().await {

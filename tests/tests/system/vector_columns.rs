@@ -1,4 +1,4 @@
-//! The columns of a client's own games: every one of them says what the engine says of the same game.
+//! The columns of vector streams equal the engine's values for the same games.
 
 use chefshat_agents::game_seed;
 use chefshat_engine::{Event, Game, RuleSetSpec, Viewer};
@@ -9,7 +9,7 @@ use chefshat_tests::TestServer;
 use crate::vectors::{play_on, setup};
 
 #[tokio::test]
-async fn every_column_says_what_the_engine_says() {
+async fn every_column_equals_the_engines_value() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let wanted = v1::VectorSetup {
@@ -18,7 +18,7 @@ async fn every_column_says_what_the_engine_says() {
         ..setup(3, 9)
     };
     let (mut games, batch) = client.vector(wanted).await.expect("games");
-    let rules = RuleSetSpec::default().validate().expect("standard rules");
+    let rules = RuleSetSpec::default().validate().expect("default rules");
     let mut alone: Vec<Game> = (0..3)
         .map(|index| Game::new(rules, game_seed(11, index), |_| {}))
         .collect();
@@ -98,7 +98,7 @@ async fn every_column_says_what_the_engine_says() {
                     ));
                 }
             })
-            .expect("legal");
+            .expect("a legal action");
             rows += 1;
         }
     })

@@ -1,5 +1,5 @@
-//! Games of a client's own over real connections: their records are those of the engine alone, their limits and refusals are told, and they
-//! end with the server.
+//! Vector streams over real connections: their records equal those of the engine alone, limits and
+//! refusals are reported, and they end with the server.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ fn masks(batch: &v1::VectorBatch) -> impl Iterator<Item = &[u8]> {
 
 fn choose(agent: &mut RandomAgent, batch: &v1::VectorBatch) -> Vec<ActionId> {
     masks(batch)
-        .map(|mask| agent.choose(mask).expect("something is legal"))
+        .map(|mask| agent.choose(mask).expect("a legal action"))
         .collect()
 }
 
@@ -104,12 +104,10 @@ async fn games_of_a_batch_have_the_records_of_the_engine_alone() {
         (0..10).collect::<Vec<_>>()
     );
     for (index, lines) in records {
-        let verified = replay(&lines).expect("the record can be verified");
+        let verified = replay(&lines).expect("a valid record");
         assert_eq!(verified.state, v1::RoomState::Finished);
-        // The engine alone, with the same decisions, deals and goes as the record says.
-        let rules = RuleSetSpec::default()
-            .validate()
-            .expect("the standard rules");
+        // The engine alone, with the same decisions, deals and continues as the record says.
+        let rules = RuleSetSpec::default().validate().expect("default rules");
         let Seed(seed) = game_seed(11, index);
         let mut alone = Game::new(rules, Seed(seed), |_| {});
         let mut own = answers.remove(&index).expect("answers").into_iter();
@@ -128,21 +126,21 @@ async fn games_of_a_batch_have_the_records_of_the_engine_alone() {
             let action = u16::try_from(decision.action).expect("an action");
             alone
                 .apply(chefshat_engine::ActionId::new(action), |_| {})
-                .expect("legal");
+                .expect("a legal action");
         }
         assert!(alone.is_over() && own.next().is_none() && decisions > 100);
         let standings = alone.standings().expect("it is over");
-        let told = lines.iter().find_map(|line| match &line.line {
+        let received = lines.iter().find_map(|line| match &line.line {
             Some(Line::Event(v1::GameEvent {
                 kind: Some(v1::game_event::Kind::GameEnded(end)),
                 ..
             })) => Some(end.clone()),
             _ => None,
         });
-        let told = told.expect("the end of the game");
-        assert_eq!(told.reveal.expect("the seed").game_seed, seed);
+        let received = received.expect("the end of the game");
+        assert_eq!(received.reveal.expect("the seed").game_seed, seed);
         let points: Vec<u64> = standings.iter().map(|(_, _, points)| points).collect();
-        let recorded: Vec<u64> = told.standings.iter().map(|one| one.points).collect();
+        let recorded: Vec<u64> = received.standings.iter().map(|one| one.points).collect();
         assert_eq!(recorded, points);
     }
 }
@@ -164,7 +162,7 @@ async fn games_branch_from_a_recorded_one() {
     };
     let wanted = branched(point(decisions, true));
     let (mut games, batch) = client.vector(wanted).await.expect("games");
-    // All begin with the decision that came next.
+    // All start with the next decision.
     let next = &first.decisions()[decisions as usize];
     assert_eq!(batch.rows, 3);
     for (mask, seat) in masks(&batch).zip(&batch.seats) {
@@ -191,7 +189,7 @@ async fn games_branch_from_a_recorded_one() {
         refused(&client, with_rules).await,
         ("BRANCH_REFUSED".into(), "rules".into())
     );
-    // Rooms of the same server go on beside it.
+    // Rooms of the same server are unaffected.
     let room = ended(
         &client,
         v1::CreateRoomRequest {
@@ -204,7 +202,7 @@ async fn games_branch_from_a_recorded_one() {
 }
 
 #[tokio::test]
-async fn what_makes_no_sense_is_refused_in_words() {
+async fn invalid_requests_are_refused_with_a_reason() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let standard = || setup(2, 0);
@@ -328,7 +326,7 @@ async fn what_makes_no_sense_is_refused_in_words() {
     let error = games
         .step([ActionId(199), ActionId(70_000)])
         .await
-        .expect_err("no such action");
+        .expect_err("an unknown action");
     assert_eq!(error.reason(), Some("ILLEGAL_ACTION"));
     assert_eq!(error.metadata()["row"], "0");
     let gone = games.step([ActionId(0), ActionId(0)]).await;
@@ -376,7 +374,7 @@ async fn attempts_are_asked_again_and_recorded() {
     let mut agent = RandomAgent::new(3);
     while !batch.done {
         let answers = choose(&mut agent, &batch);
-        // Game 0 never answers with a legal action: gifts are for the exchange.
+        // Game 0 never answers with a legal action: gifts belong to the exchange.
         let own = batch.games.as_chunks::<4>().0.iter().zip(answers);
         let answers: Vec<ActionId> = own
             .map(|(game, action)| {
@@ -395,7 +393,7 @@ async fn attempts_are_asked_again_and_recorded() {
     }
     assert_eq!(records.len(), 2);
     for (index, lines) in records {
-        replay(&lines).expect("the record can be verified");
+        replay(&lines).expect("a valid record");
         let (mut defaults, mut own) = (0, 0);
         for line in &lines {
             let Some(Line::Decision(decision)) = &line.line else {
@@ -418,7 +416,7 @@ async fn attempts_are_asked_again_and_recorded() {
 }
 
 #[tokio::test]
-async fn games_begin_anew_over_the_wire() {
+async fn games_are_reset_over_the_wire() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (mut games, first) = client.vector(setup(3, 0)).await.expect("games");
@@ -429,25 +427,25 @@ async fn games_begin_anew_over_the_wire() {
     };
     assert_eq!(begun(&first), [0, 1, 2]);
     let actions = choose(&mut RandomAgent::new(1), &first);
-    games.step(actions).await.expect("legal");
+    games.step(actions).await.expect("a legal action");
     let some = v1::VectorReset {
         games: 1u32.to_le_bytes().to_vec(),
         ..v1::VectorReset::default()
     };
-    assert_eq!(begun(&games.reset(some).await.expect("anew")), [4]);
+    assert_eq!(begun(&games.reset(some).await.expect("reset")), [4]);
     let all = v1::VectorReset {
         all: true,
         ..v1::VectorReset::default()
     };
     assert_eq!(
-        begun(&games.reset(all.clone()).await.expect("anew")),
+        begun(&games.reset(all.clone()).await.expect("reset")),
         [3, 7, 5]
     );
     let seeded = v1::VectorReset {
         seeds: Some(v1::vector_reset::Seeds::BaseSeed(11)),
         ..all
     };
-    let again = games.reset(seeded).await.expect("anew");
+    let again = games.reset(seeded).await.expect("reset");
     assert_eq!(begun(&again), [0, 1, 2]);
     assert_eq!(
         (again.observations, again.seats),
@@ -456,12 +454,12 @@ async fn games_begin_anew_over_the_wire() {
     let none = games
         .reset(v1::VectorReset::default())
         .await
-        .expect("as it was");
+        .expect("restored");
     assert_eq!((begun(&none), none.rows), (vec![], 3));
 }
 
 #[tokio::test]
-async fn streams_are_bounded_and_end_with_the_server() {
+async fn streams_are_limited_and_end_with_the_server() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let limits = client.server_info().await.expect("information").limits;
@@ -474,7 +472,7 @@ async fn streams_are_bounded_and_end_with_the_server() {
     let error = client.vector(setup(1, 0)).await.expect_err("one too many");
     assert_eq!(error.reason(), Some("TOO_MANY_VECTOR_STREAMS"));
     assert!(error.message().contains(&most.to_string()));
-    // One that is given up makes room for another, as soon as the server has heard of it.
+    // A stream that is dropped makes room for another, as soon as the server notices.
     open.pop();
     patiently("room for another stream", async {
         while client.vector(setup(1, 0)).await.is_err() {
@@ -482,7 +480,7 @@ async fn streams_are_bounded_and_end_with_the_server() {
         }
     })
     .await;
-    // So are the seats of all of them together.
+    // The seats of all streams together are limited too.
     open.truncate(1);
     let whole = u32::try_from(limits["max_vector_seats"] / 4).expect("a number of games");
     let error = patiently("too many games", async {

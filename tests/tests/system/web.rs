@@ -1,5 +1,5 @@
-//! What browsers do: they get the page and speak gRPC-web on the same port, over HTTP/1.1, watching on one stream and acting by single calls;
-//! and what tools do: reflection. What is on the page is tested beside it, in clients/web.
+//! Browsers: the page and gRPC-web on the same port, over HTTP/1.1, with one stream for watching and
+//! single calls for acting; and tools: reflection. clients/web tests the page itself.
 
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
             async move { futures::future::join_all(others.iter_mut().map(play_on)).await },
         );
 
-    // HTTP/1.1 alone, as browsers speak it to a server without TLS.
+    // HTTP/1.1 only, as browsers use it for servers without TLS.
     let http = HttpClient::builder(TokioExecutor::new()).build_http();
     let web = ServiceBuilder::new()
         .layer(GrpcWebClientLayer::new())
@@ -58,7 +58,7 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
             }],
         })
         .await
-        .expect("it may watch")
+        .expect("a stream")
         .into_inner();
     let mut waiting: VecDeque<v1::SeatUpdate> = VecDeque::new();
     let mut decisions = 0;
@@ -68,11 +68,11 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
             let message = patiently("the next message", updates.message())
                 .await
                 .expect("no error")
-                .expect("the stream goes on");
+                .expect("the stream continues");
             waiting.extend(message.updates);
             continue;
         };
-        match update.update.expect("an update says something") {
+        match update.update.expect("an update") {
             Update::Events(batch) => {
                 for event in batch.events {
                     assert_eq!(event.sequence, last_event + 1);
@@ -91,7 +91,7 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
                         })),
                     })
                     .await
-                    .expect("the answer is taken")
+                    .expect("an accepted answer")
                     .into_inner()
                     .result
                     .expect("an answer has a result");
@@ -110,7 +110,7 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
 }
 
 #[tokio::test]
-async fn every_address_has_the_page_in_both_versions_of_http_and_calls_are_still_calls() {
+async fn every_path_serves_the_page_in_both_http_versions_and_calls_still_work() {
     let server = TestServer::start().await;
     for http2 in [false, true] {
         let http = HttpClient::builder(TokioExecutor::new())
@@ -129,7 +129,7 @@ async fn every_address_has_the_page_in_both_versions_of_http_and_calls_are_still
             let answer = patiently("an answer", http.request(request))
                 .await
                 .expect("the server answers");
-            // Without a build of the page the answer is a page as well, which says how to get one.
+            // Without a build of the page the answer is a page with instructions.
             let wanted = status.unwrap_or(match chefshat_server::web::is_built_in() {
                 true => http::StatusCode::OK,
                 false => http::StatusCode::SERVICE_UNAVAILABLE,
