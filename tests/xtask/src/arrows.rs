@@ -1,5 +1,6 @@
-//! Which crates of the workspace may depend on which. Cargo refuses circles between crates; this refuses every arrow that is not in
-//! the table below, so that a lower crate cannot come to know a higher one unnoticed.
+//! Allowed dependencies between the crates of the workspace. Cargo refuses circles between crates; this
+//! check refuses every dependency that is not in the table below, so that no lower crate starts to
+//! depend on a higher one.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +10,11 @@ use crate::command::{self, cargo};
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// For each crate, the crates of the workspace that it may depend on. The map in ARCHITECTURE.md explains it.
+/// For each crate, the crates of the workspace that it may depend on. ARCHITECTURE.md explains the map.
 ///
-/// Two arrows go beyond the map of the crates' subjects: a tournament names built-in agents as fillers, so `chefshat-tournament` knows
-/// `chefshat-agents` (for `AgentKind`); and `chefshat-simulation` plays whole tournaments offline, so it knows `chefshat-tournament`.
+/// Two arrows go beyond the map: `chefshat-tournament` depends on `chefshat-agents` (for `AgentKind`,
+/// because built-in agents are fillers), and `chefshat-simulation` on `chefshat-tournament` (it plays
+/// complete tournaments offline).
 const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-engine", &[]),
     ("chefshat-proto", &[]),
@@ -74,7 +76,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-/// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its own test features, itself.
+/// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its test features, itself.
 const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[];
 
 /// Refuses dependencies between crates of the workspace that the tables do not allow.
@@ -99,7 +101,7 @@ pub(crate) fn metadata(places: &Places) -> Result<Value, Failure> {
 
 type Table<'a> = &'a [(&'a str, &'a [&'a str])];
 
-/// A line for each arrow that is not allowed and for each crate without a row.
+/// A line for each dependency that is not allowed and for each crate without a row.
 fn problems(metadata: &Value, allowed: Table<'_>, in_tests: Table<'_>) -> Vec<String> {
     let allowed: BTreeMap<_, _> = allowed.iter().copied().collect();
     let in_tests: BTreeMap<_, _> = in_tests.iter().copied().collect();
@@ -156,12 +158,12 @@ mod tests {
     }
 
     #[test]
-    fn the_workspace_has_no_arrow_but_those_allowed() {
+    fn the_workspace_has_only_allowed_arrows() {
         check(&Places::find().unwrap()).unwrap();
     }
 
     #[test]
-    fn an_arrow_that_runs_back_up_is_refused() {
+    fn a_dependency_on_a_higher_crate_is_refused() {
         let serde = json!({ "name": "serde", "kind": null });
         let down = json!([{ "name": "low", "kind": null }, serde]);
         let up = |kind: Value| json!([{ "name": "high", "kind": kind }]);
@@ -179,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn tests_may_use_what_their_own_list_names_and_nothing_else() {
+    fn tests_may_use_only_what_their_own_list_names() {
         let up = json!([{ "name": "high", "kind": "dev" }]);
         let metadata = workspace(&up, &json!([]));
         assert_eq!(

@@ -1,14 +1,15 @@
 //! Circles between the files of a crate.
 //!
-//! A file depends on another if its code, tests aside, names an item that the other defines. What counts:
-//! - Every path counts, in `use` and elsewhere, in macro arguments too, that starts with `crate`, `self`, `super`, a child module or an
-//!   imported name.
-//! - Re-exports are followed: naming `crate::Item` is a dependency on the file that defines `Item`, not on the `lib.rs` that re-exports
-//!   it. Likewise a module on the way is no dependency: `use super::child` counts where `child::Item` is used.
-//! - So a `mod.rs` or `lib.rs` that declares and re-exports its children does not depend on them. It does as soon as its own code uses
-//!   one of the names.
-//! - Code under `#[cfg(test)]` and attributes, doc comments among them, do not count. Neither do methods and trait implementations, whose
-//!   home cannot be seen without types.
+//! A file depends on another if its code, except tests, names an item that the other defines:
+//! - Every path that starts with `crate`, `self`, `super`, a child module or an imported name counts, in
+//!   `use` and elsewhere, macro arguments included.
+//! - Re-exports are followed: `crate::Item` is a dependency on the file that defines `Item`, not on the
+//!   `lib.rs` that re-exports it. Likewise a module in a path is not a dependency: `use super::child`
+//!   counts where `child::Item` is used.
+//! - So a `mod.rs` or `lib.rs` that declares and re-exports its children does not depend on them, unless
+//!   its own code uses one of the names.
+//! - Code under `#[cfg(test)]` and attributes, including doc comments, do not count; nor do methods and
+//!   trait implementations, whose file cannot be found without types.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -21,8 +22,8 @@ use crate::arrows;
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// Groups of files that still depend on each other in circles. The list only shrinks: a new circle is refused, and so is an entry that
-/// is no longer needed.
+/// Groups of files that still depend on each other in circles. The list may only shrink: a new circle is
+/// refused, and so is an obsolete entry.
 const REMAINING: &[&[&str]] = &[
     &[
         "server/src/tournaments/games.rs",
@@ -34,7 +35,7 @@ const REMAINING: &[&[&str]] = &[
     ],
 ];
 
-/// Re-exports that are followed from one name before giving up. Far more than any path has.
+/// Most re-exports followed from one name. Far more than any path has.
 const MAX_HOPS: usize = 32;
 
 /// Refuses circles between the files of a crate, for every crate of the workspace.
@@ -68,11 +69,11 @@ fn crate_roots(metadata: &Value) -> Vec<PathBuf> {
 struct Circle {
     /// All files that can be reached from each other, in order.
     files: Vec<String>,
-    /// The shortest ways around, one for each dependency in the group, without repetition.
+    /// The shortest circles, one for each dependency in the group, without repetition.
     ways: Vec<String>,
 }
 
-/// A line for each circle that is not among the remaining ones, and for each entry that no circle needs.
+/// A line for each circle that is not among the remaining ones, and for each obsolete entry.
 fn problems(circles: &[Circle], remaining: &[&[&str]]) -> Vec<String> {
     let is_covered = |circle: &Circle, entry: &[&str]| {
         (circle.files.iter()).all(|file| entry.contains(&file.as_str()))
@@ -94,7 +95,7 @@ fn problems(circles: &[Circle], remaining: &[&[&str]]) -> Vec<String> {
     problems
 }
 
-/// The modules of one crate and the files that hold them.
+/// The modules of one crate and their files.
 #[derive(Default)]
 struct Files {
     paths: Vec<PathBuf>,
@@ -106,22 +107,22 @@ struct Module {
     file: usize,
     parent: Option<usize>,
     children: BTreeMap<String, usize>,
-    /// Names of the items that it defines.
+    /// Names of the items it defines.
     items: BTreeSet<String>,
     imports: Vec<Import>,
-    /// Paths in its code, other than imports.
+    /// Paths in its code, except imports.
     paths: BTreeSet<Vec<String>>,
 }
 
 /// One name of a `use`.
 struct Import {
     path: Vec<String>,
-    /// The name under which it is known; `None` for a glob.
+    /// The name it introduces; `None` for a glob.
     name: Option<String>,
     is_re_export: bool,
 }
 
-/// What a path leads to.
+/// The target of a path.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Target {
     Module(usize),
@@ -138,7 +139,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Adds a module that is a file; its children are looked for in `folder`.
+    /// Adds a module that is a file, with its children from `folder`.
     fn add_file(
         &mut self,
         path: PathBuf,
@@ -197,13 +198,13 @@ impl Files {
         Ok(module)
     }
 
-    /// The files on which each file depends.
+    /// The dependencies of each file.
     fn dependencies(&self) -> Vec<BTreeSet<usize>> {
         let mut all = vec![BTreeSet::new(); self.paths.len()];
         for (index, module) in self.modules.iter().enumerate() {
             let imports = module.imports.iter();
             let imports = imports.filter(|import| !import.is_re_export && import.name.is_some());
-            // An import brings in what it names; where that is a module, the paths through it count.
+            // An import introduces a name; if it is a module, the paths through it count.
             let named = imports.filter_map(|import| self.resolve(index, &import.path, 0));
             let used = (module.paths.iter()).filter_map(|path| self.resolve(index, path, 0));
             for target in named.chain(used) {
@@ -218,7 +219,7 @@ impl Files {
         all
     }
 
-    /// Where a path leads that stands in `module`; `None` if it leads out of the crate.
+    /// The target of a path in `module`; `None` if it is outside the crate.
     fn resolve(&self, module: usize, path: &[String], hops: usize) -> Option<Target> {
         let (first, rest) = path.split_first()?;
         match first.as_str() {
@@ -235,7 +236,7 @@ impl Files {
         }
     }
 
-    /// Like [`Files::find`]; a name that cannot be found is taken for an item of the module, since macros define items too.
+    /// Like [`Files::find`]; an unknown name counts as an item of the module, because macros define items too.
     fn walk(&self, module: usize, path: &[String], hops: usize) -> Option<Target> {
         if path.is_empty() {
             return Some(Target::Module(module));
@@ -243,7 +244,7 @@ impl Files {
         self.find(module, path, hops).or(Some(Target::Item(module)))
     }
 
-    /// Looks for the first name of the path among what the module defines and imports, and follows it.
+    /// Finds the first name of the path among the module's definitions and imports, and follows it.
     fn find(&self, module: usize, path: &[String], hops: usize) -> Option<Target> {
         if hops > MAX_HOPS {
             return None;
@@ -296,7 +297,7 @@ impl Files {
             for &from in &group {
                 is_seen[from] = true;
                 for &to in dependencies[from].iter().filter(|to| group.contains(to)) {
-                    // From `to` back to `from`, read backwards.
+                    // From `to` back to `from`, in reverse.
                     let mut way = vec![from];
                     while let Some(&before) = way.last()
                         && before != to
@@ -322,7 +323,7 @@ impl Files {
     }
 }
 
-/// For every file that can be reached from one, the file before it on a shortest way there.
+/// For every file that can be reached from one, the previous file on a shortest path.
 fn search(dependencies: &[BTreeSet<usize>], from: usize) -> Vec<Option<usize>> {
     let mut before = vec![None; dependencies.len()];
     let mut queue = VecDeque::from([from]);
@@ -384,7 +385,7 @@ impl Reader {
         });
     }
 
-    /// Paths among the arguments of a macro, which have no syntax of their own.
+    /// Paths in the arguments of a macro, which have no syntax of their own.
     fn tokens(&mut self, tokens: TokenStream) {
         let mut path: Vec<String> = Vec::new();
         let mut colons = 0;
@@ -460,7 +461,7 @@ impl<'ast> Visit<'ast> for Reader {
 
     fn visit_attribute(&mut self, _: &'ast syn::Attribute) {}
 
-    /// `pub(in path)` and `pub(super)` use nothing of what they name.
+    /// `pub(in path)` and `pub(super)` do not use what they name.
     fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
@@ -477,7 +478,7 @@ impl<'ast> Visit<'ast> for Reader {
     }
 }
 
-/// Whether an item is compiled for tests alone.
+/// Whether an item is compiled only for tests.
 fn is_for_tests(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let syn::Meta::List(list) = &attribute.meta else {
@@ -502,7 +503,7 @@ fn is_for_tests(attributes: &[syn::Attribute]) -> bool {
     })
 }
 
-/// The file that `#[path = "…"]` names.
+/// The file named by `#[path = "…"]`.
 fn path_attribute(module: &syn::ItemMod) -> Option<String> {
     module.attrs.iter().find_map(|attribute| {
         let syn::Meta::NameValue(pair) = &attribute.meta else {
@@ -522,7 +523,7 @@ fn path_attribute(module: &syn::ItemMod) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// The ways around in a crate of these files.
+    /// The circles in a crate of these files.
     fn ways(files: &[(&str, &str)]) -> Vec<String> {
         let files: BTreeMap<&Path, &str> = files
             .iter()
@@ -537,12 +538,12 @@ mod tests {
     const TWO: &str = "mod a; mod b;";
 
     #[test]
-    fn the_workspace_has_none_but_those_that_remain() {
+    fn the_workspace_has_only_the_remaining_circles() {
         check(&Places::find().unwrap()).unwrap();
     }
 
     #[test]
-    fn a_planted_circle_is_reported_whichever_way_it_is_written() {
+    fn a_circle_is_reported_however_it_is_written() {
         let uses = [
             "use crate::b::B; struct A(B);",
             "struct A(super::b::B);",
@@ -563,7 +564,7 @@ mod tests {
     }
 
     #[test]
-    fn files_in_one_direction_are_no_circle() {
+    fn dependencies_in_one_direction_are_not_a_circle() {
         let none: [String; 0] = [];
         let a = "use crate::b::B; struct A(B);";
         assert_eq!(
@@ -577,7 +578,7 @@ mod tests {
     }
 
     #[test]
-    fn re_exports_are_followed_and_are_no_dependencies_themselves() {
+    fn re_exports_are_followed_and_are_not_dependencies() {
         let none: [String; 0] = [];
         let root = "mod a; mod b; pub use a::A; pub use b::B;";
         let a = "use crate::B; pub struct A(B);";
@@ -616,7 +617,7 @@ mod tests {
     }
 
     #[test]
-    fn circles_of_three_and_modules_with_paths_are_seen() {
+    fn longer_circles_and_modules_with_paths_are_found() {
         let root = "mod a; #[path = \"else/where.rs\"] mod b; mod c { pub mod d; }";
         let found = ways(&[
             ("lib.rs", root),

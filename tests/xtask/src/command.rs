@@ -1,4 +1,4 @@
-//! Starting other programs. Their output goes straight through, so that a person sees what they see.
+//! Starts other programs. Their output is passed through.
 
 use std::ffi::OsStr;
 use std::process::{Command, Stdio};
@@ -6,12 +6,13 @@ use std::process::{Command, Stdio};
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// A program with the same Cargo that started this one, if it is Cargo.
+/// The Cargo that started this program, if any, else the one on the path.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// A module run by the Python package's interpreter, in the package's folder, with every cache in the build folder.
+/// A module run by the Python package's interpreter, in the package's folder, with all caches in the
+/// build folder.
 pub(crate) fn python_command(places: &Places, module: &str) -> Command {
     let mut command = with_environment(places, Command::new(places.python()));
     command
@@ -19,7 +20,7 @@ pub(crate) fn python_command(places: &Places, module: &str) -> Command {
         .current_dir(places.python_package());
     command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
     command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
-    // Most of the time of the learning tests goes into compiling; what was compiled once is kept.
+    // Most of the time of the learning tests is spent compiling; compiled programs are cached.
     command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
     command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");
     command.env("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1");
@@ -32,12 +33,12 @@ pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command
     command.env("CHEFSHAT_PYTHON", places.python());
     command.env("CHEFSHAT_NODE_DIR", places.node());
     command.env("CHEFSHAT_PROTO", places.root.join("proto"));
-    // Python would otherwise write its caches among the sources, also where a Rust test starts it.
+    // Otherwise Python would write its caches among the sources, also when a Rust test starts it.
     command.env("PYTHONPYCACHEPREFIX", places.own.join("pycache"));
     command
 }
 
-/// Runs to the end; anything but success is a failure that names the command line.
+/// Runs a command; an exit code other than 0 is a failure that names the command line.
 pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
     println!("    {}", line(command));
     let status = command
@@ -50,7 +51,7 @@ pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
     }
 }
 
-/// What the program writes to its standard output, without its last line end; its errors are not shown.
+/// The standard output of a command, without the final line break; its errors are hidden.
 pub(crate) fn read(command: &mut Command) -> Result<String, Failure> {
     let output = command
         .stderr(Stdio::null())
@@ -69,7 +70,7 @@ pub(crate) fn read(command: &mut Command) -> Result<String, Failure> {
     }
 }
 
-/// Whether the program can be started and succeeds; it is not seen.
+/// Whether the program can be started and succeeds, without output.
 pub(crate) fn succeeds(program: impl AsRef<OsStr>, arguments: &[&str]) -> bool {
     read(Command::new(program).args(arguments)).is_ok()
 }
@@ -81,7 +82,7 @@ fn cannot_start(command: &Command, error: &std::io::Error) -> Failure {
     ))
 }
 
-/// The command as one would type it (without quoting, which no argument here needs).
+/// The command as typed in a shell (without quoting, which no argument here needs).
 fn line(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words
@@ -107,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn output_is_read_without_its_last_line_end() {
+    fn output_is_read_without_the_final_line_break() {
         assert_eq!(
             read(Command::new("echo").arg("two words")).unwrap(),
             "two words"

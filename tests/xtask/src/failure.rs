@@ -1,13 +1,13 @@
-//! Why a task stops.
+//! The error of a task.
 
 use std::fmt;
 
-/// Why a task stopped, in words for the person who started it.
+/// The reason why a task stopped, for the person who started it.
 #[derive(Debug)]
 pub(crate) struct Failure(String);
 
 impl Failure {
-    /// A failure that says this.
+    /// Creates a failure with this message.
     pub(crate) fn new(message: impl Into<String>) -> Self {
         Self(message.into())
     }

@@ -1,4 +1,4 @@
-//! `cargo xtask lint`: everything that is checked without running the project.
+//! `cargo xtask lint`: all checks that do not run the project.
 
 use std::process::Command;
 
@@ -22,7 +22,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
     schema(places, steps, "vendor.compose-spec", "docker/compose.yaml")?;
-    // Read, not built: there need be no container engine.
+    // Only parsed, not built: no container engine is needed.
     steps.program(
         "hadolint",
         tool(places, "hadolint").arg("docker/Dockerfile"),
@@ -67,7 +67,7 @@ pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> 
     steps.program("mypy", &mut python_command(places, "mypy"))
 }
 
-/// Checks a file against one of the schemas that the checker brings with it.
+/// Checks a file against one of the schemas that come with the checker.
 fn schema(places: &Places, steps: &mut Steps, name: &str, file: &str) -> Result<(), Failure> {
     let arguments = ["--builtin-schema", name, file];
     let step = format!("schema of {file}");

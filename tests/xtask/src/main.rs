@@ -1,7 +1,7 @@
-//! `cargo xtask`: sets up what the tests of all languages need, runs them, runs the linters, and builds the page for people.
+//! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, and builds the page.
 //!
-//! The command line lives here. What is run lives in [`lint`], [`test`] and [`web`], what must be there first in [`setup`]. Nothing here
-//! knows a crate of the project: this program only starts others and must build when they do not.
+//! The command line is here; [`lint`], [`test`] and [`web`] are the tasks, [`setup`] prepares them. It
+//! depends on no crate of the project: it only starts other programs, and builds even if they do not.
 
 mod arrows;
 mod circles;
@@ -35,15 +35,15 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run all tests; sets up by itself what they need, inside the build folder.
+    /// Run all tests; sets up what they need, inside the build folder.
     Test {
-        /// Run the tests of one language alone.
+        /// Run only the tests of one language.
         #[arg(long, value_enum)]
         only: Option<Language>,
     },
     /// Check format, lints, protocol, licences and images.
     Lint,
-    /// Build the page for people, which the server gives out on its port.
+    /// Build the page for people, which the server serves on its port.
     Web,
 }
 

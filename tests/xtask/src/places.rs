@@ -1,31 +1,31 @@
-//! Where things lie: the source tree, which is only read, and the build folder, where everything is written.
+//! Paths: the source tree, which is only read, and the build folder, where everything is written.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// Why steps are skipped where [`Places::has_python_package`] is false.
-pub(crate) const NO_PYTHON_PACKAGE: &str = "there is no clients/python/pyproject.toml";
+/// Why steps are skipped if [`Places::has_python_package`] is false.
+pub(crate) const NO_PYTHON_PACKAGE: &str = "missing: clients/python/pyproject.toml";
 
-/// Why steps are skipped where [`Places::has_node_package`] is false.
-pub(crate) const NO_NODE_PACKAGE: &str = "there is no clients/node/package-lock.json";
+/// Why steps are skipped if [`Places::has_node_package`] is false.
+pub(crate) const NO_NODE_PACKAGE: &str = "missing: clients/node/package-lock.json";
 
-/// Why steps are skipped where [`Places::has_web_package`] is false.
-pub(crate) const NO_WEB_PACKAGE: &str = "there is no clients/web/package-lock.json";
+/// Why steps are skipped if [`Places::has_web_package`] is false.
+pub(crate) const NO_WEB_PACKAGE: &str = "missing: clients/web/package-lock.json";
 
-/// The folders this program works with, all absolute.
+/// The folders used by this program, all absolute.
 pub(crate) struct Places {
     /// The source tree.
     pub(crate) root: PathBuf,
     /// Cargo's build folder.
     pub(crate) target: PathBuf,
-    /// What this program sets up.
+    /// Environments and tools that this program sets up.
     pub(crate) own: PathBuf,
 }
 
 impl Places {
-    /// Finds the source tree from the place of this crate, and the build folder as Cargo does.
+    /// Finds the source tree from the path of this crate, and the build folder as Cargo does.
     pub(crate) fn find() -> Result<Self, Failure> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let root = root
@@ -72,12 +72,13 @@ impl Places {
         self.web_package().join("package-lock.json").exists()
     }
 
-    /// Where the built page must lie for the server to give it out: the one place in the source tree that is written to, and not kept.
+    /// Where the server expects the built page: the only place in the source tree that is written to; Git
+    /// ignores it.
     pub(crate) fn web_dist(&self) -> PathBuf {
         self.web_package().join("dist")
     }
 
-    /// Folder that looks like the source tree to [`Places::web`].
+    /// A folder that looks like the source tree to [`Places::web`].
     pub(crate) fn web_tree(&self) -> PathBuf {
         self.own.join("web")
     }

@@ -1,5 +1,6 @@
-//! What the steps need: virtual environments, node modules, checkers, Debian packages. Everything is made inside the build
-//! folder and made anew only when what it was made from has changed; a Debian package is installed only when it is missing.
+//! Prepares what the steps need: virtual environments, node modules, checkers, Debian packages.
+//! Everything is created inside the build folder and recreated only when its sources have changed; a
+//! Debian package is installed only if it is missing.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -10,27 +11,27 @@ use crate::command::{cargo, read, run, succeeds};
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// Version of cargo-deny that deny.toml is written for.
+/// The version of cargo-deny for which deny.toml is written.
 const CARGO_DENY: &str = "0.20.2";
 
-/// Oldest main version of Node that the packages run on.
+/// Oldest major version of Node that the packages support.
 const OLDEST_NODE: u32 = 20;
 
-/// Kept in a folder made by this program: what it was made from.
+/// A file in each created folder that lists its sources.
 const MADE_FROM: &str = ".made-from";
 
-/// The Python package, editable, with its development extras, in an environment of its own.
+/// The Python package, editable, with its development extras, in its own environment.
 pub(crate) fn python_package(places: &Places) -> Result<(), Failure> {
     let package = places.python_package();
     let project = package.join("pyproject.toml");
     let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
     let editable = format!("{}[dev]", package.display());
-    // The place counts too: clones may share a build folder, and the package runs from where it lies.
+    // The path counts too: clones may share a build folder, and the package runs from its source folder.
     let made_from = format!("{editable}\n{text}");
     venv(&places.venv(), &made_from, &["--editable", &editable])
 }
 
-/// The checkers of tools.txt, in an environment of their own.
+/// The checkers of tools.txt, in their own environment.
 pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
     let list = places.root.join("tests/xtask/tools.txt");
     let made_from = fs::read_to_string(&list).map_err(|error| at(&list, &error))?;
@@ -46,7 +47,8 @@ pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
     npm_package(&places.node_package(), &places.node())
 }
 
-/// The page for people, with its modules, in a folder from which the rest of the source tree is where the page looks for it.
+/// The page for people, with its modules, in a folder in which the rest of the source tree is where the
+/// page expects it.
 pub(crate) fn web_package(places: &Places) -> Result<(), Failure> {
     let tree = places.web_tree();
     fs::create_dir_all(&tree).map_err(|error| at(&tree, &error))?;
@@ -56,14 +58,14 @@ pub(crate) fn web_package(places: &Places) -> Result<(), Failure> {
         if fs::read_link(&link).is_ok_and(|pointed| pointed == source) {
             continue;
         }
-        // Another source tree has the same build folder.
+        // Another source tree uses the same build folder.
         let _ = fs::remove_file(&link);
         symlink(&source, &link).map_err(|error| at(&link, &error))?;
     }
     npm_package(&places.web_package(), &places.web())
 }
 
-/// A package for Node, copied beside its modules: npm writes only next to a package.json.
+/// Copies a package for Node next to its modules: npm writes only beside a package.json.
 fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
     if !succeeds("node", &["--version"]) {
         debian_package("nodejs")?;
@@ -74,7 +76,7 @@ fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
     let version = read(Command::new("node").arg("--version"))?;
     if !is_new_enough(&version) {
         return Err(Failure::new(format!(
-            "Node {OLDEST_NODE} or newer is needed, and `node` is {version}; https://nodejs.org has newer ones"
+            "Node {OLDEST_NODE} or newer is needed, but `node` is {version}; see https://nodejs.org"
         )));
     }
     copy_package(source, copy).map_err(|error| at(copy, &error))?;
@@ -90,14 +92,14 @@ fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
     note_made_from(&modules, &made_from)
 }
 
-/// Whether a version as Node says it ("v20.19.4") is one that the packages run on.
+/// Whether a version as Node prints it ("v20.19.4") is supported.
 fn is_new_enough(version: &str) -> bool {
     let main = version.trim_start_matches('v').split('.').next();
     main.and_then(|main| main.parse().ok())
         .is_some_and(|main: u32| main >= OLDEST_NODE)
 }
 
-/// The browser that the page is tested in.
+/// The browser for the tests of the page.
 pub(crate) fn chromium() -> Result<(), Failure> {
     if succeeds("chromium", &["--version"]) {
         return Ok(());
@@ -105,7 +107,7 @@ pub(crate) fn chromium() -> Result<(), Failure> {
     debian_package("chromium")
 }
 
-/// strace, by which a test has a disk fail.
+/// strace, with which a test makes a disk fail.
 pub(crate) fn strace() -> Result<(), Failure> {
     if succeeds("strace", &["--version"]) {
         return Ok(());
@@ -113,7 +115,7 @@ pub(crate) fn strace() -> Result<(), Failure> {
     debian_package("strace")
 }
 
-/// tmux, in which commands that draw on a terminal are tested.
+/// tmux, for the tests of terminal commands.
 pub(crate) fn tmux() -> Result<(), Failure> {
     if succeeds("tmux", &["-V"]) {
         return Ok(());
@@ -121,7 +123,7 @@ pub(crate) fn tmux() -> Result<(), Failure> {
     debian_package("tmux")
 }
 
-/// cargo-deny: the one on the path if it is of the right version, else one built here. Returns the program to start.
+/// cargo-deny: from the path if it has the right version, else built here. Returns its command.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     let wanted = format!("cargo-deny {CARGO_DENY}");
     let own = places.cargo_tools().join("bin/cargo-deny");
@@ -130,7 +132,7 @@ pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
             return Ok(Command::new(program));
         }
     }
-    // An unoptimised build takes a fraction of the time and checks our few hundred crates in seconds all the same.
+    // An unoptimised build takes a fraction of the time and still checks our few hundred crates in seconds.
     let build = places.cargo_tools().join("build");
     let mut install = cargo();
     install.args([
@@ -151,7 +153,7 @@ pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     Ok(Command::new(own))
 }
 
-/// A virtual environment with what pip is told to install, unless it is there already.
+/// A virtual environment with these packages, unless it exists already.
 fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure> {
     if !succeeds("python3", &["--version"]) {
         debian_package("python3")?;
@@ -172,7 +174,7 @@ fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure>
     note_made_from(folder, made_from)
 }
 
-/// Installs a Debian package that is missing, or says which one is.
+/// Installs a Debian package if it is missing, or names it if it cannot.
 fn debian_package(name: &str) -> Result<(), Failure> {
     let root = read(Command::new("id").arg("-u")).is_ok_and(|id| id == "0");
     if !root || !succeeds("apt-get", &["--version"]) {
@@ -190,7 +192,8 @@ fn debian_package(name: &str) -> Result<(), Failure> {
     ]))
 }
 
-/// Makes `copy` the same as `source`, but for the modules: those of `copy` stay, those of `source` are not taken.
+/// Makes `copy` equal to `source`, except for the modules: those of `copy` stay, those of `source` are
+/// skipped.
 fn copy_package(source: &Path, copy: &Path) -> std::io::Result<()> {
     fs::create_dir_all(copy)?;
     for entry in fs::read_dir(copy)? {
@@ -273,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn old_versions_of_node_are_known() {
+    fn old_versions_of_node_are_recognised() {
         for (version, new_enough) in [
             ("v20.19.4", true),
             ("v24.0.0", true),
@@ -285,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_is_made_from_what_was_noted_and_nothing_else() {
+    fn a_folder_matches_only_its_recorded_sources() {
         let folder = std::env::temp_dir().join(format!("xtask-made-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         assert!(!is_made_from(&folder, "one"));

@@ -1,4 +1,4 @@
-//! The steps of a task: announced, timed, summed up at the end. Which steps there are is not decided here.
+//! The steps of a task: announced, timed, and summarised at the end.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -54,7 +54,7 @@ impl Steps {
         self.run(name, || command::run(command))
     }
 
-    /// Notes, visibly, a step that cannot be run.
+    /// Reports a step that cannot be run.
     pub(crate) fn skip(&mut self, name: &str, reason: &str) {
         println!("\n==> {name}: SKIPPED, {reason}");
         let outcome = Outcome::Skipped {
@@ -88,7 +88,7 @@ impl Steps {
                 Outcome::Failed => format!("FAILED   {name:width$}  {seconds:6.1} s"),
                 Outcome::Skipped { reason } => format!("skipped  {name:width$}  {reason}"),
             };
-            writeln!(text, "{line}").expect("a String takes everything written to it");
+            writeln!(text, "{line}").expect("a String grows as needed");
         }
         text
     }
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_names_its_step_and_stands_in_the_summary() {
+    fn a_failure_names_its_step_and_is_in_the_summary() {
         let mut steps = Steps::default();
         steps.run("first", || Ok(())).unwrap();
         steps.skip("second", "nothing there");

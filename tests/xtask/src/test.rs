@@ -1,4 +1,4 @@
-//! `cargo xtask test`: the tests of every language, each told where to find the others. The whole-system tests, written in
+//! `cargo xtask test`: the tests of every language, with the paths of the others. The system tests, in
 //! Rust, start agents in Python and JavaScript; the tests of those start the server.
 
 use std::process::Command;
@@ -13,16 +13,16 @@ use crate::setup;
 use crate::steps::Steps;
 use crate::web;
 
-/// A language whose tests can be run alone.
+/// A language whose tests can be run separately.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Language {
-    /// Engine, server, Rust SDK and whole-system tests.
+    /// Engine, server, Rust SDK and system tests.
     Rust,
     /// The package in clients/python.
     Python,
     /// The agent in clients/node.
     Node,
-    /// The page for people in clients/web, in a browser as well.
+    /// The page for people in clients/web, including browser tests.
     Web,
 }
 
@@ -45,8 +45,8 @@ pub(crate) fn run(
     if has_web && (wants(Language::Rust) || wants(Language::Web)) {
         web::run(places, steps)?;
     }
-    // Libraries, programs and tests in one go: the server alone would be built with other features than
-    // beside its tests, and hundreds of crates twice.
+    // Libraries, programs and tests together: otherwise hundreds of crates would be built twice, with the
+    // features of the server and with those of its tests.
     let build = [
         "build",
         "--workspace",
@@ -58,7 +58,7 @@ pub(crate) fn run(
     steps.program("build", cargo_command(places).args(build))?;
 
     if wants(Language::Rust) {
-        // Tests that need what a machine does not have say themselves that they are skipped.
+        // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
         }

@@ -1,4 +1,5 @@
-//! `cargo xtask web`: builds the page for people and puts it where the server takes it from. Also how the page is checked and tested.
+//! `cargo xtask web`: builds the page and copies it to where the server expects it. Also checks and
+//! tests the page.
 
 use std::fs;
 use std::path::Path;
@@ -23,12 +24,12 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     })
 }
 
-/// Types, lints and format of the page, whose package must be set up.
+/// Checks types, lints and format of the page, whose package must be set up.
 pub(crate) fn check(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("tsc, biome", npm(places).args(["run", "check"]))
 }
 
-/// The page's tests without a browser, then those with one, which start the server.
+/// The page's tests without a browser, then the browser tests, which start the server.
 pub(crate) fn test(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("vitest", npm(places).args(["run", "test"]))?;
     match setup::chromium() {
@@ -46,8 +47,8 @@ fn npm(places: &Places) -> Command {
     command
 }
 
-/// Makes `copy` hold the files that `source` holds. Files that are the same are not touched, so that Cargo builds nothing anew for them;
-/// hidden ones belong to the source tree.
+/// Makes `copy` contain the files of `source`. Unchanged files are not touched, so that Cargo rebuilds
+/// nothing for them; hidden files belong to the source tree.
 fn follow(source: &Path, copy: &Path) -> std::io::Result<()> {
     fs::create_dir_all(copy)?;
     for entry in fs::read_dir(copy)? {
@@ -82,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_followed_folder_is_the_same_but_for_hidden_files_and_what_did_not_change_is_not_touched() {
+    fn a_copied_folder_equals_its_source_except_hidden_files_and_unchanged_files_are_not_touched() {
         let folder = std::env::temp_dir().join(format!("xtask-follow-{}", std::process::id()));
         let (source, copy) = (folder.join("source"), folder.join("copy"));
         fs::create_dir_all(source.join("assets")).unwrap();

@@ -232,7 +232,7 @@ Global___TakenOver: _TypeAlias = TakenOver  # noqa: Y015
 
 @_typing.final
 class DecisionRecord(_message.Message):
-    """One decision, whoever or whatever took it."""
+    """One decision, from any source."""
 
     DESCRIPTOR: _descriptor.Descriptor
 

@@ -260,7 +260,7 @@ class SeatConfig(_message.Message):
     """A built-in agent of the server: "random", "random_unmasked", "greedy" or "trained"."""
     name: _builtins.str
     """Display name of a built-in agent, 1..=64 characters; empty: its own name. Ratings and filters
-    use the agent, not this name. Must be empty for an open seat: whoever joins chooses a name.
+    use the agent, not this name. Must be empty for an open seat: its participant chooses a name.
     """
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:

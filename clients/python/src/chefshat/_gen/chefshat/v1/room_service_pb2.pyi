@@ -41,10 +41,10 @@ class CreateRoomRequest(_message.Message):
     commitment and is not rated.
     """
     request_id: _builtins.bytes
-    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
-    lost, creates nothing more and gets the same answer with the same secrets, as long as the server lists what was created; after a restart
-    of the server too, if that outlives the server. With the same id but other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
-    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, creates nothing and gets the same response with the same secrets, as long as the
+    created object is listed; if it survives a restart of the server, then too. The same id with other
+    content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -253,10 +253,10 @@ class JoinRoomRequest(_message.Message):
     seat: _builtins.int
     """The requested seat; unset: the first free one that admits the kind."""
     request_id: _builtins.bytes
-    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
-    lost, gets the same place with the same ticket, also when the game has begun or the server was restarted, as long as the participant
-    has its place. With the same id but another name, kind or seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
-    (REQUEST_ID_REFUSED).
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, gets the same place with the same ticket while the participant has it, even after
+    the start of the game or a restart of the server. The same id with another name, kind or seat:
+    ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     def __init__(
         self,

@@ -29,10 +29,10 @@ class CreateTournamentRequest(_message.Message):
     SETTINGS_FIELD_NUMBER: _builtins.int
     REQUEST_ID_FIELD_NUMBER: _builtins.int
     request_id: _builtins.bytes
-    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
-    lost, creates nothing more and gets the same answer with the same secrets, as long as the server lists what was created; after a restart
-    of the server too, if that outlives the server. With the same id but other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
-    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, creates nothing and gets the same response with the same secrets, as long as the
+    created object is listed; if it survives a restart of the server, then too. The same id with other
+    content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     @_builtins.property
     def settings(self) -> _tournament_pb2.TournamentSettings:
@@ -218,9 +218,10 @@ class JoinTournamentRequest(_message.Message):
     stateless: _builtins.bool
     """Declares it stateless: it remembers nothing from one game to the next."""
     request_id: _builtins.bytes
-    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
-    lost, gets the same place with the same ticket, also when the game has begun or the server was restarted, as long as the participant
-    has its place. With the same id but another name, kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, gets the same place with the same ticket while the participant has it, even after
+    the start of the tournament or a restart of the server. The same id with another name, kind, number
+    of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
     (REQUEST_ID_REFUSED).
     """
     def __init__(
