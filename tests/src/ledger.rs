@@ -16,14 +16,14 @@ type Key = (String, u32, u64);
 pub struct Ledger {
     sent: Mutex<BTreeMap<Key, u32>>,
     accepted: Mutex<BTreeMap<Key, u32>>,
-    surprises: Mutex<Vec<String>>,
+    unexpected: Mutex<Vec<String>>,
     count: watch::Sender<u64>,
 }
 
 impl Ledger {
     /// Wraps an agent whose answers are recorded here.
-    pub fn noting<A: Agent>(self: &Arc<Self>, agent: A) -> Noted<A> {
-        Noted {
+    pub fn wrap<A: Agent>(self: &Arc<Self>, agent: A) -> Recorded<A> {
+        Recorded {
             agent,
             game: String::new(),
             seat: 0,
@@ -46,17 +46,17 @@ impl Ledger {
     }
 
     /// Records something that must not happen.
-    pub fn surprise(&self, what: String) {
-        self.surprises.lock().expect("no panic").push(what);
+    pub fn unexpected(&self, what: String) {
+        self.unexpected.lock().expect("no panic").push(what);
     }
 
     /// Checks that nothing unexpected happened.
     ///
     /// # Panics
     /// Something unexpected happened.
-    pub fn assert_no_surprise(&self) {
-        let surprises = self.surprises.lock().expect("no panic");
-        assert!(surprises.is_empty(), "{surprises:#?}");
+    pub fn assert_nothing_unexpected(&self) {
+        let unexpected = self.unexpected.lock().expect("no panic");
+        assert!(unexpected.is_empty(), "{unexpected:#?}");
     }
 
     /// Compares the record of a game with the clients' knowledge: it contains every acknowledged decision
@@ -99,20 +99,20 @@ impl Ledger {
 
 /// An agent whose answers and acknowledgements are recorded.
 #[derive(Debug)]
-pub struct Noted<A> {
+pub struct Recorded<A> {
     agent: A,
     game: String,
     seat: u32,
     ledger: Arc<Ledger>,
 }
 
-impl<A> Noted<A> {
+impl<A> Recorded<A> {
     fn key(&self, decision: u64) -> Key {
         (self.game.clone(), self.seat, decision)
     }
 }
 
-impl<A: Agent> Agent for Noted<A> {
+impl<A: Agent> Agent for Recorded<A> {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let action = self.agent.decide(request);
         let key = self.key(request.decision_id);
@@ -121,7 +121,8 @@ impl<A: Agent> Agent for Noted<A> {
         drop(sent);
         // An agent is asked again only after a refused answer, and these answers are never refused.
         if before.is_some() {
-            self.ledger.surprise(format!("{key:?} was requested twice"));
+            self.ledger
+                .unexpected(format!("{key:?} was requested twice"));
         }
         action
     }
@@ -144,8 +145,8 @@ impl<A: Agent> Agent for Noted<A> {
         self.agent.on_result(result);
         let key = self.key(result.decision_id);
         if result.status() != v1::AnswerStatus::Accepted {
-            let surprise = format!("{key:?} was answered with {result:?}");
-            return self.ledger.surprise(surprise);
+            let unexpected = format!("{key:?} was answered with {result:?}");
+            return self.ledger.unexpected(unexpected);
         }
         let mut accepted = self.ledger.accepted.lock().expect("no panic");
         let before = accepted.insert(key.clone(), result.action);
@@ -153,7 +154,7 @@ impl<A: Agent> Agent for Noted<A> {
         match before {
             None => self.ledger.count.send_modify(|count| *count += 1),
             Some(action) if action == result.action => {}
-            Some(action) => self.ledger.surprise(format!(
+            Some(action) => self.ledger.unexpected(format!(
                 "{key:?} was acknowledged as {action} and as {}",
                 result.action
             )),

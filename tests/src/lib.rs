@@ -7,18 +7,18 @@
 #[cfg(doctest)]
 pub struct Readme;
 
+mod busy_rooms;
 mod disk;
 mod ledger;
 mod process;
-mod regulars;
 mod seat;
 mod server;
 
+pub use busy_rooms::{BusyRooms, RoomKind};
 pub use disk::{SmallDisk, skip};
-pub use ledger::{Ledger, Noted};
+pub use ledger::{Ledger, Recorded};
 pub use process::{Ended, Launch, Process, set_up};
-pub use regulars::{Habit, Regulars};
-pub use seat::{StreamSeat, attach_all, first_legal, first_to_hear, is_legal, play_on};
+pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
 pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
 
 use std::time::Duration;

@@ -194,7 +194,7 @@ pub async fn play_on(seat: &mut StreamSeat) -> v1::DetachReason {
 }
 
 /// The first update that any of the seats receives, and that seat's index.
-pub async fn first_to_hear(seats: &mut [StreamSeat]) -> (Update, usize) {
+pub async fn first_update(seats: &mut [StreamSeat]) -> (Update, usize) {
     let listening = seats.iter_mut().map(|seat| Box::pin(seat.next()));
     let (update, index, _) = futures::future::select_all(listening).await;
     (update, index)

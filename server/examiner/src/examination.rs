@@ -158,7 +158,7 @@ impl Examination {
         };
         relay.abort();
         self.close(venue, owner_token).await;
-        let findings = desk.look().findings().to_vec();
+        let findings = desk.lock().findings().to_vec();
         if findings.is_empty() {
             last_lines.clear();
         }
@@ -176,15 +176,15 @@ impl Examination {
             Place::Room(room) => {
                 let mut request = room(&self.patience);
                 request.name = format!("examination: {}", case.name);
-                let made = client.create_room(request).await?;
-                let room = made.room.ok_or(ExaminationError::NoRoom)?;
+                let created = client.create_room(request).await?;
+                let room = created.room.ok_or(ExaminationError::NoRoom)?;
                 Ok(Opened {
                     venue: Venue::Room {
                         room_id: room.room_id,
-                        join_code: made.join_code.clone(),
+                        join_code: created.join_code.clone(),
                     },
-                    code: made.join_code,
-                    owner_token: made.owner_token,
+                    code: created.join_code,
+                    owner_token: created.owner_token,
                 })
             }
             Place::Tournament(settings) => {
@@ -193,15 +193,15 @@ impl Examination {
                     ..v1::CreateTournamentRequest::default()
                 };
                 let mut service = TournamentServiceClient::new(client.channel());
-                let made = service.create_tournament(request).await;
-                let made = made.map_err(chefshat_client::Error::from)?.into_inner();
-                let tournament = made.tournament.ok_or(ExaminationError::NoRoom)?;
+                let created = service.create_tournament(request).await;
+                let created = created.map_err(chefshat_client::Error::from)?.into_inner();
+                let tournament = created.tournament.ok_or(ExaminationError::NoRoom)?;
                 Ok(Opened {
                     venue: Venue::Tournament {
                         tournament_id: tournament.tournament_id,
                     },
-                    code: made.join_code,
-                    owner_token: made.owner_token,
+                    code: created.join_code,
+                    owner_token: created.owner_token,
                 })
             }
         }
@@ -245,7 +245,7 @@ struct Opened {
 /// Waits until the case is over.
 async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Result<()> {
     let mut running = process.is_some();
-    while !desk.look().is_done() {
+    while !desk.lock().is_done() {
         let exited = async {
             match &mut process {
                 Some(process) if running => process.ended().await,

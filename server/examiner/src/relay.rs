@@ -51,19 +51,19 @@ impl Desk {
 
     /// Passes an event to the case and wakes its waiters.
     pub(super) fn show<T>(&self, act: impl FnOnce(&mut Exam, Duration) -> T) -> T {
-        let shown = act(&mut self.look(), self.began.elapsed());
+        let result = act(&mut self.lock(), self.began.elapsed());
         self.changed.notify_one();
-        shown
+        result
     }
 
     /// Locks the case for reading.
-    pub(super) fn look(&self) -> MutexGuard<'_, Exam> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Exam> {
         self.exam.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// When the time limits of the case must be checked.
     pub(super) fn wake_at(&self) -> Instant {
-        self.began + self.look().wake_at()
+        self.began + self.lock().wake_at()
     }
 
     /// Waits until an event has been passed to the case.
@@ -241,7 +241,7 @@ impl Stream {
         let desk = Arc::clone(&self.desk);
         loop {
             let passed = tokio::select! {
-                said = agent.message(), if self.to_server.is_some() => match said {
+                message = agent.message(), if self.to_server.is_some() => match message {
                     Ok(Some(request)) => desk.show(|exam, now| exam.from_agent(id, request, now)),
                     Ok(None) => {
                         self.to_server = None;

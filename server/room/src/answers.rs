@@ -40,7 +40,7 @@ pub enum JoinError {
     #[error("this request id was used with another name, kind or seat; draw a new one")]
     RequestIdUsed,
     /// The game has started.
-    #[error("the game of this room has already started; nobody can join any more")]
+    #[error("the game of this room has already started; joining is no longer possible")]
     GameStarted,
     /// The game has ended.
     #[error(

@@ -123,8 +123,8 @@ impl Core {
         state.connection = Some(connection);
         state.ever_attached = true;
         // With a contribution to the seed this game would have other deals than the rest of its series.
-        let dealt_alike = self.header.series().is_some();
-        if self.state == State::Waiting && !dealt_alike {
+        let in_series = self.header.series().is_some();
+        if self.state == State::Waiting && !in_series {
             state.entropy = entropy;
         }
         if state.away || state.substituted {
@@ -242,11 +242,11 @@ impl Core {
     }
 
     fn accept(&mut self, now: Duration, seat: Seat, input: Answer, time: Duration) -> Answered {
-        let taken_already = self.seats[seat.index()].annotation_bytes;
+        let recorded_bytes = self.seats[seat.index()].annotation_bytes;
         let (annotations, annotations_dropped) = match input.annotations {
             Some(bytes)
                 if bytes.len() > MAX_ANNOTATION_BYTES
-                    || taken_already + bytes.len() > MAX_ANNOTATION_BYTES_PER_GAME =>
+                    || recorded_bytes + bytes.len() > MAX_ANNOTATION_BYTES_PER_GAME =>
             {
                 (None, true)
             }

@@ -170,7 +170,7 @@ pub(super) fn agent(field: &'static str, name: &str) -> Result<Option<AgentKind>
         let known = AgentKind::ALL.map(AgentKind::name).join(", ");
         FieldProblem::new(
             field,
-            format!("there is no built-in agent {name:?}; use one of {known}"),
+            format!("{name:?} is not a built-in agent; use one of {known}"),
         )
     })
 }

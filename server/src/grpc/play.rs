@@ -95,8 +95,8 @@ impl PlayService for Play {
             for attach in seats {
                 reader.attach(attach).await;
             }
-            // The seats stay attached until the client goes or the server closes. A call that has been taken is followed to its end: given up
-            // half-way, the seat would be attached to nobody.
+            // The seats stay attached until the client goes or the server closes. A call that has been
+            // received is executed completely: cancelled half-way, the seat would be attached to no stream.
             loop {
                 tokio::select! {
                     () = outbox.abandoned() => break,

@@ -274,7 +274,7 @@ impl Handle {
     }
 
     /// Closes the room because its tournament is closed; a running game is aborted.
-    pub async fn give_up(&self) {
+    pub async fn close_for_tournament(&self) {
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(Message::Abort(AbortReason::Closed)).await;
     }

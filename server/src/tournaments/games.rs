@@ -28,7 +28,7 @@ impl Task {
         if let Some(deal) = self.state.core.games()[game].deal {
             self.rooms.withhold(self.hosted.series(deal), true);
         }
-        self.unmade.insert(game);
+        self.without_room.insert(game);
         self.seen.remove(&game);
         self.push(TournamentEntry::Placed {
             game,
@@ -41,7 +41,7 @@ impl Task {
     pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
         let playing: Vec<usize> = self.state.core.playing().collect();
         for game in playing {
-            if self.unmade.contains(&game) {
+            if self.without_room.contains(&game) {
                 continue;
             }
             let placed = self.state.placed.get(&game).copied();
@@ -73,11 +73,11 @@ impl Task {
             (game.tournament()).is_some_and(|game| game.tournament == self.hosted.id())
         };
         if let Some(stored) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
-            let told = tokio::task::spawn_blocking(move || {
+            let reading = tokio::task::spawn_blocking(move || {
                 let lines = convert::lines_of(&stored);
                 (outcome::outcome(&lines), abort_reason(&lines))
             });
-            let (outcome, reason) = told
+            let (outcome, reason) = reading
                 .await
                 .map_err(|error| StoreError::Failed(format!("reading a record failed: {error}")))?;
             return Ok(match (outcome, reason) {
@@ -116,12 +116,12 @@ impl Task {
 
     /// Creates the rooms of called games and notifies their participants.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        if self.unmade.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+        if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
             return Ok(());
         }
         self.retry = None;
-        let unmade: Vec<usize> = self.unmade.iter().copied().collect();
-        let making = unmade.iter().map(|game| {
+        let without_room: Vec<usize> = self.without_room.iter().copied().collect();
+        let making = without_room.iter().map(|game| {
             let new = self.new_room(*game);
             let rooms = &self.rooms;
             async move { (*game, rooms.create(new).await) }
@@ -129,7 +129,7 @@ impl Task {
         for (game, made) in join_all(making).await {
             match made {
                 Ok(_) => {
-                    self.unmade.remove(&game);
+                    self.without_room.remove(&game);
                     self.seen.insert(game);
                     self.has_changed = true;
                     self.call(game);

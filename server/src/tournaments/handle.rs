@@ -42,11 +42,11 @@ impl Connection {
     /// Sends a call; `false` if the stream is gone or too many calls wait. In the latter case the stream
     /// is ended, so that its client reconnects.
     pub(super) fn call(&self, call: Call) -> bool {
-        let told = self.calls.try_send((self.handle, call)).is_ok();
-        if !told {
+        let sent = self.calls.try_send((self.handle, call)).is_ok();
+        if !sent {
             self.outbox.cut(StreamEnd::CallsNotTaken);
         }
-        told
+        sent
     }
 }
 
@@ -365,8 +365,8 @@ impl TournamentHandle {
     }
 
     /// Reads the committed state of the core.
-    pub fn look<T>(&self, look: impl FnOnce(&Tournament) -> T) -> T {
-        look(&self.committed().core)
+    pub fn read<T>(&self, read: impl FnOnce(&Tournament) -> T) -> T {
+        read(&self.committed().core)
     }
 
     /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just before
@@ -379,7 +379,7 @@ impl TournamentHandle {
             if rooms.is_over(room) == Some(false)
                 && let Some(room) = rooms.get(room)
             {
-                tokio::spawn(async move { room.give_up().await });
+                tokio::spawn(async move { room.close_for_tournament().await });
             }
         }
     }

@@ -190,7 +190,7 @@ impl Tournaments {
         count: usize,
     ) -> Vec<(u64, Arc<TournamentHandle>)> {
         let is_wanted = |hosted: &TournamentHandle| {
-            state.is_none_or(|state| hosted.look(Tournament::state) == state)
+            state.is_none_or(|state| hosted.read(Tournament::state) == state)
         };
         // Read after the table is unlocked: each may be busy for a moment.
         let earlier: Vec<_> = (self.lock().earlier(before))
@@ -286,7 +286,7 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        self.tournaments.lock().give_back(self.owner.room);
+        self.tournaments.lock().release(self.owner.room);
         self.tournaments.created.notify_waiters();
     }
 }

@@ -70,7 +70,7 @@ impl TournamentHandle {
 
     fn mark(&self) -> Mark {
         let change = *self.changes.borrow();
-        self.look(|core| Mark {
+        self.read(|core| Mark {
             change,
             state: core.state(),
             participants: core.participants().len(),
@@ -116,7 +116,7 @@ impl TournamentHandle {
     }
 
     fn compute_results(&self) -> v1::GetTournamentResultsResponse {
-        let core = self.look(Tournament::clone);
+        let core = self.read(Tournament::clone);
         v1::GetTournamentResultsResponse {
             tournament: Some(self.described(&core)),
             standings: self.standings(&core),

@@ -55,7 +55,7 @@ impl Table {
     }
 
     /// Releases the space reserved for a tournament.
-    pub(super) fn give_back(&mut self, id: Id) {
+    pub(super) fn release(&mut self, id: Id) {
         self.in_creation.remove(&id);
     }
 

@@ -42,11 +42,11 @@ pub(super) struct Task {
     /// Number of committed rows.
     rows: u64,
     /// Entries of the next commit.
-    pub(super) unkept: Vec<TournamentEntry>,
+    pub(super) pending: Vec<TournamentEntry>,
     /// Streams of participants, with their connection ids.
     pub(super) connections: BTreeMap<usize, (u64, Connection)>,
     /// Called games that have no room yet.
-    pub(super) unmade: BTreeSet<usize>,
+    pub(super) without_room: BTreeSet<usize>,
     /// Games whose rooms have existed since the server was started.
     pub(super) seen: BTreeSet<usize>,
     /// Deals whose remaining games must be checked.
@@ -71,9 +71,9 @@ impl Task {
             hosted,
             rooms,
             rows,
-            unkept: Vec::new(),
+            pending: Vec::new(),
             connections: BTreeMap::new(),
-            unmade: BTreeSet::new(),
+            without_room: BTreeSet::new(),
             seen: BTreeSet::new(),
             deals: BTreeSet::new(),
             has_changed: false,
@@ -215,7 +215,7 @@ impl Task {
     fn close(&mut self) {
         if let Some(change) = self.state.core.close() {
             self.fold(change);
-            self.unmade.clear();
+            self.without_room.clear();
         }
     }
 
@@ -260,7 +260,7 @@ impl Task {
         let state = &self.state;
         let games = state.core.playing().filter(|number| {
             let game = &state.core.games()[*number];
-            !self.unmade.contains(number) && plays_itself(game, participant)
+            !self.without_room.contains(number) && plays_itself(game, participant)
         });
         games
             .filter_map(|number| state.placed.get(&number).map(|(room, _)| *room))
@@ -291,7 +291,7 @@ impl Task {
     /// Applies an entry and adds it to the next commit.
     pub(super) fn push(&mut self, entry: TournamentEntry) {
         self.state.apply(&entry);
-        self.unkept.push(entry);
+        self.pending.push(entry);
     }
 
     pub(super) fn fold_all(&mut self, changes: Vec<Change>) {
@@ -308,9 +308,9 @@ impl Task {
                 self.read_ended_games().await?;
                 self.follow().await?;
             }
-            let moved = !self.unkept.is_empty();
+            let moved = !self.pending.is_empty();
             if moved {
-                let entries = std::mem::take(&mut self.unkept);
+                let entries = std::mem::take(&mut self.pending);
                 let store = self.rooms.store();
                 (store.append_tournament(self.hosted.id(), self.rows, entries.clone())).await?;
                 self.rows += 1;
@@ -329,7 +329,7 @@ impl Task {
             if std::mem::take(&mut self.has_changed) || moved {
                 self.hosted.changes.send_modify(|count| *count += 1);
             }
-            if !moved && self.unkept.is_empty() {
+            if !moved && self.pending.is_empty() {
                 return Ok(());
             }
         }
@@ -378,7 +378,7 @@ impl Task {
 
 impl Drop for Task {
     fn drop(&mut self) {
-        let state = self.hosted.look(|core| core.state());
+        let state = self.hosted.read(|core| core.state());
         info!(tournament = %self.hosted.id(), ?state, "the tournament's task has ended");
     }
 }

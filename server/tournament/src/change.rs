@@ -71,7 +71,7 @@ pub enum Change {
         /// The result.
         result: GameResult,
     },
-    /// A game was given up and counts for nobody.
+    /// A game was voided and does not count.
     Voided {
         /// The game.
         game: usize,

@@ -3,7 +3,7 @@
 use chefshat_proto::Timestamp;
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
-    StreamSeat, TestServer, attach_all, first_legal, first_to_hear, is_legal, one_shift, play_on,
+    StreamSeat, TestServer, attach_all, first_legal, first_update, is_legal, one_shift, play_on,
     room_of_four,
 };
 
@@ -16,7 +16,7 @@ async fn first_to_act(
     let (_, tickets) = room_of_four(&client, one_shift(), policy).await;
     let mut seats = attach_all(server, &tickets).await;
     // Events come with decisions: only the seat that is asked receives anything.
-    let (update, index) = first_to_hear(&mut seats).await;
+    let (update, index) = first_update(&mut seats).await;
     let Update::Decision(decision) = update else {
         panic!("no decision, but {update:?}");
     };
@@ -141,7 +141,7 @@ async fn bad_annotations_and_expressions_do_not_spoil_the_record() {
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let mut seats = attach_all(&server, &tickets).await;
-    let (update, index) = first_to_hear(&mut seats).await;
+    let (update, index) = first_update(&mut seats).await;
     let Update::Decision(decision) = update else {
         panic!("no decision, but {update:?}");
     };

@@ -2,14 +2,13 @@
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
-    StreamSeat, TestServer, attach_all, first_legal, first_to_hear, one_shift, play_on,
-    room_of_four,
+    StreamSeat, TestServer, attach_all, first_legal, first_update, one_shift, play_on, room_of_four,
 };
 
 /// Plays until `seat` has a decision open, which it leaves unanswered.
 async fn until_asked(seats: &mut [StreamSeat], seat: usize) -> v1::DecisionRequest {
     loop {
-        let (update, index) = first_to_hear(seats).await;
+        let (update, index) = first_update(seats).await;
         match update {
             Update::Decision(decision) if index == seat => return decision,
             Update::Decision(decision) => {

@@ -1,7 +1,7 @@
 //! Joining, attaching, closing and leaving rooms: who may, and the errors for others.
 
 use chefshat_proto::v1::{self, room_service_client::RoomServiceClient, seat_update::Update};
-use chefshat_tests::{StreamSeat, TestServer, attach_all, first_to_hear, one_shift, room_of_four};
+use chefshat_tests::{StreamSeat, TestServer, attach_all, first_update, one_shift, room_of_four};
 use tonic::Code;
 
 use crate::records::reason;
@@ -218,7 +218,7 @@ async fn a_seat_can_be_freed_until_the_game_starts() {
         tickets[seat] = again.ticket;
     }
     let mut seats = attach_all(&server, &tickets).await;
-    let (_, to_play) = first_to_hear(&mut seats).await;
+    let (_, to_play) = first_update(&mut seats).await;
     let error = client.leave_room(&*tickets[to_play]).await;
     assert_eq!(
         error.expect_err("the game has started").reason(),

@@ -10,8 +10,8 @@ use chefshat_client::Client;
 use chefshat_proto::v1::{self, record_line::Line, seat_update::Update};
 use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
-    Ended, Habit, Launch, Ledger, Process, Regulars, SmallDisk, StreamSeat, first_legal,
-    first_to_hear, is_legal, one_shift, patiently, room_of_four, skip,
+    BusyRooms, Ended, Launch, Ledger, Process, RoomKind, SmallDisk, StreamSeat, first_legal,
+    first_update, is_legal, one_shift, patiently, room_of_four, skip,
 };
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
@@ -29,20 +29,20 @@ const DECISION_TIME_MS: u32 = 2_000;
 /// rooms.
 const ON_THE_WAY: u64 = 16;
 
-fn rooms(count: usize, policy: v1::RoomPolicy) -> Vec<Habit> {
-    let habit = Habit {
+fn rooms(count: usize, policy: v1::RoomPolicy) -> Vec<RoomKind> {
+    let kind = RoomKind {
         rules: v1::RuleSet {
             stop: Some(v1::rule_set::Stop::TargetShifts(2)),
             ..v1::RuleSet::default()
         },
         policy,
-        ..Habit::default()
+        ..RoomKind::default()
     };
-    vec![habit; count]
+    vec![kind; count]
 }
 
 fn unhurried() -> v1::RoomPolicy {
-    Habit::default().policy
+    RoomKind::default().policy
 }
 
 /// A policy under which a seat that is charged for a locked database times out.
@@ -70,10 +70,15 @@ fn assert_failed(ended: &Ended, advice: &str) {
 }
 
 /// Lets games continue for a while and end, and finds every acknowledged decision in the records.
-async fn assert_continues(launch: &Launch, server: Process, regulars: Regulars, data_dir: &Path) {
-    let ledger = Arc::clone(&regulars.ledger);
+async fn assert_continues(
+    launch: &Launch,
+    server: Process,
+    busy_rooms: BusyRooms,
+    data_dir: &Path,
+) {
+    let ledger = Arc::clone(&busy_rooms.ledger);
     patiently("decisions", ledger.reaches(ledger.count() + 100)).await;
-    let games = regulars.leave().await;
+    let games = busy_rooms.finish().await;
     let client = Client::connect(launch.url())
         .await
         .expect("the server listens");
@@ -128,8 +133,8 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
     let server = launch.start().await.expect("the server starts");
-    let regulars = Regulars::come(&launch.url(), rooms(4, unhurried()));
-    patiently("decisions", regulars.ledger.reaches(50)).await;
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(4, unhurried()));
+    patiently("decisions", busy_rooms.ledger.reaches(50)).await;
     disk.fill("filler");
     assert_failed(&server.ended().await, "the disk is full: free some space");
     // A restart while the disk is full fails again: at once, or a little later when its space runs out.
@@ -140,7 +145,7 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
     assert_failed(&ended, "free some space");
     std::fs::remove_file(disk.path().join("filler")).expect("removed");
     let server = launch.start().await.expect("the server restarts");
-    assert_continues(&launch, server, regulars, &disk.path()).await;
+    assert_continues(&launch, server, busy_rooms, &disk.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -183,19 +188,19 @@ async fn a_temporarily_locked_database_delays_nobody() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
     let server = launch.start().await.expect("the server starts");
-    let regulars = Regulars::come(&launch.url(), rooms(4, hurried()));
-    patiently("decisions", regulars.ledger.reaches(50)).await;
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(4, hurried()));
+    patiently("decisions", busy_rooms.ledger.reaches(50)).await;
     let mut other = other_program(folder.path()).await;
     execute(&mut other, "BEGIN IMMEDIATE").await;
-    let before = regulars.ledger.count();
+    let before = busy_rooms.ledger.count();
     tokio::time::sleep(LOCKED_FOR).await;
-    let meanwhile = regulars.ledger.count() - before;
+    let meanwhile = busy_rooms.ledger.count() - before;
     execute(&mut other, "ROLLBACK").await;
     assert!(
         meanwhile <= ON_THE_WAY,
         "{meanwhile} were acknowledged although nothing can be committed"
     );
-    assert_continues(&launch, server, regulars, folder.path()).await;
+    assert_continues(&launch, server, busy_rooms, folder.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -220,7 +225,7 @@ async fn a_seat_that_waits_for_the_database_may_still_answer() {
         assert!(matches!(seat.next().await, Update::Attached(_)));
         seats.push(seat);
     }
-    let (Update::Decision(decision), asked) = first_to_hear(&mut seats).await else {
+    let (Update::Decision(decision), asked) = first_update(&mut seats).await else {
         panic!("the first update is a decision");
     };
     execute(&mut other, "BEGIN IMMEDIATE").await;
@@ -245,8 +250,8 @@ async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
     let server = launch.start().await.expect("the server starts");
-    let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
-    patiently("decisions", regulars.ledger.reaches(50)).await;
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(2, unhurried()));
+    patiently("decisions", busy_rooms.ledger.reaches(50)).await;
     let mut other = other_program(folder.path()).await;
     execute(&mut other, "BEGIN IMMEDIATE").await;
     let advice = "another program has kept games.sqlite3 locked for more than 10 s";
@@ -254,7 +259,7 @@ async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
     execute(&mut other, "ROLLBACK").await;
     other.close().await.expect("closed");
     let server = launch.start().await.expect("the server restarts");
-    assert_continues(&launch, server, regulars, folder.path()).await;
+    assert_continues(&launch, server, busy_rooms, folder.path()).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -282,15 +287,15 @@ async fn a_disk_that_fails_to_sync_ends_the_server_and_loses_nothing() {
     let data_dir = folder.path().join("data");
     let mut launch = Launch::new(&data_dir).through(strace);
     let server = launch.start().await.expect("the server starts");
-    let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(2, unhurried()));
     let ended = server.ended().await;
     assert_failed(&ended, "the disk fails to read or write");
-    assert!(regulars.ledger.count() > 20, "in mid-game");
+    assert!(busy_rooms.ledger.count() > 20, "in mid-game");
     let log = std::fs::read_to_string(log).expect("strace wrote it");
     assert!(log.contains("(INJECTED)"), "{log}");
     launch.by_itself();
     let server = launch.start().await.expect("the server restarts");
-    assert_continues(&launch, server, regulars, &data_dir).await;
+    assert_continues(&launch, server, busy_rooms, &data_dir).await;
 }
 
 /// The message of a server that does not start. Checks that it leaves the database unchanged.

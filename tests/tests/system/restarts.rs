@@ -9,7 +9,7 @@ use chefshat_client::{Backoff, Client, PlayOptions, RandomAgent};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_update::Update};
 use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
-    Habit, Launch, PATIENCE, Regulars, StreamSeat, patiently, random_agents, room_of_four,
+    BusyRooms, Launch, PATIENCE, RoomKind, StreamSeat, patiently, random_agents, room_of_four,
 };
 use rand::rngs::SmallRng;
 use rand::{RngExt as _, SeedableRng as _};
@@ -33,24 +33,24 @@ fn shifts(count: u32) -> v1::RuleSet {
 
 /// Eight rooms of all kinds: long and short games, shared and separate streams, events at once and with
 /// decisions, with built-in agents.
-fn eight_rooms() -> Vec<Habit> {
-    let mut habits: Vec<Habit> = (0..8)
-        .map(|number| Habit {
+fn eight_rooms() -> Vec<RoomKind> {
+    let mut kinds: Vec<RoomKind> = (0..8)
+        .map(|number| RoomKind {
             rules: shifts(1 + number % 3),
             one_stream: number % 2 == 1,
             delivery: match number % 4 {
                 0 | 1 => v1::EventDelivery::AtOnce,
                 _ => v1::EventDelivery::WithDecisions,
             },
-            ..Habit::default()
+            ..RoomKind::default()
         })
         .collect();
-    for habit in &mut habits[4..6] {
-        habit.built_in = 1;
-        habit.policy.pace_ms = Some(2);
+    for kind in &mut kinds[4..6] {
+        kind.built_in = 1;
+        kind.policy.pace_ms = Some(2);
     }
-    habits[7].rules = v1::RuleSet::default();
-    habits
+    kinds[7].rules = v1::RuleSet::default();
+    kinds
 }
 
 async fn playing(client: &Client) -> usize {
@@ -86,8 +86,8 @@ async fn every_acknowledged_decision_survives_sigkill() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
     let mut server = launch.start().await.expect("the server starts");
-    let regulars = Regulars::come(&launch.url(), eight_rooms());
-    let ledger = &regulars.ledger;
+    let busy_rooms = BusyRooms::start(&launch.url(), eight_rooms());
+    let ledger = &busy_rooms.ledger;
     let mut random = SmallRng::seed_from_u64(kills);
     let mut found_playing = 0;
     for kill in 1..=kills {
@@ -106,8 +106,8 @@ async fn every_acknowledged_decision_survives_sigkill() {
             eprintln!("{kill} kills, {decisions} decisions acknowledged, {seconds} s");
         }
     }
-    let ledger = Arc::clone(&regulars.ledger);
-    let games = regulars.leave().await;
+    let ledger = Arc::clone(&busy_rooms.ledger);
+    let games = busy_rooms.finish().await;
     let client = connect(&launch).await;
     assert_eq!(playing(&client).await, 0, "no game is running");
 
@@ -182,9 +182,9 @@ async fn a_stop_suspends_durable_games_and_aborts_the_others() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path()).with("--grace", 0);
     let mut server = launch.start().await.expect("the server starts");
-    let mut habits = eight_rooms();
-    habits.truncate(4);
-    let regulars = Regulars::come(&launch.url(), habits);
+    let mut kinds = eight_rooms();
+    kinds.truncate(4);
+    let busy_rooms = BusyRooms::start(&launch.url(), kinds);
     let mut aborted = Vec::new();
     for _ in 0..5 {
         let client = connect(&launch).await;
@@ -197,8 +197,8 @@ async fn a_stop_suspends_durable_games_and_aborts_the_others() {
         for ticket in &tickets {
             seats.push(StreamSeat::attached(client.channel(), ticket).await);
         }
-        let more = regulars.ledger.count() + 20;
-        patiently("decisions", regulars.ledger.reaches(more)).await;
+        let more = busy_rooms.ledger.count() + 20;
+        patiently("decisions", busy_rooms.ledger.reaches(more)).await;
         server.request_stop().await;
         for seat in &mut seats {
             let reason = loop {
@@ -221,8 +221,8 @@ async fn a_stop_suspends_durable_games_and_aborts_the_others() {
         server = launch.start().await.expect("the server restarts");
     }
     // If a durable game had been aborted, its agents would have received that.
-    let ledger = Arc::clone(&regulars.ledger);
-    let games = regulars.leave().await;
+    let ledger = Arc::clone(&busy_rooms.ledger);
+    let games = busy_rooms.finish().await;
     let client = connect(&launch).await;
     for game in &games {
         let record = client.record(game).await.expect("a stored record");

@@ -17,7 +17,7 @@ const QUIET_DECISIONS: u32 = 1;
 
 impl Exam {
     /// A decision is requested from the agent.
-    pub(super) fn put(
+    pub(super) fn decision_requested(
         &mut self,
         key: &SeatKey,
         handle: u32,
@@ -37,7 +37,7 @@ impl Exam {
             }));
         self.settle_before(key, request.decision_id);
         let seen = self.seats.entry(key.clone()).or_default();
-        seen.put(request);
+        seen.decision_requested(request);
         if seen.no_mask {
             request.action_mask.clear();
         }
@@ -50,15 +50,15 @@ impl Exam {
         };
         let mut unanswered = None;
         for (id, decision) in seen.decisions.range_mut(..next) {
-            let open = matches!(decision.stand, DecisionState::Open | DecisionState::Refused);
+            let open = matches!(decision.state, DecisionState::Open | DecisionState::Refused);
             if !open
                 || decision.lost_noted
-                || decision.tampered && decision.stand == DecisionState::Open
+                || decision.tampered && decision.state == DecisionState::Open
             {
                 continue;
             }
             decision.lost_noted = true;
-            decision.stand = DecisionState::Closed;
+            decision.state = DecisionState::Closed;
             seen.lost += 1;
             unanswered = Some((*id, decision.kind));
         }
@@ -120,7 +120,7 @@ impl Exam {
                 }
                 false
             }
-            Some(decision) if decision.closed_told => {
+            Some(decision) if decision.closed_received => {
                 decision.after_closed += 1;
                 let times = decision.after_closed;
                 if times > CROSSING_ANSWERS {
@@ -132,7 +132,7 @@ impl Exam {
                 }
                 false
             }
-            Some(decision) => match decision.stand {
+            Some(decision) => match decision.state {
                 DecisionState::Taken | DecisionState::Answered => {
                     let action = answer.action;
                     self.fault(
@@ -145,7 +145,7 @@ impl Exam {
                 // It was on its way when the time ran out.
                 DecisionState::Closed => false,
                 DecisionState::Open | DecisionState::Refused => {
-                    decision.stand = DecisionState::Answered;
+                    decision.state = DecisionState::Answered;
                     decision.tampered |= dropping;
                     let choice = decision.legal_count() > 1;
                     let turn = decision.kind == v1::DecisionKind::Turn;
@@ -297,13 +297,13 @@ impl Exam {
         };
         match result.status() {
             v1::AnswerStatus::Accepted => {
-                decision.stand = DecisionState::Taken;
+                decision.state = DecisionState::Taken;
                 seen.taken += 1;
                 self.fulfil(Fault::GaveUpWhenRefused);
             }
             v1::AnswerStatus::Invalid => {
                 let exhausted = result.invalid_attempts_left == Some(0);
-                decision.stand = if exhausted {
+                decision.state = if exhausted {
                     DecisionState::Closed
                 } else {
                     DecisionState::Refused
@@ -321,12 +321,12 @@ impl Exam {
                 }
             }
             v1::AnswerStatus::Closed => {
-                decision.closed_told = true;
+                decision.closed_received = true;
                 let tampered = decision.tampered;
-                if decision.stand != DecisionState::Answered {
+                if decision.state != DecisionState::Answered {
                     return;
                 }
-                decision.stand = DecisionState::Closed;
+                decision.state = DecisionState::Closed;
                 if tampered {
                     // Decisions requested before this result may be answered without having read it.
                     seen.read_after = seen.newest();

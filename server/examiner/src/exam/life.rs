@@ -87,11 +87,11 @@ impl Exam {
             }
         }
         let seen = &mut self.streams[stream];
-        let asked = RequestedAttach {
+        let requested = RequestedAttach {
             ticket: attach.ticket.clone(),
             no_mask: attach.no_mask,
         };
-        seen.asked.insert(seen.attachments, asked);
+        seen.requested.insert(seen.attachments, requested);
         seen.attachments += 1;
     }
 
@@ -100,7 +100,7 @@ impl Exam {
             room_id: attached.room_id.clone(),
             seat: attached.seat,
         };
-        let asked = self.streams[stream].asked.remove(&handle);
+        let requested = self.streams[stream].requested.remove(&handle);
         self.streams[stream].bound.insert(handle, key.clone());
         let seen = self.seats.entry(key.clone()).or_default();
         seen.live_from = attached.next_sequence;
@@ -109,17 +109,19 @@ impl Exam {
             Venue::Tournament { tournament_id } => *tournament_id == attached.tournament_id,
         };
         let own = seen.own;
-        seen.no_mask = asked.as_ref().is_some_and(|asked| asked.no_mask);
+        seen.no_mask = requested
+            .as_ref()
+            .is_some_and(|requested| requested.no_mask);
         let newest = seen.newest();
         if let Some(decision) = seen.decisions.get_mut(&newest)
-            && decision.stand == DecisionState::Answered
+            && decision.state == DecisionState::Answered
         {
             // The agent cannot know whether its answer arrived: it may send it again.
-            decision.stand = DecisionState::Open;
+            decision.state = DecisionState::Open;
             decision.tampered = true;
         }
-        if let Some(asked) = asked {
-            self.tickets.insert(asked.ticket, key.clone());
+        if let Some(requested) = requested {
+            self.tickets.insert(requested.ticket, key.clone());
         }
         if own {
             let attached = self.streams.iter().flat_map(|stream| stream.bound.values());
@@ -140,7 +142,7 @@ impl Exam {
 
     pub(super) fn refused(&mut self, stream: StreamId, handle: u32, refused: &v1::Refused) {
         let got = format!("{} ({})", refused.message, refused.reason);
-        if self.streams[stream].asked.remove(&handle).is_some() {
+        if self.streams[stream].requested.remove(&handle).is_some() {
             self.fatal(Fault::AttachRefused, "a valid attachment", got);
         } else if refused.reason != "HANDLE_UNKNOWN" {
             self.fault(Fault::CommandRefused, "valid commands", got);
@@ -175,7 +177,7 @@ impl Exam {
 
     /// The agent is attached as a participant of the tournament.
     pub(super) fn entered(&mut self, stream: StreamId, handle: u32, entered: &v1::Entered) {
-        self.streams[stream].asked.remove(&handle);
+        self.streams[stream].requested.remove(&handle);
         let Venue::Tournament { tournament_id } = &self.venue else {
             return;
         };

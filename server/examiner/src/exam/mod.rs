@@ -19,9 +19,9 @@ use super::fault::{Fault, Finding};
 use seats::{SeatKey, SeatSeen, StreamSeen};
 
 /// Unrequested commands that an agent may send in a case.
-const UNASKED_COMMANDS: u64 = 200;
+const UNREQUESTED_COMMANDS: u64 = 200;
 /// Commands that an agent may send for each update it receives.
-const COMMANDS_AN_UPDATE: u64 = 4;
+const COMMANDS_PER_UPDATE: u64 = 4;
 /// Most different faults recorded in a case.
 const MAX_FINDINGS: usize = 16;
 
@@ -101,7 +101,7 @@ pub struct Exam {
     tickets: BTreeMap<String, SeatKey>,
     findings: Vec<Finding>,
     received: u64,
-    said: u64,
+    commands_sent: u64,
     /// Most seats of the venue that were attached at a time.
     together: usize,
 }
@@ -133,7 +133,7 @@ impl Exam {
             tickets: BTreeMap::new(),
             findings: Vec::new(),
             received: 0,
-            said: 0,
+            commands_sent: 0,
             together: 0,
         }
     }
@@ -157,18 +157,18 @@ impl Exam {
     ) -> Passed {
         let mut passed = Passed::default();
         // An empty message counts too.
-        self.said += u64::from(request.commands.is_empty());
+        self.commands_sent += u64::from(request.commands.is_empty());
         for command in request.commands {
             if self.is_done() || self.streams[stream].cut {
                 break;
             }
-            self.said += 1;
-            if self.said > UNASKED_COMMANDS + COMMANDS_AN_UPDATE * self.received {
-                let (said, received) = (self.said, self.received);
+            self.commands_sent += 1;
+            if self.commands_sent > UNREQUESTED_COMMANDS + COMMANDS_PER_UPDATE * self.received {
+                let (commands_sent, received) = (self.commands_sent, self.received);
                 self.fatal(
                     Fault::Flooding,
                     "about one command for each decision",
-                    format!("{said} commands, after {received} updates in total"),
+                    format!("{commands_sent} commands, after {received} updates in total"),
                 );
                 break;
             }
@@ -295,7 +295,7 @@ impl Exam {
             }
             Update::Decision(request) => {
                 if let Some(key) = self.streams[stream].bound.get(&handle).cloned() {
-                    self.put(&key, handle, request, passed);
+                    self.decision_requested(&key, handle, request, passed);
                 }
             }
             Update::Result(result) => {

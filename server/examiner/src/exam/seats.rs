@@ -28,7 +28,7 @@ pub(super) struct StreamSeen {
     /// Requested attachments; each takes the next handle.
     pub(super) attachments: u32,
     /// Those without an answer yet, by handle.
-    pub(super) asked: BTreeMap<u32, RequestedAttach>,
+    pub(super) requested: BTreeMap<u32, RequestedAttach>,
     /// The seat behind each handle, once attached.
     pub(super) bound: BTreeMap<u32, SeatKey>,
     /// Handles of seats that have been detached.
@@ -68,7 +68,7 @@ pub(super) enum DecisionState {
 pub(super) struct DecisionSeen {
     pub(super) kind: v1::DecisionKind,
     pub(super) mask: Vec<u8>,
-    pub(super) stand: DecisionState,
+    pub(super) state: DecisionState,
     /// The examiner interfered: losses caused by it are not the agent's fault.
     pub(super) tampered: bool,
     /// The examiner's action, sent in place of the agent's, and the agent's.
@@ -76,7 +76,7 @@ pub(super) struct DecisionSeen {
     /// The agent's answer, held back.
     pub(super) held: Option<v1::Answer>,
     /// The agent has received the result CLOSED.
-    pub(super) closed_told: bool,
+    pub(super) closed_received: bool,
     /// Answers after that.
     pub(super) after_closed: u32,
     /// It timed out, and that has been recorded.
@@ -130,7 +130,7 @@ impl SeatSeen {
     }
 
     /// Records a decision request, the first or a repeated one.
-    pub(super) fn put(&mut self, request: &v1::DecisionRequest) {
+    pub(super) fn decision_requested(&mut self, request: &v1::DecisionRequest) {
         self.kinds.insert(request.kind);
         let seen = self
             .decisions
@@ -138,15 +138,15 @@ impl SeatSeen {
             .or_insert_with(|| DecisionSeen {
                 kind: request.kind(),
                 mask: request.action_mask.clone(),
-                stand: DecisionState::Open,
+                state: DecisionState::Open,
                 tampered: false,
                 swapped: None,
                 held: None,
-                closed_told: false,
+                closed_received: false,
                 after_closed: 0,
                 lost_noted: false,
             });
-        seen.stand = DecisionState::Open;
+        seen.state = DecisionState::Open;
         while self.decisions.len() > REMEMBERED {
             self.decisions.pop_first();
         }

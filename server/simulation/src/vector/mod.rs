@@ -167,9 +167,9 @@ impl VectorGames {
         let mut batch = self.empty_batch();
         let mut budget = MAX_WORK_PER_STEP;
         self.open.clear();
-        let mut anew = games.iter().copied().peekable();
+        let mut restarted = games.iter().copied().peekable();
         for (game, slot) in (0..).zip(&mut self.slots) {
-            if anew.next_if_eq(&game).is_some() {
+            if restarted.next_if_eq(&game).is_some() {
                 slot.begin_next(&self.setup, &mut batch);
                 slot.advance(&self.setup, &mut batch, &mut self.totals, &mut budget);
             }

@@ -154,7 +154,7 @@ impl Journal for EphemeralJournal {
                 summary,
             };
             match self.orders.send(game).await {
-                // The game has been played all the same; the record that was stored first stays.
+                // The game was played anyway; the record that was stored first stays.
                 Err(StoreError::Taken(_)) => {
                     error!(game = %game_id, "another record has the id of this game; the game is not stored");
                     Ok(())

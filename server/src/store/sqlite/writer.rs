@@ -136,7 +136,7 @@ pub(super) async fn run(
             .iter()
             .any(|(order, _)| matches!(order, WriteCommand::Close));
         let failure = failed.borrow().clone();
-        let kept = match failure {
+        let committed = match failure {
             Some(failure) => Err(failure),
             None => commit(&mut connection, &mut pending, &mut last_listed)
                 .await
@@ -148,7 +148,7 @@ pub(super) async fn run(
                 }),
         };
         for (index, (_, reply)) in pending.drain(..).enumerate() {
-            let answer = match &kept {
+            let answer = match &committed {
                 Ok(taken) => taken
                     .get(&index)
                     .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),

@@ -75,7 +75,7 @@ impl TournamentHandle {
     }
 
     fn started(self: Arc<Self>) -> Arc<Self> {
-        let started = self.look(Tournament::begin).expect("there are enough");
+        let started = self.read(Tournament::begin).expect("there are enough");
         for change in started {
             self.committed().core.fold(&change);
         }
@@ -84,21 +84,21 @@ impl TournamentHandle {
 
     /// Calls all games that can be called.
     fn call_games(&self) {
-        let mut moving = self.committed();
-        while let Some(change) = moving.core.next(0) {
+        let mut state = self.committed();
+        while let Some(change) = state.core.next(0) {
             if let Change::Called { game, .. } = change {
-                moving.placed.insert(game, (Id::random(), Id::random()));
+                state.placed.insert(game, (Id::random(), Id::random()));
             }
-            moving.core.fold(&change);
+            state.core.fold(&change);
         }
     }
 
     /// Ends all called games.
     fn end_games(&self) {
-        let mut moving = self.committed();
-        let playing: Vec<usize> = moving.core.playing().collect();
+        let mut state = self.committed();
+        let playing: Vec<usize> = state.core.playing().collect();
         for game in playing {
-            let seats = moving.core.games()[game].seats.len();
+            let seats = state.core.games()[game].seats.len();
             let seats = (1..=seats).map(|place| SeatPlayed {
                 place,
                 points: 3,
@@ -108,8 +108,8 @@ impl TournamentHandle {
                 shifts: 1,
                 seats: seats.collect(),
             };
-            let change = moving.core.ended(game, ended).expect("it was played");
-            moving.core.fold(&change);
+            let change = state.core.ended(game, ended).expect("it was played");
+            state.core.fold(&change);
         }
     }
 }
@@ -130,7 +130,7 @@ async fn views_are_computed_once_for_each_change() {
     hosted.changes.send_modify(|count| *count += 1);
     let other = hosted.follower_update(&permits).await.expect("computed");
     assert!(!Arc::ptr_eq(&follower_update, &other));
-    // A client that was told of the start before the change was counted sees no earlier state.
+    // A client that learned of the start before the change was counted sees no earlier state.
     let hosted = hosted.started();
     let started = hosted.results(&permits).await.expect("computed");
     let state = started.message.tournament.as_ref().map(|it| it.state());
@@ -179,12 +179,12 @@ fn followers_receive_the_running_games_and_the_last_ones() {
         hosted.call_games();
     }
     let follower_update = hosted.compute_update();
-    let playing: Vec<u32> = hosted.look(|core| core.playing().map(convert::number).collect());
+    let playing: Vec<u32> = hosted.read(|core| core.playing().map(convert::number).collect());
     assert_eq!(
         in_state(&follower_update.games, v1::TournamentGameState::Playing),
         playing
     );
-    let counted: Vec<u32> = hosted.look(|core| {
+    let counted: Vec<u32> = hosted.read(|core| {
         let games = core.games().iter().enumerate();
         let counted = games.filter(|(_, game)| game.is_over());
         counted.map(|(number, _)| convert::number(number)).collect()

@@ -55,7 +55,7 @@ fn tables_of_a_round_share_deals_and_nobody_plays_one_twice() {
             let seats = who.len();
             who.sort_unstable();
             who.dedup();
-            assert_eq!(who.len(), seats, "nobody meets it twice");
+            assert_eq!(who.len(), seats, "nobody plays it twice");
         }
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn a_refusal_looks_like_one_of_the_agents_own_answer() {
-    let steps = [begun(), vec![put(2), answer(2, 5)]].concat();
+    let steps = [started(), vec![request(2), answer(2, 5)]].concat();
     let mut course = Course::of("refusal", steps);
     assert_eq!(course.answers(), [(1, 1), (2, ILLEGAL)]);
     course.step(result(2, ILLEGAL, AnswerStatus::Invalid));
@@ -21,11 +21,11 @@ fn a_refusal_looks_like_one_of_the_agents_own_answer() {
     assert!(course.codes().is_empty());
 
     let refused = [
-        put(2),
+        request(2),
         answer(2, 1),
         result(2, ILLEGAL, AnswerStatus::Invalid),
     ];
-    let silent = [&refused[..], &[put(3)]].concat();
+    let silent = [&refused[..], &[request(3)]].concat();
     check("silence", "refusal", silent, &["GAVE_UP_WHEN_REFUSED"]);
     let ended = [&refused[..], &[Exit(1)]].concat();
     check("an end", "refusal", ended, &["GAVE_UP_WHEN_REFUSED"]);
@@ -33,30 +33,30 @@ fn a_refusal_looks_like_one_of_the_agents_own_answer() {
 
 #[test]
 fn a_connection_is_cut_before_an_answer_a_request_and_a_result() {
-    let mut course = Course::of("disconnect", begun());
-    course.step(put(2));
+    let mut course = Course::of("disconnect", started());
+    course.step(request(2));
     course.step(answer(2, 1));
     assert_eq!((course.cuts, course.answers()), (1, vec![(1, 1)]));
     // Messages on the old stream are lost; on a new one the decision is requested again.
     course.step(answer(2, 1));
     course.step(Attach(2));
-    course.step(put(2));
+    course.step(request(2));
     course.step(answer(2, 1));
     course.step(accepted(2));
     assert_eq!(course.answers(), [(1, 1), (2, 1)]);
     let received = course.to_agent.len();
-    course.step(put(3));
+    course.step(request(3));
     assert_eq!((course.cuts, course.to_agent.len()), (3, received));
     course.step(Attach(0));
-    course.step(put(3));
+    course.step(request(3));
     course.step(answer(3, 1));
     course.step(accepted(3));
     assert_eq!(course.cuts, 4, "the result is not sent");
     course.step(Attach(2));
-    course.step(put(4));
+    course.step(request(4));
     assert!(course.codes().is_empty());
 
-    let cut = [put(2), answer(2, 1)];
+    let cut = [request(2), answer(2, 1)];
     let with = |rest: &[Step]| [&cut[..], rest].concat();
     check(
         "never",
@@ -79,15 +79,15 @@ fn a_connection_is_cut_before_an_answer_a_request_and_a_result() {
 #[test]
 fn an_answer_is_held_until_its_decision_is_closed() {
     let closed = result(2, 1, AnswerStatus::Closed);
-    let held = [begun(), vec![put(2), answer(2, 1)]].concat();
+    let held = [started(), vec![request(2), answer(2, 1)]].concat();
     let mut course = Course::of("stale", held);
     assert_eq!(course.answers(), [(1, 1)]);
-    course.step(put(3));
+    course.step(request(3));
     assert_eq!(course.answers(), [(1, 1), (2, 1)]);
-    let late = [put(2), answer(2, 1), put(3), closed];
+    let late = [request(2), answer(2, 1), request(3), closed];
     let ended = [&late[..], &[Exit(1)]].concat();
     check("an end", "stale", ended, &["STOPPED_AFTER_CLOSED"]);
-    let silent = [&late[..], &(4..=12).map(put).collect::<Vec<_>>()].concat();
+    let silent = [&late[..], &(4..=12).map(request).collect::<Vec<_>>()].concat();
     check("silence", "stale", silent, &["STOPPED_AFTER_CLOSED"]);
     let unheard = [&late[..], &[answer(3, 1), Exit(1)]].concat();
     check(
@@ -96,7 +96,7 @@ fn an_answer_is_held_until_its_decision_is_closed() {
         unheard,
         &["STOPPED_AFTER_CLOSED"],
     );
-    let none = and_good_end([&late[..], &[put(4)]].concat());
+    let none = and_good_end([&late[..], &[request(4)]].concat());
     check("nothing more", "stale", none, &["STOPPED_AFTER_CLOSED"]);
     let on = and_good_end([&late[..], &[answer(3, 1), accepted(3)]].concat());
     check("playing on", "stale", on, &[]);
@@ -104,8 +104,14 @@ fn an_answer_is_held_until_its_decision_is_closed() {
 
 #[test]
 fn answers_are_dropped_until_a_substitute_plays() {
-    let dropped = [put(2), answer(2, 1), put(3), answer(3, 1), substituted(2)];
-    let course = Course::of("substitution", [begun(), dropped.to_vec()].concat());
+    let dropped = [
+        request(2),
+        answer(2, 1),
+        request(3),
+        answer(3, 1),
+        substituted(2),
+    ];
+    let course = Course::of("substitution", [started(), dropped.to_vec()].concat());
     assert_eq!(course.answers(), [(1, 1)]);
     let with = |rest: &[Step]| [&dropped[..], rest].concat();
     let found = ["NEVER_RESUMED"];

@@ -39,12 +39,12 @@ fn answers_and_their_faults() {
     let closed = |id| result(id, 1, AnswerStatus::Closed);
     let invalid = |id| result(id, ILLEGAL, AnswerStatus::Invalid);
     check("a good game", "small", and_good_end(played(2, 9)), &[]);
-    let twice = [put(2), answer(2, 1), answer(2, 1), accepted(2)];
+    let twice = [request(2), answer(2, 1), answer(2, 1), accepted(2)];
     check("twice", "small", and_good_end(twice), &["ANSWERED_TWICE"]);
-    let again = [put(2), answer(2, 1), accepted(2), answer(2, 1)];
+    let again = [request(2), answer(2, 1), accepted(2), answer(2, 1)];
     check("again", "small", and_good_end(again), &["ANSWERED_TWICE"]);
     let illegal = [
-        put(2),
+        request(2),
         answer(2, ILLEGAL),
         invalid(2),
         answer(2, 1),
@@ -57,7 +57,7 @@ fn answers_and_their_faults() {
         &["ILLEGAL_ACTION"],
     );
     let beyond = [
-        put(2),
+        request(2),
         answer(2, ACTIONS),
         invalid(2),
         answer(2, 1),
@@ -69,19 +69,19 @@ fn answers_and_their_faults() {
         and_good_end(beyond),
         &["ACTION_OUT_OF_SPACE"],
     );
-    let unrequested_answer = [put(2), answer(3, 1), answer(2, 1), accepted(2)];
+    let unrequested_answer = [request(2), answer(3, 1), answer(2, 1), accepted(2)];
     check(
         "unasked",
         "small",
         and_good_end(unrequested_answer),
         &["ANSWERED_UNASKED"],
     );
-    let crossing = [put(2), put(3), answer(2, 1)];
+    let crossing = [request(2), request(3), answer(2, 1)];
     check("silence", "small", crossing, &["NOT_ANSWERED"]);
     let late = [
-        put(2),
+        request(2),
         answer(2, 1),
-        put(3),
+        request(3),
         closed(2),
         answer(3, 1),
         accepted(3),
@@ -151,16 +151,21 @@ fn the_end() {
     check("left and back", "small", back, &[]);
     let aborted = event(2, Kind::GameAborted(Box::default()));
     check("aborted", "small", [aborted], &["GAME_ABORTED"]);
-    let last = [put(2), game_over()];
+    let last = [request(2), game_over()];
     check("the last decision", "small", last, &["NOT_ANSWERED"]);
     check("too short", "stale", good_end(), &["NOT_EXAMINED"]);
     check("no exchange", "game", good_end(), &["NOT_EXAMINED"]);
-    check("too long", "small", [put(2), Wait(630)], &["CASE_TOO_LONG"]);
+    check(
+        "too long",
+        "small",
+        [request(2), Wait(630)],
+        &["CASE_TOO_LONG"],
+    );
 }
 
 #[test]
 fn short_deadlines_need_most_answers_in_time() {
-    let lost = |ids: std::ops::RangeInclusive<u64>| ids.map(put).collect::<Vec<_>>();
+    let lost = |ids: std::ops::RangeInclusive<u64>| ids.map(request).collect::<Vec<_>>();
     let some = and_good_end([lost(2..=9), played(10, 20)].concat());
     check("some lost", "deadlines", some, &["TOO_SLOW"]);
     let few = and_good_end([lost(2..=5), played(6, 20)].concat());
@@ -182,7 +187,7 @@ fn an_agent_without_masks_receives_none_but_is_judged() {
         ..v1::Attached::default()
     };
     course.received(stream, Update::Attached(attached));
-    course.step(put(1));
+    course.step(request(1));
     let Some(Update::Decision(received)) = course.to_agent.last() else {
         panic!("no decision");
     };
@@ -220,7 +225,7 @@ fn tournament(seats: u32, rest: &[Step]) -> Course {
             ..v1::Attached::default()
         };
         course.receives_on(handle, Update::Attached(attached));
-        for step in [put(1), answer(1, 1), accepted(1)] {
+        for step in [request(1), answer(1, 1), accepted(1)] {
             match step {
                 Told(update) => course.receives_on(handle, update),
                 Says(_, command) => course.sends(stream, handle, command),

@@ -50,7 +50,7 @@ fn answer(decision_id: u64, action: u32) -> Step {
     Says(0, Command::Answer(answer))
 }
 
-fn put(decision_id: u64) -> Step {
+fn request(decision_id: u64) -> Step {
     Told(Update::Decision(v1::DecisionRequest {
         decision_id,
         kind: v1::DecisionKind::Turn.into(),
@@ -104,7 +104,7 @@ fn resume() -> Step {
 /// Decisions from one number to another, each answered and accepted.
 fn played(from: u64, to: u64) -> Vec<Step> {
     (from..=to)
-        .flat_map(|id| [put(id), answer(id, 1), accepted(id)])
+        .flat_map(|id| [request(id), answer(id, 1), accepted(id)])
         .collect()
 }
 
@@ -234,14 +234,14 @@ impl Course {
 }
 
 /// From joining to the first accepted decision.
-fn begun() -> Vec<Step> {
+fn started() -> Vec<Step> {
     let mut steps = vec![Join, Attach(0)];
     steps.extend(played(1, 1));
     steps
 }
 
 fn check(name: &str, case: &str, steps: impl IntoIterator<Item = Step>, expected: &[&str]) {
-    let course = Course::of(case, begun().into_iter().chain(steps));
+    let course = Course::of(case, started().into_iter().chain(steps));
     assert_eq!(course.codes(), expected, "{name}");
     assert!(course.exam.is_done(), "{name} ends");
 }

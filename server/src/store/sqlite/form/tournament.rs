@@ -332,11 +332,10 @@ fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
         },
         built_in: match form.built_in.as_str() {
             "" => None,
-            name => {
-                Some(AgentKind::from_name(name).ok_or_else(|| {
-                    Unreadable::new(format!("there is no built-in agent {name:?}"))
-                })?)
-            }
+            name => Some(
+                AgentKind::from_name(name)
+                    .ok_or_else(|| Unreadable::new(format!("{name:?} is not a built-in agent")))?,
+            ),
         },
         name: form.name,
         filler: form.filler,

@@ -28,7 +28,7 @@ const BACKOFF: Backoff = Backoff {
 
 /// The games of a regular room.
 #[derive(Debug, Clone)]
-pub struct Habit {
+pub struct RoomKind {
     /// The rules.
     pub rules: v1::RuleSet,
     /// The policy.
@@ -43,7 +43,7 @@ pub struct Habit {
     pub pace: Duration,
 }
 
-impl Default for Habit {
+impl Default for RoomKind {
     fn default() -> Self {
         Self {
             rules: v1::RuleSet::default(),
@@ -62,23 +62,23 @@ impl Default for Habit {
 
 /// Rooms that are played all the time.
 #[derive(Debug)]
-pub struct Regulars {
+pub struct BusyRooms {
     /// What they received.
     pub ledger: Arc<Ledger>,
     leaving: watch::Sender<bool>,
     rooms: JoinSet<Vec<String>>,
 }
 
-impl Regulars {
+impl BusyRooms {
     /// Starts a room for each habit, on the server with this URL, which may be down at times.
-    pub fn come(url: &str, habits: Vec<Habit>) -> Self {
+    pub fn start(url: &str, kinds: Vec<RoomKind>) -> Self {
         let ledger = Arc::new(Ledger::default());
         let leaving = watch::Sender::new(false);
         let mut rooms = JoinSet::new();
-        for (habit, number) in habits.into_iter().zip(0..) {
+        for (kind, number) in kinds.into_iter().zip(0..) {
             let room = Room {
                 url: url.to_owned(),
-                habit,
+                kind,
                 ledger: Arc::clone(&ledger),
                 random: SmallRng::seed_from_u64(number),
             };
@@ -93,17 +93,17 @@ impl Regulars {
 
     /// Lets the running games end and stops. Returns the ids of all their games, each of which ended with
     /// a result.
-    pub async fn leave(self) -> Vec<String> {
+    pub async fn finish(self) -> Vec<String> {
         self.leaving.send_replace(true);
         let games = patiently("the last games to end", self.rooms.join_all()).await;
-        self.ledger.assert_no_surprise();
+        self.ledger.assert_nothing_unexpected();
         games.into_iter().flatten().collect()
     }
 }
 
 struct Room {
     url: String,
-    habit: Habit,
+    kind: RoomKind,
     ledger: Arc<Ledger>,
     random: SmallRng,
 }
@@ -120,7 +120,9 @@ impl Room {
             for outcome in self.play(&client, tickets).await {
                 match outcome.map(|outcome| outcome.ending) {
                     Ok(Ending::Finished(_)) => {}
-                    other => self.ledger.surprise(format!("{game} ended with {other:?}")),
+                    other => self
+                        .ledger
+                        .unexpected(format!("{game} ended with {other:?}")),
                 }
             }
             games.push(game);
@@ -130,10 +132,10 @@ impl Room {
 
     /// Creates a room and takes its seats. `None` if a ticket was lost with the connection.
     async fn open(&self, client: &Client) -> Option<(String, Vec<String>)> {
-        let open = 4 - self.habit.built_in;
+        let open = 4 - self.kind.built_in;
         let request = v1::CreateRoomRequest {
-            rules: Some(self.habit.rules.clone()),
-            policy: Some(self.habit.policy.clone()),
+            rules: Some(self.kind.rules.clone()),
+            policy: Some(self.kind.policy.clone()),
             seats: (0..4)
                 .map(|seat| v1::SeatConfig {
                     filled_by: (seat >= open).then(|| FilledBy::BuiltInAgent("random".to_owned())),
@@ -176,7 +178,7 @@ impl Room {
         tickets: Vec<String>,
     ) -> Vec<Result<Outcome, PlayError>> {
         let options = PlayOptions {
-            delivery: self.habit.delivery,
+            delivery: self.kind.delivery,
             backoff: BACKOFF,
             ..PlayOptions::default()
         };
@@ -184,12 +186,12 @@ impl Room {
         for ticket in tickets {
             let agent = Paced {
                 agent: RandomAgent::new(self.random.random()),
-                pace: self.habit.pace,
+                pace: self.kind.pace,
                 random: SmallRng::seed_from_u64(self.random.random()),
             };
-            seats.push((ticket, self.ledger.noting(agent)));
+            seats.push((ticket, self.ledger.wrap(agent)));
         }
-        if self.habit.one_stream {
+        if self.kind.one_stream {
             return client.play_many_with(seats, &options).await;
         }
         let mut playing = JoinSet::new();
