@@ -118,7 +118,7 @@ async fn every_acknowledged_decision_survives_sigkill() {
         let record = client.record(game).await.expect("a stored record");
         let replayed = replay::replay(&record).unwrap_or_else(|error| panic!("{game}: {error}"));
         assert_eq!(replayed.state, v1::RoomState::Finished, "{game}");
-        acknowledged += ledger.assert_kept(game, &record);
+        acknowledged += ledger.assert_committed(game, &record);
         restarts += restarts_in(&record);
         records.push(record);
     }
@@ -226,7 +226,7 @@ async fn a_stop_suspends_durable_games_and_aborts_the_others() {
     let client = connect(&launch).await;
     for game in &games {
         let record = client.record(game).await.expect("a stored record");
-        ledger.assert_kept(game, &record);
+        ledger.assert_committed(game, &record);
     }
     for game in &aborted {
         let record = client.record(game).await.expect("a stored record");
