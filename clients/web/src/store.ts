@@ -18,10 +18,10 @@ export function recall(name: string): string | null {
  * The result of `take` for the stored JSON object, or null: another version may have stored
  * something else.
  */
-export function recallObject<T>(name: string, take: (kept: Record<string, unknown>) => T | null): T | null {
+export function recallObject<T>(name: string, take: (stored: Record<string, unknown>) => T | null): T | null {
   try {
-    const kept: unknown = JSON.parse(recall(name) ?? "null");
-    return typeof kept === "object" && kept !== null ? take({ ...kept }) : null;
+    const stored: unknown = JSON.parse(recall(name) ?? "null");
+    return typeof stored === "object" && stored !== null ? take({ ...stored }) : null;
   } catch {
     return null;
   }

@@ -1,9 +1,9 @@
 // Flapping connections: one line in the log, and one announcement for each change that lasts.
 
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { isPresence, worthSaying } from "../src/table/model/log";
+import { isPresence, visibleLines } from "../src/table/model/log";
 import type { LogEntry, LogLine } from "../src/table/model/state";
-import { SETTLED_MS, tellPresence } from "../src/table/presence";
+import { createPresenceAnnouncer, SETTLED_MS } from "../src/table/presence";
 
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
@@ -22,35 +22,35 @@ test.each<[string, LogEntry[], number[]]>([
   ["away while it was decided for the seat", [lost(1), passed(1), back(1)], [0, 1, 2]],
   ["gone for good", [passed(1), lost(1), passed(2)], [0, 1, 2]],
   ["an expression between", [lost(1), joy(1), back(1)], [1, 2]],
-])("in the log, %s", (_, entries, kept) => {
+])("in the log, %s", (_, entries, visible) => {
   const log = entries.map((entry, sequence): LogLine => ({ sequence, entry }));
-  expect(worthSaying(log, true).map(({ sequence }) => sequence)).toEqual(kept);
-  const quiet = kept.filter((sequence) => entries[sequence]?.kind !== "expressed");
-  expect(worthSaying(log, false).map(({ sequence }) => sequence)).toEqual(quiet);
+  expect(visibleLines(log, true).map(({ sequence }) => sequence)).toEqual(visible);
+  const quiet = visible.filter((sequence) => entries[sequence]?.kind !== "expressed");
+  expect(visibleLines(log, false).map(({ sequence }) => sequence)).toEqual(quiet);
 });
 
 /**
  * Applies changes, each after a delay in milliseconds; returns the announcements once everything
  * has settled.
  */
-function heard(steps: readonly (readonly [afterMs: number, entry: LogEntry])[]): LogEntry[] {
-  const said: LogEntry[] = [];
-  const teller = tellPresence(({ entry }) => said.push(entry));
+function announcements(steps: readonly (readonly [afterMs: number, entry: LogEntry])[]): LogEntry[] {
+  const announced: LogEntry[] = [];
+  const announcer = createPresenceAnnouncer(({ entry }) => announced.push(entry));
   steps.forEach(([afterMs, entry], sequence) => {
     vi.advanceTimersByTime(afterMs);
     const line: LogLine = { sequence, entry };
     if (!isPresence(line)) throw new Error("not about a connection");
-    teller.hear(line);
+    announcer.apply(line);
   });
   vi.advanceTimersByTime(SETTLED_MS);
-  return said;
+  return announced;
 }
 
 const SOON = SETTLED_MS / 4;
 const LATE = SETTLED_MS * 2;
 
 test.each<[string, [number, LogEntry][], LogEntry[]]>([
-  ["a change that lasts is said", [[0, lost(1)]], [lost(1)]],
+  ["a change that lasts is announced", [[0, lost(1)]], [lost(1)]],
   [
     "one that does not is not",
     [
@@ -65,7 +65,7 @@ test.each<[string, [number, LogEntry][], LogEntry[]]>([
     [lost(1)],
   ],
   [
-    "each lasting change is said",
+    "each lasting change is announced",
     [
       [0, lost(1)],
       [LATE, back(1)],
@@ -74,7 +74,7 @@ test.each<[string, [number, LogEntry][], LogEntry[]]>([
     [lost(1), back(1), lost(1)],
   ],
   [
-    "back for a moment only is not said",
+    "back for a moment only is not announced",
     [
       [0, lost(1)],
       [LATE, back(1)],
@@ -84,7 +84,7 @@ test.each<[string, [number, LogEntry][], LogEntry[]]>([
   ],
   ["who was lost before this page came is back", [[0, back(1)]], [back(1)]],
   [
-    "a substitute is said once",
+    "a substitute is announced once",
     [
       [0, lost(1)],
       [SOON, replaced(1)],
@@ -101,17 +101,17 @@ test.each<[string, [number, LogEntry][], LogEntry[]]>([
     ],
     [lost(1)],
   ],
-])("%s", (_, steps, said) => {
-  expect(heard(steps)).toEqual(said);
+])("%s", (_, steps, announced) => {
+  expect(announcements(steps)).toEqual(announced);
 });
 
 test("after leaving the table nothing is announced", () => {
-  const said = vi.fn();
-  const teller = tellPresence(said);
+  const announced = vi.fn();
+  const announcer = createPresenceAnnouncer(announced);
   const line: LogLine = { sequence: 1, entry: lost(1) };
-  if (isPresence(line)) teller.hear(line);
-  teller.stop();
+  if (isPresence(line)) announcer.apply(line);
+  announcer.stop();
   vi.advanceTimersByTime(LATE);
   expect(isPresence(line)).toBe(true);
-  expect(said).not.toHaveBeenCalled();
+  expect(announced).not.toHaveBeenCalled();
 });

@@ -30,12 +30,12 @@ const SHORTEST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 8_000;
 
 /**
- * Follows the stream that `open` opens. `heard` receives every message and returns whether more
+ * Follows the stream that `open` opens. `onMessage` receives every message and returns whether more
  * will follow. A stream that ends while more should follow is reopened.
  */
 export function follow<Message>(
   open: (signal: AbortSignal) => AsyncIterable<Message>,
-  heard: (message: Message) => boolean,
+  onMessage: (message: Message) => boolean,
 ): Following {
   const link = signal<Link>("connecting");
   const fault = signal<Fault | undefined>(undefined);
@@ -75,7 +75,7 @@ export function follow<Message>(
           heardAtMs = Date.now();
           failures = 0;
           link.value = "open";
-          if (!heard(message)) return end("ended");
+          if (!onMessage(message)) return end("ended");
         }
       } catch (thrown) {
         if (stopped) return;

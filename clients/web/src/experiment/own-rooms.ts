@@ -39,8 +39,8 @@ export const jobs = signal<ReadonlyMap<string, Job>>(new Map());
 
 /** The rooms that this device created for participants, like a given room. */
 export function ownRooms(likeRoomId: string): OwnRoom[] {
-  const kept = recallObject(keptUnder(likeRoomId), ({ made }) => (Array.isArray(made) ? made : null));
-  return (kept ?? []).flatMap((one: unknown) => {
+  const stored = recallObject(storageKey(likeRoomId), ({ made }) => (Array.isArray(made) ? made : null));
+  return (stored ?? []).flatMap((one: unknown) => {
     if (typeof one !== "object" || one === null) return [];
     const { name, roomId, search }: { name?: unknown; roomId?: unknown; search?: unknown } = one;
     if (typeof name !== "string" || typeof roomId !== "string" || typeof search !== "string") return [];
@@ -88,9 +88,9 @@ function ownName(roomName: string, name: string): string {
 
 function keep(likeRoomId: string, rooms: readonly OwnRoom[]): void {
   const made = rooms.map(({ name, roomId, search }) => ({ name, roomId, search }));
-  remember(keptUnder(likeRoomId), JSON.stringify({ made }));
+  remember(storageKey(likeRoomId), JSON.stringify({ made }));
 }
 
-function keptUnder(roomId: string): string {
+function storageKey(roomId: string): string {
   return `own-rooms.${roomId}`;
 }

@@ -120,8 +120,8 @@ export function rememberStudy(id: string, study: Study): void {
 
 /** The study that this device takes part in, in a room or tournament. */
 export function studyIn(id: string): Study | null {
-  const kept = recall(`study.${id}`);
-  return kept === null ? null : studyOf(kept);
+  const stored = recall(`study.${id}`);
+  return stored === null ? null : studyOf(stored);
 }
 
 /** The last questionnaire of a participant who has left the table. */

@@ -32,7 +32,7 @@ export function heldSeat(roomId: string): HeldSeat | null {
 
 /** Deletes a seat and everything stored with it: the room is gone, or the seat was given up. */
 export function giveUpSeat(roomId: string): void {
-  for (const kept of ["seat", "study", "timed"]) remember(`${kept}.${roomId}`, null);
+  for (const name of ["seat", "study", "timed"]) remember(`${name}.${roomId}`, null);
   for (const name of codesOf(roomId)) remember(name, null);
 }
 

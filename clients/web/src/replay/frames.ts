@@ -9,7 +9,7 @@ import { applyEvent } from "../table/model/reduce";
 import { emptyTable, fromRules, seatFromParticipant, type TableState } from "../table/model/state";
 
 /** Moments between stored tables: this many events are applied faster than the table is drawn. */
-const KEPT_EVERY = 200;
+const STORED_EVERY = 200;
 
 /** A moment of a recorded game. */
 export interface Frame {
@@ -44,7 +44,7 @@ interface Moment {
 }
 
 /** The film of a record. */
-export function filmOf(lines: readonly RecordLine[], keptEvery = KEPT_EVERY): Film {
+export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY): Film {
   let header: RecordHeader | undefined;
   let decisions = 0;
   const moments: Moment[] = [];
@@ -72,7 +72,7 @@ export function filmOf(lines: readonly RecordLine[], keptEvery = KEPT_EVERY): Fi
       default:
     }
   });
-  const tableAt = folded(header ? tableFromHeader(header) : emptyTable(), moments, keptEvery);
+  const tableAt = folded(header ? tableFromHeader(header) : emptyTable(), moments, storedEvery);
   return {
     header,
     length: moments.length,
@@ -90,17 +90,17 @@ export function filmOf(lines: readonly RecordLine[], keptEvery = KEPT_EVERY): Fi
 }
 
 /** The table at each moment, computed from the nearest stored or last requested one before it. */
-function folded(start: TableState, moments: readonly Moment[], keptEvery: number): (number: number) => TableState {
-  const kept: TableState[] = [];
+function folded(start: TableState, moments: readonly Moment[], storedEvery: number): (number: number) => TableState {
+  const stored: TableState[] = [];
   let looked = { number: -1, table: start };
   const on = (table: TableState, { event }: Moment) => (event ? applyEvent(table, event) : table);
   moments.forEach((moment, number) => {
     looked = { number, table: on(looked.table, moment) };
-    if (number % keptEvery === 0) kept.push(looked.table);
+    if (number % storedEvery === 0) stored.push(looked.table);
   });
   return (number) => {
-    const last = Math.floor(number / keptEvery);
-    const base = { number: last * keptEvery, table: kept[last] ?? start };
+    const last = Math.floor(number / storedEvery);
+    const base = { number: last * storedEvery, table: stored[last] ?? start };
     const from = looked.number > base.number && looked.number <= number ? looked : base;
     looked = { number, table: moments.slice(from.number + 1, number + 1).reduce(on, from.table) };
     return looked.table;

@@ -37,7 +37,7 @@ export interface Acting {
   /** The last error in words; empty if there is none. */
   readonly trouble: Signal<string>;
   /** Applies updates of the seat. */
-  hear(updates: readonly SeatUpdate[]): void;
+  apply(updates: readonly SeatUpdate[]): void;
   /** Answers the open decision. */
   answer(action: number): void;
   /** Shows an expression to the table. */
@@ -54,7 +54,7 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
   /** The open decision and when it was first rendered. */
   let shown = { id: 0n, atMs: 0 };
 
-  const hear = (updates: readonly SeatUpdate[]) => {
+  const apply = (updates: readonly SeatUpdate[]) => {
     const nowMs = performance.now();
     batch(() => {
       for (const update of updates) live.value = applyUpdate(live.value, update, nowMs);
@@ -82,7 +82,7 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
           const reply = await playApi.act({ ticket, command: { case: "answer", value } }, { timeoutMs: CALL_LIMIT_MS });
           const { result } = reply;
           if (result) {
-            hear([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
+            apply([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
             trouble.value = answerWords(result);
           }
           return;
@@ -112,7 +112,7 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
     live,
     sending,
     trouble,
-    hear,
+    apply,
     answer: (action) => void answer(action),
     express: (gesture) => void tell({ case: "express", value: gesture }),
     resume: () => void tell({ case: "resume", value: {} }),

@@ -6,10 +6,10 @@ import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import type { OpenDecision } from "./model/live";
-import { isPresence, worthSaying } from "./model/log";
+import { isPresence, visibleLines } from "./model/log";
 import { isOpening } from "./model/requirement";
 import type { TableState } from "./model/state";
-import { tellPresence } from "./presence";
+import { createPresenceAnnouncer } from "./presence";
 import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
 import { spokenLine } from "./words";
@@ -19,24 +19,24 @@ const MOST_AT_ONCE = 14;
 
 /** Announces events, with sounds, while the table is rendered. */
 export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {
-  const heard = useRef<number | undefined>(undefined);
+  const lastSequence = useRef<number | undefined>(undefined);
   const seen = useRef(table);
   seen.current = table;
-  const presence = useMemo(() => tellPresence((line) => announce(spokenLine(seen.current, line))), []);
+  const presence = useMemo(() => createPresenceAnnouncer((line) => announce(spokenLine(seen.current, line))), []);
   useEffect(() => presence.stop, []);
   const last = table.log.at(-1)?.sequence ?? 0;
   useEffect(() => {
-    const before = heard.current;
-    heard.current = last;
+    const before = lastSequence.current;
+    lastSequence.current = last;
     if (before === undefined) return;
     const fresh = table.log.filter(({ sequence }) => sequence > before);
     if (fresh.length > MOST_AT_ONCE) return;
-    const said = worthSaying(fresh, !hidden.peek().includes("expressions"));
-    for (const line of said) {
-      if (isPresence(line)) presence.hear(line);
+    const lines = visibleLines(fresh, !hidden.peek().includes("expressions"));
+    for (const line of lines) {
+      if (isPresence(line)) presence.apply(line);
       else announce(spokenLine(table, line));
     }
-    const sounds = said.flatMap((line) => soundOf(line) ?? []);
+    const sounds = lines.flatMap((line) => soundOf(line) ?? []);
     // All at once would be noise: only the last one is played, which says the most.
     const sound = sounds.at(-1);
     if (sound) play(sound);

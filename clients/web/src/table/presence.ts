@@ -8,29 +8,29 @@ export const SETTLED_MS = 2000;
 
 type Presence = PresenceLine["entry"]["kind"];
 
-export interface PresenceTeller {
-  /** Takes in an event of a seat's connection. */
-  hear(line: PresenceLine): void;
+export interface PresenceAnnouncer {
+  /** Processes an event of a seat's connection. */
+  apply(line: PresenceLine): void;
   /** Cancels pending announcements. */
   stop(): void;
 }
 
-/** Calls `say` for each change that lasts. */
-export function tellPresence(say: (line: PresenceLine) => void): PresenceTeller {
+/** Calls `announce` for each change that lasts. */
+export function createPresenceAnnouncer(announce: (line: PresenceLine) => void): PresenceAnnouncer {
   /** Each seat's last settled state. */
-  const stood = new Map<number, Presence>();
+  const settled = new Map<number, Presence>();
   const waiting = new Map<number, ReturnType<typeof setTimeout>>();
   return {
-    hear: (line) => {
+    apply: (line) => {
       const { seat, kind } = line.entry;
       // A first event implies the opposite state before it.
-      if (!stood.has(seat)) stood.set(seat, kind === "lost" ? "back" : "lost");
+      if (!settled.has(seat)) settled.set(seat, kind === "lost" ? "back" : "lost");
       clearTimeout(waiting.get(seat));
       const timer = setTimeout(() => {
         waiting.delete(seat);
-        if (stood.get(seat) === kind) return;
-        stood.set(seat, kind);
-        say(line);
+        if (settled.get(seat) === kind) return;
+        settled.set(seat, kind);
+        announce(line);
       }, SETTLED_MS);
       waiting.set(seat, timer);
     },

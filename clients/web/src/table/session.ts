@@ -26,7 +26,7 @@ export function startSession(held: HeldSeat, table: TableState): Session {
       (abort) =>
         playApi.watch({ seats: [{ ticket, fromSequence: BigInt(live.peek().table.nextSequence) }] }, { signal: abort }),
       ({ updates }) => {
-        acting.hear(updates);
+        acting.apply(updates);
         const { attachment } = live.peek();
         return attachment.kind === "none" || attachment.kind === "attached";
       },

@@ -17,7 +17,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
   const words = t().tournaments;
   const number = several ? ` ${game.number}` : "";
   const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
-  const heard = <span class="visually-hidden"> {which}</span>;
+  const label = <span class="visually-hidden"> {which}</span>;
   // A study may hide links to other pages.
   const linked = !hidden.value.includes("pages");
   switch (game.state) {
@@ -31,7 +31,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
         <a href={pathOf({ page: "replay", gameId: game.gameId })}>
           {words.games.replay}
           {number}
-          {heard}
+          {label}
         </a>
       );
     case TournamentGameState.PLAYING:
@@ -40,7 +40,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
           <span aria-hidden="true">▶ </span>
           {words.games.watch}
           {number}
-          {heard}
+          {label}
         </a>
       ) : (
         <span>

@@ -14,22 +14,22 @@ import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { type Acting, asksForTimes } from "../table/acting";
 import { Seated } from "../table/Seated";
-import type { Heard } from "./following";
+import type { LiveTournament } from "./following";
 import { type Participation as Part, startParticipation } from "./participation";
 import type { HeldPlace } from "./place";
 import { gameOf, isEnded } from "./structure";
 
 interface ParticipationProps {
   held: HeldPlace;
-  heard: Heard;
+  live: LiveTournament;
   /** The rest of the page, shown between games. */
   children: ComponentChildren;
 }
 
 /** The page for a participant. */
-export function Participation({ held, heard, children }: ParticipationProps) {
-  const { tournamentId } = heard.tournament;
-  const ended = isEnded(heard.tournament);
+export function Participation({ held, live, children }: ParticipationProps) {
+  const { tournamentId } = live.tournament;
+  const ended = isEnded(live.tournament);
   const [part, setPart] = useState<Part | undefined>(undefined);
   useEffect(() => {
     // The stream reports games of others that end only after the participant's own game.
@@ -46,7 +46,7 @@ export function Participation({ held, heard, children }: ParticipationProps) {
   const game = part?.game.value;
   const [left, setLeft] = useState<Acting | undefined>(undefined);
   useEffect(() => {
-    if (game) announce(t().tournaments.part.begins(placeWords(heard, game)));
+    if (game) announce(t().tournaments.part.begins(placeWords(live, game)));
   }, [game]);
   const banner = part && <Banner part={part} />;
   // The tournament was closed during the game.
@@ -75,7 +75,7 @@ export function Participation({ held, heard, children }: ParticipationProps) {
       {banner}
       {after}
       {!after && (
-        <OwnState held={held} heard={heard}>
+        <OwnState held={held} live={live}>
           {game && !gone && !isOverThere(game) && (
             <Button look="main" onClick={() => setLeft(undefined)}>
               {t().tournaments.part.toGame}
@@ -89,9 +89,9 @@ export function Participation({ held, heard, children }: ParticipationProps) {
 }
 
 /** The participant's status, and what happens next. */
-function OwnState(props: { held: HeldPlace; heard: Heard; children: ComponentChildren }) {
+function OwnState(props: { held: HeldPlace; live: LiveTournament; children: ComponentChildren }) {
   const words = t().tournaments.part;
-  const { state } = props.heard.tournament;
+  const { state } = props.live.tournament;
   return (
     <Notice kind="good">
       <strong>{words.you(props.held.name)}</strong>{" "}
@@ -141,7 +141,7 @@ function isOverThere(game: Acting): boolean {
   return phase === "gameOver" || phase === "aborted";
 }
 
-function placeWords({ games }: Heard, game: Acting): string {
+function placeWords({ games }: LiveTournament, game: Acting): string {
   const { roomName, gameId } = game.live.peek().table;
   const found = gameOf(games, gameId);
   return found ? t().tournaments.part.place(found.round, found.table) : roomName;

@@ -16,7 +16,14 @@ import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
 import { Entrants } from "./Entrants";
-import { type FollowedTournament, type Heard, MAX_GAMES, useConfidence, useGames, useTournament } from "./following";
+import {
+  type FollowedTournament,
+  type LiveTournament,
+  MAX_GAMES,
+  useConfidence,
+  useGames,
+  useTournament,
+} from "./following";
 import { JoinTournament } from "./JoinTournament";
 import { Organiser } from "./Organiser";
 import { Participation } from "./Participation";
@@ -35,30 +42,30 @@ export function TournamentPage({ route }: PageProps<"tournament">) {
 }
 
 function Followed({ followed }: { followed: FollowedTournament }) {
-  const { heard, following } = followed;
+  const { live, following } = followed;
   const { link, fault } = following;
   if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
-  if (!heard.value) return <p class="soft">{t().common.loading}</p>;
+  if (!live.value) return <p class="soft">{t().common.loading}</p>;
   const lost = link.value === "lost" && <Notice kind="fault">{t().tournaments.part.lost}</Notice>;
   if (new URLSearchParams(location.search).has("wall")) {
     return (
       <>
         {lost}
-        <Wall heard={heard.value} />
+        <Wall live={live.value} />
       </>
     );
   }
   return (
     <div class={tournamentsCss.tournament}>
       {lost}
-      <Visited heard={heard.value} />
+      <Visited live={live.value} />
     </div>
   );
 }
 
 /** The page for a visitor or a participant. */
-function Visited({ heard }: { heard: Heard }) {
-  const { tournament } = heard;
+function Visited({ live }: { live: LiveTournament }) {
+  const { tournament } = live;
   const { tournamentId } = tournament;
   const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournamentId));
   const [another, setAnother] = useState(false);
@@ -74,10 +81,10 @@ function Visited({ heard }: { heard: Heard }) {
   };
   if (held && holder === "reader") {
     return (
-      <Participation held={held} heard={heard}>
-        <Course heard={heard} mine={held.participant}>
+      <Participation held={held} live={live}>
+        <Overview live={live} mine={held.participant}>
           <Organiser tournament={tournament} />
-        </Course>
+        </Overview>
       </Participation>
     );
   }
@@ -90,13 +97,13 @@ function Visited({ heard }: { heard: Heard }) {
     return <StudyJoin study={invited.study} what="tournament" take={take} arrive={arrive} />;
   }
   return (
-    <Course heard={heard} mine={undefined}>
+    <Overview live={live} mine={undefined}>
       <Organiser tournament={tournament} />
       {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
       {!open && invited && !isEnded(tournament) && (
         <Notice kind="hint">{t().faults.byReason.TOURNAMENT_STARTED}</Notice>
       )}
-    </Course>
+    </Overview>
   );
 }
 
@@ -132,19 +139,19 @@ function Whose({ name, as, onSame, onOther }: WhoseProps) {
   );
 }
 
-interface CourseProps {
-  heard: Heard;
+interface OverviewProps {
+  live: LiveTournament;
   /** The participant of this device. */
   mine: number | undefined;
   /** Shown between heading and standings. */
   children?: ComponentChildren;
 }
 
-function Course({ heard, mine, children }: CourseProps) {
-  const { tournament, standings } = heard;
+function Overview({ live, mine, children }: OverviewProps) {
+  const { tournament, standings } = live;
   const words = t().tournaments;
-  const games = useGames(heard);
-  const confidence = useConfidence(heard);
+  const games = useGames(live);
+  const confidence = useConfidence(live);
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   const deals = dealsWords(tournament);
   return (
@@ -172,7 +179,7 @@ function Course({ heard, mine, children }: CourseProps) {
       </header>
       {children}
       <section class={`sheet ${tournamentsCss.part}`}>
-        <h2>{standingsTitle(heard)}</h2>
+        <h2>{standingsTitle(live)}</h2>
         {tournament.round === 0 ? (
           <Entrants tournament={tournament} mine={mine} />
         ) : (
@@ -195,7 +202,7 @@ function Course({ heard, mine, children }: CourseProps) {
   );
 }
 
-function standingsTitle({ tournament }: Heard): string {
+function standingsTitle({ tournament }: LiveTournament): string {
   const words = t().tournaments.standings;
   if (tournament.round === 0) return words.field;
   return tournament.state === TournamentState.FINISHED ? words.final : words.title;

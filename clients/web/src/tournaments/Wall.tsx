@@ -10,7 +10,7 @@ import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
 import { Entrants } from "./Entrants";
 import { useFit } from "./fit";
-import { type Heard, useGames } from "./following";
+import { type LiveTournament, useGames } from "./following";
 import { TablesOnWall } from "./Rounds";
 import { Standings } from "./Standings";
 import { bracket, playedRounds } from "./structure";
@@ -27,8 +27,8 @@ const BRACKET_TABLES = 4;
 const EVERY_MS = 9_000;
 
 /** The wall. */
-export function Wall({ heard }: { heard: Heard }) {
-  const { tournament } = heard;
+export function Wall({ live }: { live: LiveTournament }) {
+  const { tournament } = live;
   const words = t().tournaments;
   useWithoutFrame();
   return (
@@ -52,15 +52,15 @@ export function Wall({ heard }: { heard: Heard }) {
           <p class={css.play}>{playWords(tournament).join(" · ")}</p>
         </section>
       ) : (
-        <Played heard={heard} />
+        <Played live={live} />
       )}
     </div>
   );
 }
 
 /** The standings and the tables after the start. */
-function Played({ heard }: { heard: Heard }) {
-  const { tournament, standings } = heard;
+function Played({ live }: { live: LiveTournament }) {
+  const { tournament, standings } = live;
   const words = t().tournaments;
   const lines = useParts(standings, LINES);
   return (
@@ -74,16 +74,16 @@ function Played({ heard }: { heard: Heard }) {
           <Standings tournament={tournament} standings={lines.shown} large />
         </Fitted>
       </section>
-      <Tables heard={heard} />
+      <Tables live={live} />
     </>
   );
 }
 
 /** The current tables: those of the round, or the rest of a bracket. */
-function Tables({ heard }: { heard: Heard }) {
-  const { tournament } = heard;
+function Tables({ live }: { live: LiveTournament }) {
+  const { tournament } = live;
   const words = t().tournaments;
-  const games = useGames(heard);
+  const games = useGames(live);
   const rounds = playedRounds(games);
   const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds.at(-1);
   const tables = useParts(newest?.tables ?? [], TABLES);

@@ -11,7 +11,7 @@ import type { OrderConfidence, Tournament, TournamentGame, TournamentStanding } 
 import { isEnded, mergedGames } from "./structure";
 
 /** The data of the stream. */
-export interface Heard {
+export interface LiveTournament {
   readonly tournament: Tournament;
   readonly standings: readonly TournamentStanding[];
   /** Games of the round; of a round robin, the running ones. */
@@ -20,7 +20,7 @@ export interface Heard {
 
 /** A followed tournament. */
 export interface FollowedTournament {
-  readonly heard: Signal<Heard | undefined>;
+  readonly live: Signal<LiveTournament | undefined>;
   readonly following: Following;
 }
 
@@ -28,16 +28,16 @@ export interface FollowedTournament {
 export function useTournament(tournamentId: string): FollowedTournament | undefined {
   const [followed, setFollowed] = useState<FollowedTournament | undefined>(undefined);
   useEffect(() => {
-    const heard = signal<Heard | undefined>(undefined);
+    const live = signal<LiveTournament | undefined>(undefined);
     const following = follow(
       (abort) => tournamentApi.followTournament({ tournamentId }, { signal: abort }),
       ({ tournament, standings, games }) => {
         if (!tournament) return true;
-        heard.value = { tournament, standings, games };
+        live.value = { tournament, standings, games };
         return !isEnded(tournament);
       },
     );
-    setFollowed({ heard, following });
+    setFollowed({ live, following });
     return () => following.stop();
   }, [tournamentId]);
   return followed;
@@ -60,14 +60,14 @@ const HARDLY_MS = 3_600_000;
 export const MAX_GAMES = PAGE_SIZE * MAX_PAGES;
 
 /** All games of a tournament, updated with those from the stream. */
-export function useGames({ tournament, games }: Heard): TournamentGame[] {
+export function useGames({ tournament, games }: LiveTournament): TournamentGame[] {
   const { tournamentId } = tournament;
   const listed = usePolled((abort) => listGames(tournamentId, abort), quietMs(tournament), useChanges(tournament));
   return mergedGames(listed.value ?? [], games);
 }
 
 /** How certain the order of each pair of neighbours in the standings is. */
-export function useConfidence({ tournament }: Heard): readonly OrderConfidence[] {
+export function useConfidence({ tournament }: LiveTournament): readonly OrderConfidence[] {
   const { tournamentId, gamesOver } = tournament;
   const ask = async (abort: AbortSignal) => {
     if (gamesOver === 0) return [];
@@ -87,18 +87,18 @@ function quietMs(tournament: Tournament): number {
  */
 function useChanges({ tournamentId, state, round, gamesOver }: Tournament): string {
   const now = `${tournamentId} ${state} ${round} ${gamesOver}`;
-  const [told, setTold] = useState(now);
+  const [throttled, setThrottled] = useState(now);
   const toldAtMs = useRef(performance.now());
   useEffect(() => {
-    if (now === told) return;
+    if (now === throttled) return;
     const tell = () => {
       toldAtMs.current = performance.now();
-      setTold(now);
+      setThrottled(now);
     };
     const timer = setTimeout(tell, toldAtMs.current + SOONEST_MS - performance.now());
     return () => clearTimeout(timer);
-  }, [now, told]);
-  return told;
+  }, [now, throttled]);
+  return throttled;
 }
 
 function listGames(tournamentId: string, abort: AbortSignal): Promise<TournamentGame[]> {

@@ -79,7 +79,7 @@ export function startParticipation(ticket: string, timed: boolean): Participatio
       }
       const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat, timed);
       batch(() => {
-        acting.hear(seated.waiting);
+        acting.apply(seated.waiting);
         game.value = acting;
       });
       seated.acting = acting;
@@ -93,21 +93,21 @@ export function startParticipation(ticket: string, timed: boolean): Participatio
 
   const attach = () => {
     const handles = new Map<number, Seated>();
-    const hear = (update: SeatUpdate) => {
+    const receive = (update: SeatUpdate) => {
       if (update.handle < FIRST_SEATED) {
         presence.value = presenceAfter(update, presence.peek());
         return;
       }
       if (update.update.case === "attached") handles.set(update.handle, seat(update.update.value));
       const seated = handles.get(update.handle);
-      if (seated?.acting) seated.acting.hear([update]);
+      if (seated?.acting) seated.acting.apply([update]);
       else seated?.waiting.push(update);
       if (update.update.case === "detached") handles.delete(update.handle);
     };
     return follow(
       (abort) => playApi.watch({ seats: [{ ticket }] }, { signal: abort }),
       ({ updates }) => {
-        batch(() => updates.forEach(hear));
+        batch(() => updates.forEach(receive));
         return isPresent();
       },
     );

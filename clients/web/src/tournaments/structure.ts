@@ -125,9 +125,9 @@ export function seatOf(game: TournamentGame, participant: number) {
 }
 
 /** Games from a list, updated with those from the stream. */
-export function mergedGames(listed: readonly TournamentGame[], heard: readonly TournamentGame[]): TournamentGame[] {
+export function mergedGames(listed: readonly TournamentGame[], streamed: readonly TournamentGame[]): TournamentGame[] {
   const byNumber = new Map(listed.map((game) => [game.game, game]));
-  for (const game of heard) {
+  for (const game of streamed) {
     const before = byNumber.get(game.game);
     if (!before || !isOver(before)) byNumber.set(game.game, game);
   }

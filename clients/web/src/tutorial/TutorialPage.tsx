@@ -61,10 +61,10 @@ export function TutorialPage() {
   };
   const decision = ready && lesson?.decision ? openDecision(progress, lesson.decision) : undefined;
   useAnnounced(table, 0, decision);
-  const said = lesson ? words.lessons[lesson.name] : "";
+  const text = lesson ? words.lessons[lesson.name] : "";
   useEffect(() => {
-    if (ready) announce(said);
-  }, [ready, said]);
+    if (ready) announce(text);
+  }, [ready, text]);
 
   return (
     <TableView
@@ -77,7 +77,7 @@ export function TutorialPage() {
       banner={
         <section class={css.lesson} data-part="lesson" aria-label={words.title}>
           <p class={`${css.count} number`}>{words.step(at + 1, LESSONS.length)}</p>
-          <p class={css.words}>{ready ? said : words.watch}</p>
+          <p class={css.words}>{ready ? text : words.watch}</p>
           {ready && !lesson?.decision && at < LESSONS.length - 1 && (
             <Button look="main" onClick={() => goOn(0)}>
               {words.next}

@@ -68,33 +68,33 @@ export function startLive(table: TableState, own?: number): LiveState {
 
 /** The state after an update; `nowMs` is the page's clock. */
 export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number): LiveState {
-  const told = update.update;
-  switch (told.case) {
+  const payload = update.update;
+  switch (payload.case) {
     case "attached": {
-      const own = told.value.seat;
-      const table = { ...live.table, roomId: told.value.roomId, gameId: told.value.gameId };
+      const own = payload.value.seat;
+      const table = { ...live.table, roomId: payload.value.roomId, gameId: payload.value.gameId };
       // The open decision may have been closed while the stream was down; if not, the server sends
       // it again.
       return { ...live, own, table, decision: undefined, attachment: { kind: "attached" } };
     }
     case "events":
-      return told.value.events.reduce(withEvent, live);
+      return payload.value.events.reduce(withEvent, live);
     case "snapshot":
-      return withSnapshot(live, applySnapshot(live.table, told.value, live.own));
+      return withSnapshot(live, applySnapshot(live.table, payload.value, live.own));
     case "decision":
-      return withDecision(live, told.value, nowMs);
+      return withDecision(live, payload.value, nowMs);
     case "result": {
-      const { decisionId, status, invalidAttemptsLeft: attemptsLeft } = told.value;
+      const { decisionId, status, invalidAttemptsLeft: attemptsLeft } = payload.value;
       if (live.decision?.id !== decisionId) return live;
       if (status === AnswerStatus.INVALID) return { ...live, decision: { ...live.decision, attemptsLeft } };
       return { ...live, decision: undefined };
     }
     case "detached": {
-      const kind = DETACHED[told.value.reason] ?? "over";
+      const kind = DETACHED[payload.value.reason] ?? "over";
       return { ...live, decision: undefined, attachment: { kind } };
     }
     case "refused": {
-      const { reason, message } = told.value;
+      const { reason, message } = payload.value;
       return { ...live, decision: undefined, attachment: { kind: "refused", reason, message } };
     }
     default:

@@ -18,20 +18,20 @@ export function isPresence(line: LogLine): line is PresenceLine {
 }
 
 /** The lines to show or read out; without `expressions`, no shown expressions. */
-export function worthSaying(log: readonly LogLine[], expressions: boolean): LogLine[] {
+export function visibleLines(log: readonly LogLine[], expressions: boolean): LogLine[] {
   // Seats whose connection a later line describes.
-  const told = new Set<number>();
+  const described = new Set<number>();
   const lines: LogLine[] = [];
   for (const line of log.toReversed()) {
     if (!expressions && line.entry.kind === "expressed") continue;
     if (isPresence(line)) {
       // Consecutive changes of a connection are one line, the last, as long as nothing was decided
       // for the seat in between.
-      if (told.has(line.entry.seat)) continue;
-      told.add(line.entry.seat);
+      if (described.has(line.entry.seat)) continue;
+      described.add(line.entry.seat);
     } else {
       const seat = decidedBy(line.entry);
-      if (seat !== undefined) told.delete(seat);
+      if (seat !== undefined) described.delete(seat);
     }
     lines.push(line);
   }

@@ -3,7 +3,7 @@
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
-import { worthSaying } from "../model/log";
+import { visibleLines } from "../model/log";
 import type { TableState } from "../model/state";
 import { happeningWords, nameOf } from "../words";
 import css from "./Log.module.css";
@@ -15,7 +15,7 @@ export function Log({ table }: { table: TableState }) {
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrollable region must be reachable by keyboard */}
       <div class={css.lines} tabIndex={0}>
         <ol>
-          {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
+          {visibleLines(table.log, !hidden.value.includes("expressions")).map((line) => {
             const { seat, text } = happeningWords(table, line.entry);
             return (
               <li key={line.sequence} class={seat === undefined ? css.aside : ""}>

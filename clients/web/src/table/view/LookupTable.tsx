@@ -97,16 +97,16 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
 
 function Sign({ cell, taken }: { cell: Cell; taken: boolean }) {
   const words = t().table.lookup;
-  const said = `${moveWords(cell.move)}: ${words[cell.state]}${taken ? `, ${words.chosen}` : ""}`;
+  const label = `${moveWords(cell.move)}: ${words[cell.state]}${taken ? `, ${words.chosen}` : ""}`;
   const look = `${css.cell} ${css[cell.state]} ${taken ? css.taken : ""}`;
   if (cell.state !== "legal")
     return (
-      <span class={look} title={said} aria-hidden="true">
+      <span class={look} title={label} aria-hidden="true">
         {SIGNS[cell.state]}
       </span>
     );
   return (
-    <span class={look} title={said} role="img" aria-label={said}>
+    <span class={look} title={label} role="img" aria-label={label}>
       {SIGNS.legal}
     </span>
   );
