@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use chefshat_proto::v1;
 use chefshat_record::outcome;
-use chefshat_tournament::{Ended, Game, SeatPlayed};
+use chefshat_tournament::{Ended, SeatPlayed};
 use futures::future::join_all;
 use tokio::time::Instant;
 use tracing::warn;
@@ -159,7 +159,7 @@ impl Task {
         };
         let called = self.state.core.games()[game].clone();
         for participant in &called.seats {
-            if !plays_itself(&called, *participant) {
+            if !called.is_played_by(*participant) {
                 continue;
             }
             let connection = self.connections.get(participant);
@@ -237,11 +237,6 @@ impl Task {
 
 fn retry() -> Instant {
     Instant::now() + TOURNAMENT_RETRY
-}
-
-/// Whether a participant has its own seat in a game.
-pub(super) fn plays_itself(game: &Game, participant: usize) -> bool {
-    game.seats.contains(&participant) && !game.forfeited.contains(&participant)
 }
 
 fn seat_played(seat: &outcome::SeatOutcome) -> SeatPlayed {

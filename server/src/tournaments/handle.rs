@@ -8,7 +8,7 @@ use chefshat_tournament::{BeginProblem, Entrant, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::shown::Shown;
+use super::shared::{AsOf, Shared};
 use crate::convert::{self, TournamentPlan};
 use crate::outbox::{Outbox, StreamEnd};
 use crate::rooms::Rooms;
@@ -192,7 +192,8 @@ pub struct TournamentHandle {
     pub(super) mailbox: mpsc::Sender<Message>,
     /// Counts changes.
     pub(super) changes: watch::Sender<u64>,
-    pub(super) shown: Shown,
+    pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
+    pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
 }
 
 impl TournamentHandle {

@@ -5,11 +5,11 @@ mod games;
 mod handle;
 mod leaderboard;
 mod shared;
-mod shown;
 mod table;
 mod task;
 #[cfg(test)]
 mod tests;
+mod views;
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -31,7 +31,7 @@ use crate::store::StoreError;
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use handle::TournamentState;
-use shown::Shown;
+use shared::Shared;
 use table::Table;
 use task::{Stop, Task};
 
@@ -215,7 +215,8 @@ impl Tournaments {
             committed: Mutex::new(state),
             mailbox,
             changes: watch::Sender::new(0),
-            shown: Shown::default(),
+            follower_update: Shared::default(),
+            results: Shared::default(),
         });
         self.lock().enter(Arc::clone(&hosted));
         // Before any client can request a record.

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use chefshat_tournament::State;
 use tokio::sync::Mutex;
 
 use crate::store::StoreError;
@@ -22,6 +23,26 @@ impl From<StoreError> for ComputeError {
     fn from(error: StoreError) -> Self {
         Self(error.to_string())
     }
+}
+
+/// A message about a tournament, and the state it shows.
+#[derive(Debug)]
+pub struct AsOf<M> {
+    pub(super) mark: Mark,
+    /// The message.
+    pub message: M,
+}
+
+/// The state of a tournament as far as it can be read at once. The number of the last change follows
+/// a moment after the change; a client that knows that a tournament has started or is over must not
+/// see an earlier state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Mark {
+    pub(super) change: u64,
+    pub(super) state: State,
+    pub(super) participants: usize,
+    pub(super) games: usize,
+    pub(super) over: usize,
 }
 
 /// The last computed value.

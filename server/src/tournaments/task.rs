@@ -11,7 +11,6 @@ use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
-use super::games::plays_itself;
 use super::handle::{
     Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
 };
@@ -260,7 +259,7 @@ impl Task {
         let state = &self.state;
         let games = state.core.playing().filter(|number| {
             let game = &state.core.games()[*number];
-            !self.without_room.contains(number) && plays_itself(game, participant)
+            !self.without_room.contains(number) && game.is_played_by(participant)
         });
         games
             .filter_map(|number| state.placed.get(&number).map(|(room, _)| *room))

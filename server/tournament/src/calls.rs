@@ -89,7 +89,7 @@ impl Tournament {
             }
             Ended::NeverStarted { missing } => missing
                 .into_iter()
-                .filter(|who| played.seats.contains(who) && !played.forfeited.contains(who))
+                .filter(|who| played.is_played_by(*who))
                 .collect(),
             // Seats that do not match are not a result.
             Ended::Played { .. } | Ended::Aborted => Vec::new(),

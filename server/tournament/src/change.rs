@@ -192,6 +192,11 @@ impl Game {
         matches!(self.state, GameState::Counted(_) | GameState::Void)
     }
 
+    /// Whether a participant plays it: it has a seat and did not forfeit.
+    pub fn is_played_by(&self, participant: usize) -> bool {
+        self.seats.contains(&participant) && !self.forfeited.contains(&participant)
+    }
+
     /// The result, if it is counted.
     pub fn result(&self) -> Option<&GameResult> {
         match &self.state {

@@ -22,19 +22,6 @@ use crate::arrows;
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// Groups of files that still depend on each other in circles. The list may only shrink: a new circle is
-/// refused, and so is an obsolete entry.
-const REMAINING: &[&[&str]] = &[
-    &[
-        "server/src/tournaments/games.rs",
-        "server/src/tournaments/task.rs",
-    ],
-    &[
-        "server/src/tournaments/handle.rs",
-        "server/src/tournaments/shown.rs",
-    ],
-];
-
 /// Most re-exports followed from one name. Far more than any path has.
 const MAX_HOPS: usize = 32;
 
@@ -45,11 +32,10 @@ pub(crate) fn check(places: &Places) -> Result<(), Failure> {
         let files = Files::of_crate(&root, &|path| std::fs::read_to_string(path).ok())?;
         circles.extend(files.circles(&places.root));
     }
-    let problems = problems(&circles, REMAINING);
-    if problems.is_empty() {
+    if circles.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(format!("\n{}", problems.join("\n"))))
+    Err(Failure::new(format!("\n{}", circles.join("\n"))))
 }
 
 /// The root files of all libraries and programs of the workspace.
@@ -62,37 +48,6 @@ fn crate_roots(metadata: &Value) -> Vec<PathBuf> {
         counts.then(|| target["src_path"].as_str().map(PathBuf::from))?
     });
     roots.collect()
-}
-
-/// Files that depend on each other.
-#[derive(Debug, PartialEq, Eq)]
-struct Circle {
-    /// All files that can be reached from each other, in order.
-    files: Vec<String>,
-    /// The shortest circles, one for each dependency in the group, without repetition.
-    ways: Vec<String>,
-}
-
-/// A line for each circle that is not among the remaining ones, and for each obsolete entry.
-fn problems(circles: &[Circle], remaining: &[&[&str]]) -> Vec<String> {
-    let is_covered = |circle: &Circle, entry: &[&str]| {
-        (circle.files.iter()).all(|file| entry.contains(&file.as_str()))
-    };
-    let mut problems = Vec::new();
-    for circle in circles {
-        if !remaining.iter().any(|entry| is_covered(circle, entry)) {
-            problems.extend(circle.ways.iter().map(|way| format!("circle: {way}")));
-        }
-    }
-    for entry in remaining {
-        if !circles.iter().any(|circle| is_covered(circle, entry)) {
-            problems.push(format!(
-                "no circle any more, remove it from tests/xtask/src/circles.rs: {}",
-                entry.join(", ")
-            ));
-        }
-    }
-    problems
 }
 
 /// The modules of one crate and their files.
@@ -272,54 +227,38 @@ impl Files {
             })
     }
 
-    /// The circles, with paths relative to `root`.
-    fn circles(&self, root: &Path) -> Vec<Circle> {
+    /// The shortest circle through each dependency, shortest first. Paths are relative to `root`.
+    fn circles(&self, root: &Path) -> Vec<String> {
         let dependencies = self.dependencies();
-        let ways: Vec<Vec<Option<usize>>> = (0..dependencies.len())
-            .map(|from| search(&dependencies, from))
-            .collect();
-        let leads = |from: usize, to: usize| ways[from][to].is_some();
         let name = |file: usize| {
             let path = &self.paths[file];
             let path = path.strip_prefix(root).unwrap_or(path);
             path.to_string_lossy().replace('\\', "/")
         };
-        let mut is_seen = vec![false; dependencies.len()];
-        let mut circles = Vec::new();
-        for file in 0..dependencies.len() {
-            let group: Vec<usize> = (0..dependencies.len())
-                .filter(|&other| leads(file, other) && leads(other, file))
-                .collect();
-            if is_seen[file] || group.len() < 2 {
-                continue;
-            }
-            let mut around = BTreeSet::new();
-            for &from in &group {
-                is_seen[from] = true;
-                for &to in dependencies[from].iter().filter(|to| group.contains(to)) {
-                    // From `to` back to `from`, in reverse.
-                    let mut way = vec![from];
-                    while let Some(&before) = way.last()
-                        && before != to
-                    {
-                        way.push(ways[to][before].expect("the files are in one group"));
-                    }
-                    way.reverse();
-                    let smallest = (0..way.len()).min_by_key(|&at| name(way[at]));
-                    way.rotate_left(smallest.unwrap_or_default());
-                    way.push(way[0]);
-                    let names: Vec<String> = way.into_iter().map(name).collect();
-                    around.insert((names.len(), names.join(" → ")));
+        let mut circles = BTreeSet::new();
+        for to in 0..dependencies.len() {
+            let before = search(&dependencies, to);
+            for from in (0..dependencies.len()).filter(|from| dependencies[*from].contains(&to)) {
+                // From `to` back to `from`, read backwards.
+                let mut way = vec![from];
+                while let Some(&file) = way.last()
+                    && file != to
+                    && let Some(file) = before[file]
+                {
+                    way.push(file);
                 }
+                if way.last() != Some(&to) {
+                    continue;
+                }
+                way.reverse();
+                let smallest = (0..way.len()).min_by_key(|&at| name(way[at]));
+                way.rotate_left(smallest.unwrap_or_default());
+                way.push(way[0]);
+                let names: Vec<String> = way.into_iter().map(name).collect();
+                circles.insert((names.len(), names.join(" → ")));
             }
-            let mut files: Vec<String> = group.into_iter().map(name).collect();
-            files.sort();
-            circles.push(Circle {
-                files,
-                ways: around.into_iter().map(|(_, way)| way).collect(),
-            });
         }
-        circles
+        circles.into_iter().map(|(_, circle)| circle).collect()
     }
 }
 
@@ -531,8 +470,7 @@ mod tests {
             .collect();
         let read = |path: &Path| files.get(path).map(|text| (*text).to_owned());
         let files = Files::of_crate(Path::new("lib.rs"), &read).unwrap();
-        let circles = files.circles(Path::new(""));
-        circles.into_iter().flat_map(|circle| circle.ways).collect()
+        files.circles(Path::new(""))
     }
 
     const TWO: &str = "mod a; mod b;";
@@ -626,23 +564,5 @@ mod tests {
             ("c/d.rs", "pub fn d() { super::super::a::a() }"),
         ]);
         assert_eq!(found, ["a.rs → else/where.rs → c/d.rs → a.rs"]);
-    }
-
-    #[test]
-    fn remaining_circles_may_shrink_but_not_grow() {
-        let circle = |files: &[&str]| Circle {
-            files: files.iter().map(ToString::to_string).collect(),
-            ways: vec![files.join(" → ")],
-        };
-        let remaining: &[&[&str]] = &[&["a", "b", "c"]];
-        assert!(problems(&[circle(&["a", "b", "c"])], remaining).is_empty());
-        assert!(problems(&[circle(&["a", "b"])], remaining).is_empty());
-        assert_eq!(
-            problems(&[circle(&["a", "d"])], remaining),
-            [
-                "circle: a → d",
-                "no circle any more, remove it from tests/xtask/src/circles.rs: a, b, c"
-            ]
-        );
     }
 }

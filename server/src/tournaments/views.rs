@@ -6,40 +6,13 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_tournament::ratings::Ratings;
-use chefshat_tournament::{Format, Game, GameState, State, Tournament};
+use chefshat_tournament::{Format, Game, GameState, Tournament};
 use tokio::sync::Semaphore;
 
 use super::handle::TournamentHandle;
-use super::shared::{ComputeError, Shared};
+use super::shared::{AsOf, ComputeError, Mark};
 use crate::config::MAX_GAMES_FOLLOWED;
 use crate::convert;
-
-/// A message about a tournament, and the state it shows.
-#[derive(Debug)]
-pub struct AsOf<M> {
-    mark: Mark,
-    /// The message.
-    pub message: M,
-}
-
-/// The state of a tournament as far as it can be read at once. The number of the last change follows
-/// a moment after the change; a client that knows that a tournament has started or is over must not
-/// see an earlier state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Mark {
-    change: u64,
-    state: State,
-    participants: usize,
-    games: usize,
-    over: usize,
-}
-
-/// The last computed messages.
-#[derive(Debug, Default)]
-pub(super) struct Shown {
-    follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
-    results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
-}
 
 impl TournamentHandle {
     /// The current update for followers. Computed when a permit is available.
@@ -52,7 +25,7 @@ impl TournamentHandle {
     ) -> Result<Arc<AsOf<v1::FollowTournamentResponse>>, ComputeError> {
         let work = self.as_of_now(permits, Self::compute_update);
         let is_current = |follower_update: &AsOf<_>| follower_update.mark == self.mark();
-        self.shown.follower_update.get(is_current, work).await
+        self.follower_update.get(is_current, work).await
     }
 
     /// The current results. Computed when a permit is available.
@@ -65,7 +38,7 @@ impl TournamentHandle {
     ) -> Result<Arc<AsOf<v1::GetTournamentResultsResponse>>, ComputeError> {
         let work = self.as_of_now(permits, Self::compute_results);
         let is_current = |results: &AsOf<_>| results.mark == self.mark();
-        self.shown.results.get(is_current, work).await
+        self.results.get(is_current, work).await
     }
 
     fn mark(&self) -> Mark {

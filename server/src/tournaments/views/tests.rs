@@ -14,6 +14,7 @@ use tokio::sync::{mpsc, watch};
 use super::*;
 use crate::config::MAX_NAME_CHARS;
 use crate::tournaments::handle::TournamentState;
+use crate::tournaments::shared::Shared;
 use chefshat_room::ids::{Id, Token};
 
 /// Default message limit of gRPC clients, bytes.
@@ -70,7 +71,8 @@ impl TournamentHandle {
             }),
             mailbox: mpsc::channel(1).0,
             changes: watch::Sender::new(0),
-            shown: Shown::default(),
+            follower_update: Shared::default(),
+            results: Shared::default(),
         })
     }
 
