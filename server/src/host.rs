@@ -53,8 +53,8 @@ impl Host {
         })
     }
 
-    /// Starts a server for this process only. Games are stored in memory; records are written to files if
-    /// there is a folder for them. Stopping it does not wait for running games.
+    /// Starts a server for this process only. Games are stored in memory; records are written to
+    /// files if there is a folder for them. Stopping it does not wait for running games.
     ///
     /// # Errors
     /// No port is free.

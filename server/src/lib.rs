@@ -1,6 +1,6 @@
 //! The Chef's Hat game server as a library: tasks of rooms and tournaments, stores, gRPC services
-//! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the command
-//! line is `chefshat`, in `server/cli`.
+//! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
+//! command line is `chefshat`, in `server/cli`.
 
 pub mod clock;
 pub mod config;

@@ -1,6 +1,6 @@
-//! The updates queued for one stream. Rooms push updates; the stream takes everything that is ready as
-//! one message, so that a busy client with many seats receives batches. It is bounded: a subscriber
-//! learns when there is no space, and again when there is.
+//! The updates queued for one stream. Rooms push updates; the stream takes everything that is ready
+//! as one message, so that a busy client with many seats receives batches. It is bounded: a
+//! subscriber learns when there is no space, and again when there is.
 
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,12 +17,12 @@ use crate::wire::Updates;
 
 /// Capacity of an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
-/// Capacity of a message, counted in updates and events. It keeps messages well below the 4 MiB that
-/// gRPC clients accept by default.
+/// Capacity of a message, counted in updates and events. It keeps messages well below the 4 MiB
+/// that gRPC clients accept by default.
 pub const MESSAGE_CAPACITY: usize = 4_096;
 
-/// Records when a decision request was handed to the transport. Shared by the outbox, which sets it, and
-/// the room, which reads it.
+/// Records when a decision request was handed to the transport. Shared by the outbox, which sets
+/// it, and the room, which reads it.
 #[derive(Debug)]
 pub struct HandStamp {
     clock: RoomClock,
@@ -126,8 +126,8 @@ impl Outbox {
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
 
-    /// Queues updates; `stamp` is set when they are handed over. If they do not fit, nothing is queued,
-    /// `updates` is unchanged, and `on_space` is called when there is space again.
+    /// Queues updates; `stamp` is set when they are handed over. If they do not fit, nothing is
+    /// queued, `updates` is unchanged, and `on_space` is called when there is space again.
     pub fn push(
         &self,
         updates: &mut Updates,
@@ -196,8 +196,9 @@ impl Outbox {
         self.reader.wake();
     }
 
-    /// Whether the reader of the stream's requests must stop: it was told to, or the client has gone. If
-    /// not, its task is woken when it must. Takes no lock, because it is called for every message.
+    /// Whether the reader of the stream's requests must stop: it was told to, or the client has
+    /// gone. If not, its task is woken when it must. Takes no lock, because it is called for every
+    /// message.
     pub fn poll_reading_stopped(&self, context: &Context<'_>) -> bool {
         if !self.reading_stopped.load(Ordering::Acquire) {
             self.reader.register(context.waker());
@@ -262,7 +263,8 @@ impl Stream for OutboxStream {
             waiting.weight -= updates.weight();
             updates
         };
-        // A decision that is left for the next message is stamped a little early; its agent gains that time.
+        // A decision that is left for the next message is stamped a little early; its agent gains
+        // that time.
         if !waiting.stamps.is_empty() {
             let now = Instant::now();
             for stamp in waiting.stamps.drain(..) {

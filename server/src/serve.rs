@@ -40,8 +40,8 @@ pub enum ServeError {
     /// The transport failed.
     #[error("the server's transport failed: {0}")]
     Transport(#[from] tonic::transport::Error),
-    /// The store failed. Acknowledged decisions are stored; the fate of others shows when the store is
-    /// opened again.
+    /// The store failed. Acknowledged decisions are stored; the fate of others shows when the store
+    /// is opened again.
     #[error(
         "{0}; every acknowledged decision is stored, and durable games resume when the server is started again"
     )]
@@ -54,8 +54,8 @@ pub enum ServeError {
     Origin(String),
 }
 
-/// Resumes the games of a store and serves on a socket until `shutdown` completes and everything has
-/// ended.
+/// Resumes the games of a store and serves on a socket until `shutdown` completes and everything
+/// has ended.
 ///
 /// # Errors
 /// The transport or store failed, or an allowed origin is not a web origin.
@@ -190,7 +190,8 @@ impl Server {
         tokio::select! {
             served = serving => served?,
             () = ended_or_drained => warn!("dropping connections that do not close"),
-            // Nothing more can be acknowledged: waiting clients learn it at once when the process ends.
+            // Nothing more can be acknowledged: waiting clients learn it at once when the process
+            // ends.
             failure = store.failed() => return Err(ServeError::Store(failure)),
         }
         tournaments.end();

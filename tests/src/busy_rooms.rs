@@ -1,5 +1,5 @@
-//! Rooms that are played all the time by agents of the SDK over real connections, which reconnect on
-//! their own: after each game the next room is created. A `Ledger` records what they receive.
+//! Rooms that are played all the time by agents of the SDK over real connections, which reconnect
+//! on their own: after each game the next room is created. A `Ledger` records what they receive.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -91,8 +91,8 @@ impl BusyRooms {
         }
     }
 
-    /// Lets the running games end and stops. Returns the ids of all their games, each of which ended with
-    /// a result.
+    /// Lets the running games end and stops. Returns the ids of all their games, each of which
+    /// ended with a result.
     pub async fn finish(self) -> Vec<String> {
         self.leaving.send_replace(true);
         let games = patiently("the last games to end", self.rooms.join_all()).await;

@@ -59,10 +59,10 @@ impl Ledger {
         assert!(unexpected.is_empty(), "{unexpected:#?}");
     }
 
-    /// Compares the record of a game with the clients' knowledge: it contains every acknowledged decision
-    /// once, unchanged, and every decision it attributes to their agents was taken by one. Returns the
-    /// number of acknowledged decisions.
-    /// every decision that it says an agent of theirs took is one that the agent took. Gives the number of acknowledged decisions.
+    /// Compares the record of a game with the clients' knowledge: it contains every acknowledged
+    /// decision once, unchanged, and every decision it attributes to their agents was taken by one.
+    /// Returns the number of acknowledged decisions. every decision that it says an agent of theirs
+    /// took is one that the agent took. Gives the number of acknowledged decisions.
     ///
     /// # Panics
     /// At the first difference.

@@ -14,8 +14,8 @@ use tokio::task::JoinHandle;
 
 use crate::patiently;
 
-/// A path that `cargo xtask test` prepares and passes in the environment: the binary, an interpreter, a
-/// folder.
+/// A path that `cargo xtask test` prepares and passes in the environment: the binary, an
+/// interpreter, a folder.
 ///
 /// # Panics
 /// The variable is not set.
@@ -179,8 +179,9 @@ impl Process {
     }
 }
 
-/// A loopback address that no other test of this machine listens on. Connections come from 127.0.0.1,
-/// so a client that tries to connect while the server is down never gets the server's port.
+/// A loopback address that no other test of this machine listens on. Connections come from
+/// 127.0.0.1, so a client that tries to connect while the server is down never gets the server's
+/// port.
 fn own_address() -> Ipv4Addr {
     static NEXT: AtomicU8 = AtomicU8::new(1);
     let [_, _, high, low] = std::process::id().to_be_bytes();

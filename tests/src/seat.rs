@@ -104,8 +104,8 @@ impl StreamSeat {
         self.requests = None;
     }
 
-    /// The next update that is not a batch of events; those are stored in `events`. Panics if the stream
-    /// ends.
+    /// The next update that is not a batch of events; those are stored in `events`. Panics if the
+    /// stream ends.
     pub async fn next(&mut self) -> Update {
         self.next_or_end()
             .await
@@ -178,7 +178,8 @@ pub fn is_legal(decision: &v1::DecisionRequest, action: u32) -> bool {
         .is_some_and(|bits| bits & (1 << (action % 8)) != 0)
 }
 
-/// Answers every decision with the first legal action until the seat is detached; returns the reason.
+/// Answers every decision with the first legal action until the seat is detached; returns the
+/// reason.
 pub async fn play_on(seat: &mut StreamSeat) -> v1::DetachReason {
     loop {
         match seat.next().await {

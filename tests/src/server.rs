@@ -107,7 +107,8 @@ pub fn one_shift() -> v1::RuleSet {
     }
 }
 
-/// Creates a room with four open seats, this policy and these rules; returns the tickets in seat order.
+/// Creates a room with four open seats, this policy and these rules; returns the tickets in seat
+/// order.
 pub async fn room_of_four(
     client: &Client,
     rules: v1::RuleSet,
@@ -155,8 +156,8 @@ pub async fn play_out(server: &TestServer, tickets: Vec<String>) {
     }
 }
 
-/// A spectator that does not read: its window is small, so that unread data waits at the server, not in
-/// this process.
+/// A spectator that does not read: its window is small, so that unread data waits at the server,
+/// not in this process.
 pub async fn narrow_spectator(
     server: &TestServer,
     room_id: String,

@@ -1,5 +1,5 @@
-//! The cases of an examination as data: the room or tournament of each, where the examiner interferes,
-//! and what the agent must be faced with. `exam` judges them.
+//! The cases of an examination as data: the room or tournament of each, where the examiner
+//! interferes, and what the agent must be faced with. `exam` judges them.
 
 use std::time::Duration;
 
@@ -27,11 +27,13 @@ impl Patience {
 /// An interference of the examiner. They happen one after the other, each at a turn with a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interference {
-    /// An answer is replaced by an illegal one on its way to the server, so that it is refused as INVALID.
+    /// An answer is replaced by an illegal one on its way to the server, so that it is refused as
+    /// INVALID.
     Refuse,
     /// The connection is cut when an answer arrives; the server never receives the answer.
     CutBeforeAnswer,
-    /// The connection is cut after an answer has been accepted, before the agent receives the result.
+    /// The connection is cut after an answer has been accepted, before the agent receives the
+    /// result.
     CutBeforeResult,
     /// The connection is cut in place of a request.
     CutBeforeRequest,
@@ -52,8 +54,8 @@ pub struct Case {
     pub interferences: &'static [Interference],
     /// Kinds of decisions that the case always contains.
     pub kinds: &'static [v1::DecisionKind],
-    /// The time is so short that a busy machine may lose a decision: only the share of lost decisions is
-    /// judged.
+    /// The time is so short that a busy machine may lose a decision: only the share of lost
+    /// decisions is judged.
     pub hurried: bool,
     /// Where it is played.
     pub place: Place,
@@ -188,8 +190,8 @@ const LATE_MS: u32 = 1_000;
 const SHORT_MS: u32 = 400;
 /// Pace of built-in agents in a tournament, so that its games are played at the same time.
 const MANY_PACE_MS: u32 = 10;
-/// Pace of built-in agents in a case with a substitute, so that the agent can take over before the game
-/// is over.
+/// Pace of built-in agents in a case with a substitute, so that the agent can take over before the
+/// game is over.
 const PACE_MS: u32 = 60;
 
 fn milliseconds(duration: Duration) -> u32 {
@@ -313,8 +315,8 @@ fn many_seats(patience: &Patience) -> v1::TournamentSettings {
     }
 }
 
-/// Starts a default game with its second Shift: cards dealt one by one from a sorted deck, so that all
-/// hands are alike. `jokers`: the seat that gets both jokers.
+/// Starts a default game with its second Shift: cards dealt one by one from a sorted deck, so that
+/// all hands are alike. `jokers`: the seat that gets both jokers.
 fn second_shift(last_order: Vec<u32>, jokers: Option<u32>) -> Start {
     const SEATS: u32 = 4;
     const FACES: u32 = 11;

@@ -88,8 +88,8 @@ pub struct Examination {
 }
 
 impl Examination {
-    /// Creates an examiner that listens on `listen` (port 0: another port for each case) and writes the
-    /// output of agents into the folder `logs`.
+    /// Creates an examiner that listens on `listen` (port 0: another port for each case) and writes
+    /// the output of agents into the folder `logs`.
     ///
     /// # Errors
     /// Its server cannot be started.
@@ -108,8 +108,8 @@ impl Examination {
         })
     }
 
-    /// Runs a case with an agent started by `command`. Without a command, calls `waiting` when an agent can
-    /// be started by hand.
+    /// Runs a case with an agent started by `command`. Without a command, calls `waiting` when an
+    /// agent can be started by hand.
     ///
     /// # Errors
     /// The case could not be run.

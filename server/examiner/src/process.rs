@@ -1,5 +1,5 @@
-//! The agent's process: started from a command with placeholders, in its own process group, so that all
-//! of it ends with its case. Its output is logged, and the last lines are kept in memory.
+//! The agent's process: started from a command with placeholders, in its own process group, so that
+//! all of it ends with its case. Its output is logged, and the last lines are kept in memory.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;

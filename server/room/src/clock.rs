@@ -1,5 +1,5 @@
-//! The passing of time: deadlines and banks, default decisions, substitution, the decisions of built-in
-//! agents, and seats that are not attached in time.
+//! The passing of time: deadlines and banks, default decisions, substitution, the decisions of
+//! built-in agents, and seats that are not attached in time.
 
 use std::time::Duration;
 
@@ -39,7 +39,8 @@ impl Core {
         }
     }
 
-    /// Does what is due at `now`. `handed`: when the transport received the request for the open decision.
+    /// Does what is due at `now`. `handed`: when the transport received the request for the open
+    /// decision.
     pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {
         match self.state {
             State::Waiting => self.tick_waiting(now),
@@ -55,9 +56,9 @@ impl Core {
         }
     }
 
-    /// Takes the due decisions that need no answer: those taken over from a record, then those of built-in
-    /// agents and substitutes. At most [`BUILT_IN_BUDGET`] at a time; [`Core::deadline`] then requests
-    /// another tick.
+    /// Takes the due decisions that need no answer: those taken over from a record, then those of
+    /// built-in agents and substitutes. At most [`BUILT_IN_BUDGET`] at a time; [`Core::deadline`]
+    /// then requests another tick.
     pub(super) fn advance(&mut self, now: Duration) {
         let mut budget = BUILT_IN_BUDGET;
         while budget > 0 {
@@ -203,7 +204,8 @@ impl Core {
         })
     }
 
-    /// When a room is closed because its seats are not all attached. A restart leaves them time to return.
+    /// When a room is closed because its seats are not all attached. A restart leaves them time to
+    /// return.
     fn waits_until(&self) -> Duration {
         let after_restart = self.restarted.map_or(Duration::ZERO, |at| at + JOIN_HOLD);
         self.header.policy.waiting_time.max(after_restart)

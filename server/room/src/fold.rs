@@ -1,5 +1,5 @@
-//! Applies a change to the state and the log. The effect is the same for a new change and for one read
-//! from a journal: nothing here reads a clock, a connection or a random generator.
+//! Applies a change to the state and the log. The effect is the same for a new change and for one
+//! read from a journal: nothing here reads a clock, a connection or a random generator.
 
 use std::time::Duration;
 
@@ -172,8 +172,8 @@ impl Core {
         }
     }
 
-    /// The seed of a Shift that starts after this number of decisions: one taken over from a record, or
-    /// the game's own.
+    /// The seed of a Shift that starts after this number of decisions: one taken over from a
+    /// record, or the game's own.
     fn seed_for(&self, decisions: u64) -> Seed {
         let mut end = 0;
         self.header

@@ -1,5 +1,5 @@
-//! Identifiers and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from the
-//! operating system's generator, are stored as hashes and compared in constant time.
+//! Identifiers and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from
+//! the operating system's generator, are stored as hashes and compared in constant time.
 
 use std::fmt;
 
@@ -84,8 +84,9 @@ impl SecretHash {
     }
 }
 
-/// A secret that belongs to a room, such as a ticket or an owner token: the room's id and 256 random
-/// bits, written as 96 hexadecimal digits, so that no command line mistakes it for an option.
+/// A secret that belongs to a room, such as a ticket or an owner token: the room's id and 256
+/// random bits, written as 96 hexadecimal digits, so that no command line mistakes it for an
+/// option.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Token {
     /// The room it belongs to.
@@ -103,8 +104,8 @@ impl Token {
         }
     }
 
-    /// The ticket for a request with an id chosen by the client: the same for every repetition. Only the
-    /// server knows `key`.
+    /// The ticket for a request with an id chosen by the client: the same for every repetition.
+    /// Only the server knows `key`.
     pub fn of_request(room: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
         let parts = [key.bytes().as_slice(), &room.0, request_id];
         Self {
@@ -141,8 +142,8 @@ impl fmt::Debug for Token {
     }
 }
 
-/// Identifies a request to create something, so that it can be repeated: its id, 32 random bytes chosen
-/// by the client, and a digest of its content.
+/// Identifies a request to create something, so that it can be repeated: its id, 32 random bytes
+/// chosen by the client, and a digest of its content.
 #[derive(Clone, Copy)]
 pub struct RequestKey {
     id: [u8; 32],
@@ -162,8 +163,8 @@ impl RequestKey {
         Id(std::array::from_fn(|index| hash[index]))
     }
 
-    /// The owner token of the created object. It depends on the content too, so a request with other
-    /// content gets another token.
+    /// The owner token of the created object. It depends on the content too, so a request with
+    /// other content gets another token.
     pub fn owner(&self) -> Token {
         Token {
             room: self.created_id(),

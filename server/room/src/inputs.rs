@@ -1,5 +1,5 @@
-//! Inputs of participants: join, attach, leave, answer, express, return. Each input is checked against
-//! the state; an invalid one is refused and changes nothing.
+//! Inputs of participants: join, attach, leave, answer, express, return. Each input is checked
+//! against the state; an invalid one is refused and changes nothing.
 
 use std::time::Duration;
 
@@ -49,7 +49,8 @@ impl Core {
                 seat
             }
             None => {
-                // A seat reserved for this kind comes first, so that seats open to all stay free for others.
+                // A seat reserved for this kind comes first, so that seats open to all stay free
+                // for others.
                 let mut free: Vec<Seat> = self.all_seats().filter(|s| self.is_free(*s)).collect();
                 if free.is_empty() {
                     return Err(JoinError::RoomFull);
@@ -99,7 +100,8 @@ impl Core {
         self.commit(Duration::ZERO, Change::Seated { seat, participant });
     }
 
-    /// Attaches a connection to a seat and detaches an older one. `arrived`: when the request was read.
+    /// Attaches a connection to a seat and detaches an older one. `arrived`: when the request was
+    /// read.
     pub fn attach(
         &mut self,
         now: Duration,
@@ -122,7 +124,8 @@ impl Core {
         state.recalled = false;
         state.connection = Some(connection);
         state.ever_attached = true;
-        // With a contribution to the seed this game would have other deals than the rest of its series.
+        // With a contribution to the seed this game would have other deals than the rest of its
+        // series.
         let in_series = self.header.series().is_some();
         if self.state == State::Waiting && !in_series {
             state.entropy = entropy;
@@ -192,8 +195,8 @@ impl Core {
         Ok(())
     }
 
-    /// Processes an answer that was read at `arrived`. `handed`: when the transport received the decision
-    /// request.
+    /// Processes an answer that was read at `arrived`. `handed`: when the transport received the
+    /// decision request.
     pub fn answer(
         &mut self,
         now: Duration,

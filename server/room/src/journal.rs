@@ -60,7 +60,8 @@ pub struct Branch {
     pub game: Id,
     /// Whether later Shifts are dealt as in the recorded game.
     pub same_deals: bool,
-    /// The decisions taken over, in order. Not empty, because the first Shift's seed comes with them.
+    /// The decisions taken over, in order. Not empty, because the first Shift's seed comes with
+    /// them.
     pub taken_over: Vec<TakenOver>,
 }
 
@@ -69,8 +70,8 @@ pub struct Branch {
 pub struct TournamentGame {
     /// The tournament.
     pub tournament: Id,
-    /// The series of games with the same deals. Until all of them have ended, nothing that could reveal
-    /// the deals is published.
+    /// The series of games with the same deals. Until all of them have ended, nothing that could
+    /// reveal the deals is published.
     pub series: Option<Id>,
 }
 

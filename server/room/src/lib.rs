@@ -1,10 +1,10 @@
 //! The core of a room: `(state, input, now) → changes and answers`, without async or IO. It alone
-//! decides timeouts, invalid attempts, substitution and reconnection. Callers pass the time since the
-//! room was created.
+//! decides timeouts, invalid attempts, substitution and reconnection. Callers pass the time since
+//! the room was created.
 //!
-//! An input (`inputs`, `clock`) is checked against the state and turned into changes. Folding a change
-//! (`fold`) updates the state and the log, always with the same effect: a game is replayed from its
-//! journal by folding its changes again.
+//! An input (`inputs`, `clock`) is checked against the state and turned into changes. Folding a
+//! change (`fold`) updates the state and the log, always with the same effect: a game is replayed
+//! from its journal by folding its changes again.
 
 mod answers;
 mod clock;
@@ -133,14 +133,16 @@ pub struct OpenDecision {
     pub id: u64,
     /// When it was opened, or given back to a seat that returned from a substitute.
     released: Duration,
-    /// Whether it has been committed and its seat may learn of it. From then on its release time is fixed.
+    /// Whether it has been committed and its seat may learn of it. From then on its release time is
+    /// fixed.
     announced: bool,
     /// When its clock started, once determined.
     start: Option<Duration>,
-    /// When to check again whether the transport has received the request; zero before the first check.
+    /// When to check again whether the transport has received the request; zero before the first
+    /// check.
     recheck_at: Duration,
-    /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on a new
-    /// connection.
+    /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on
+    /// a new connection.
     paused_since: Option<Duration>,
     /// Invalid attempts so far.
     attempts: u32,
@@ -257,7 +259,8 @@ impl Core {
         self.open.as_ref()
     }
 
-    /// The open decision, if the seat's own agent takes it rather than a built-in agent or substitute.
+    /// The open decision, if the seat's own agent takes it rather than a built-in agent or
+    /// substitute.
     pub fn awaited(&self) -> Option<&OpenDecision> {
         self.open.as_ref().filter(|open| {
             !self.is_automatic(open.decision.seat) && self.next_taken_over().is_none()
@@ -370,15 +373,15 @@ impl Core {
         state.substituted || state.fill.is_built_in()
     }
 
-    /// Changes that are folded but not committed. The store removes them. They must not be published
-    /// before they are committed.
+    /// Changes that are folded but not committed. The store removes them. They must not be
+    /// published before they are committed.
     pub fn pending(&mut self) -> &mut Vec<Entry> {
         &mut self.pending
     }
 
-    /// Called when all changes have been committed and the open decision is published. Its clock starts
-    /// now, however long the commit took. If it was published before, its seat gets back the time it
-    /// spent waiting for the store.
+    /// Called when all changes have been committed and the open decision is published. Its clock
+    /// starts now, however long the commit took. If it was published before, its seat gets back the
+    /// time it spent waiting for the store.
     pub fn released(&mut self, now: Duration) {
         let Some(open) = &mut self.open else { return };
         if !open.announced {

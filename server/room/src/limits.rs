@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-/// Before the game starts, a seat becomes free again if its ticket is not attached within this time.
+/// Before the game starts, a seat becomes free again if its ticket is not attached within this
+/// time.
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);
-/// The clock of a decision starts at most this long after its release, even if the transport has not
-/// received the request.
+/// The clock of a decision starts at most this long after its release, even if the transport has
+/// not received the request.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
-/// After a restart of the server, the clock of a decision waits this long for its seat to be attached.
+/// After a restart of the server, the clock of a decision waits this long for its seat to be
+/// attached.
 pub const RECALL_TIME: Duration = Duration::from_secs(60);
-/// A seat that has waited this long for the store gets the time back. Shorter waits are part of every
-/// answer: if they were refunded, invalid answers would gain time.
+/// A seat that has waited this long for the store gets the time back. Shorter waits are part of
+/// every answer: if they were refunded, invalid answers would gain time.
 pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);
 /// How often the room checks whether the transport has received a request whose deadline would have
 /// passed.
@@ -26,13 +28,13 @@ pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
 
 /// Most times that seats are taken in a room, including freed ones: each stays in its log.
 pub const MAX_SEATINGS: usize = 1_000;
-/// Invalid attempts at one decision after which the default is taken even if attempts are unlimited,
-/// so that records stay bounded.
+/// Invalid attempts at one decision after which the default is taken even if attempts are
+/// unlimited, so that records stay bounded.
 pub const MAX_ATTEMPTS: u32 = 10_000;
 /// Most changes of one game. A game that reaches this limit is aborted.
 pub const MAX_GAME_CHANGES: u64 = 2_000_000;
 /// Most decisions that built-in agents take before the room reads its mailbox again.
 pub const BUILT_IN_BUDGET: usize = 256;
-/// Cost of a decision of a recorded player, in decisions of other agents: it compares its observation
-/// with all recorded ones.
+/// Cost of a decision of a recorded player, in decisions of other agents: it compares its
+/// observation with all recorded ones.
 pub(crate) const REPLAY_COST: usize = 32;

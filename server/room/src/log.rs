@@ -1,5 +1,5 @@
-//! The log of a room: every public event, in order. The number of an event is its position plus one.
-//! `convert::event` in the server redacts events for a viewer.
+//! The log of a room: every public event, in order. The number of an event is its position plus
+//! one. `convert::event` in the server redacts events for a viewer.
 
 use std::time::Duration;
 

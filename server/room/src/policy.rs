@@ -67,8 +67,8 @@ pub struct Policy {
     pub abort: AbortPolicy,
     /// The scheme of the rewards that seats receive.
     pub reward_scheme: Option<RewardScheme>,
-    /// How long a built-in agent or substitute waits before it decides; `None`: depends on whether people
-    /// play.
+    /// How long a built-in agent or substitute waits before it decides; `None`: depends on whether
+    /// people play.
     pub pace: Option<Duration>,
     /// How long the room waits for its seats to be attached.
     pub waiting_time: Duration,

@@ -1,6 +1,6 @@
-//! Resumes a game after a restart of the server: reads its journal entry by entry and checks each one
-//! before folding it, because a file can be damaged. Built-in agents decide again, so that their
-//! generators reach the same state.
+//! Resumes a game after a restart of the server: reads its journal entry by entry and checks each
+//! one before folding it, because a file can be damaged. Built-in agents decide again, so that
+//! their generators reach the same state.
 
 use std::sync::Arc;
 use std::time::Duration;

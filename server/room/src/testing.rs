@@ -216,8 +216,8 @@ pub fn one_shift() -> RuleSetSpec {
 }
 
 impl Core {
-    /// Replaces the dealt hands in the game and in the log, for tests of redaction. `None` if the hands
-    /// are inconsistent.
+    /// Replaces the dealt hands in the game and in the log, for tests of redaction. `None` if the
+    /// hands are inconsistent.
     pub fn replace_hands(
         &mut self,
         change: impl FnOnce(&Game) -> Option<BySeat<Cards>>,

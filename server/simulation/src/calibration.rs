@@ -1,9 +1,10 @@
-//! Tests the stated uncertainty of ratings: simulated participants with known skills play games, and
-//! the resulting ratings are compared with the skills. No cards are played here; only places are drawn.
+//! Tests the stated uncertainty of ratings: simulated participants with known skills play games,
+//! and the resulting ratings are compared with the skills. No cards are played here; only places
+//! are drawn.
 //!
 //! In a game everyone has a random performance around its skill, and places follow the performances
-//! (Plackett and Luce's model, with Gumbel noise), so that of any two participants one beats the other
-//! with the probability [`win_chance`](chefshat_tournament::ratings::win_chance).
+//! (Plackett and Luce's model, with Gumbel noise), so that of any two participants one beats the
+//! other with the probability [`win_chance`](chefshat_tournament::ratings::win_chance).
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -33,8 +34,8 @@ pub struct Fields {
     pub seed: u64,
 }
 
-/// Ratings compared with skills after a number of rounds. Both are taken relative to the mean of their
-/// field.
+/// Ratings compared with skills after a number of rounds. Both are taken relative to the mean of
+/// their field.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Calibration {
     /// For each participant 1 if its skill is within 1.96 deviations of its rating's mean, else 0.
@@ -84,9 +85,9 @@ impl Calibration {
 }
 
 /// Plays the fields and compares after each of these numbers of rounds, which ascend. In a round
-/// everyone plays one game, except for those left over. `update` computes the ratings after a game, as
-/// [`after_game`](chefshat_tournament::ratings::after_game) does. Runs on the current rayon pool, which
-/// does not affect the result.
+/// everyone plays one game, except for those left over. `update` computes the ratings after a game,
+/// as [`after_game`](chefshat_tournament::ratings::after_game) does. Runs on the current rayon
+/// pool, which does not affect the result.
 pub fn calibration(
     fields: &Fields,
     rounds: &[u32],

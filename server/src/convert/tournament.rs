@@ -38,8 +38,8 @@ pub struct TournamentPlan {
     pub deal_seed: Option<[u8; 32]>,
 }
 
-/// Checks the settings of a new tournament and fills in defaults. `draw_seed` is used if the request
-/// has no seed.
+/// Checks the settings of a new tournament and fills in defaults. `draw_seed` is used if the
+/// request has no seed.
 ///
 /// # Errors
 /// The first invalid field.

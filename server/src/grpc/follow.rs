@@ -1,4 +1,5 @@
-//! Sends a tournament to one follower. `tournaments` computes the messages, for all followers together.
+//! Sends a tournament to one follower. `tournaments` computes the messages, for all followers
+//! together.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Reads recorded games for the services, a few at a time, on blocking threads. The work itself holds
-//! its permit, so a cancelled call does not make room for another before its work has ended.
+//! Reads recorded games for the services, a few at a time, on blocking threads. The work itself
+//! holds its permit, so a cancelled call does not make room for another before its work has ended.
 
 use std::sync::Arc;
 

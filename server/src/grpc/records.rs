@@ -27,8 +27,8 @@ use crate::store::Part;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
-/// Most lines in one message, and most bytes unless a single line is longer: well below the limit of
-/// gRPC clients.
+/// Most lines in one message, and most bytes unless a single line is longer: well below the limit
+/// of gRPC clients.
 const LINES_PER_MESSAGE: usize = 512;
 const BYTES_PER_MESSAGE: usize = 1024 * 1024;
 /// Summaries read at a time while many records are streamed.
@@ -322,8 +322,8 @@ async fn send<T>(
     Ok(())
 }
 
-/// Tells the client why the stream ends. Waits, without anything large in memory, until the status is
-/// received or the client has gone.
+/// Tells the client why the stream ends. Waits, without anything large in memory, until the status
+/// is received or the client has gone.
 async fn end<T>(sender: &mpsc::Sender<Result<T, Status>>, sent: Result<(), Status>) {
     if let Err(status) = sent {
         // It fails only if the client has gone.

@@ -1,6 +1,6 @@
-//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in UPPER_SNAKE,
-//! domain `chefshat`, metadata with the field or limit at fault. Errors that a client cannot act on
-//! go to the log instead.
+//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in
+//! UPPER_SNAKE, domain `chefshat`, metadata with the field or limit at fault. Errors that a client
+//! cannot act on go to the log instead.
 
 use std::collections::HashMap;
 

@@ -1,6 +1,6 @@
-//! `VectorService`: games of a client, stepped in batches on their own thread pool so that rooms stay
-//! responsive. `chefshat_simulation::vector` plays the games; this file reads and writes the streams
-//! and splits records into messages.
+//! `VectorService`: games of a client, stepped in batches on their own thread pool so that rooms
+//! stay responsive. `chefshat_simulation::vector` plays the games; this file reads and writes the
+//! streams and splits records into messages.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -55,7 +55,8 @@ pub struct Vectors {
 }
 
 impl Vectors {
-    /// Creates the service with this number of threads (0: one for each core). `closing` ends its streams.
+    /// Creates the service with this number of threads (0: one for each core). `closing` ends its
+    /// streams.
     ///
     /// # Errors
     /// The operating system cannot start the threads.
@@ -211,8 +212,8 @@ impl Runner {
         }
     }
 
-    /// Runs work on the pool's threads. If the call is cancelled, the work completes and its result is
-    /// dropped.
+    /// Runs work on the pool's threads. If the call is cancelled, the work completes and its result
+    /// is dropped.
     async fn run_on_pool<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -325,7 +326,8 @@ async fn on_pool<T: Send + 'static>(
 async fn next(
     requests: &mut Streaming<v1::RunRequest>,
 ) -> Result<Option<Option<RequestKind>>, End> {
-    // The client is told about a message that is too large or malformed; a broken connection has no reader.
+    // The client is told about a message that is too large or malformed; a broken connection has no
+    // reader.
     let message = requests.message().await.map_err(End::Failed)?;
     Ok(message.map(|message| message.request))
 }

@@ -261,8 +261,8 @@ impl Handle {
         self.ask(|reply| Message::Close(secret, reply)).await
     }
 
-    /// Ends the room because the server stops, unless its game is over: suspends a durable game, aborts any
-    /// other.
+    /// Ends the room because the server stops, unless its game is over: suspends a durable game,
+    /// aborts any other.
     pub async fn end(&self, durable: bool) {
         let message = if durable {
             Message::Suspend

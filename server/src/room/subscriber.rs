@@ -210,8 +210,8 @@ impl Subscriber {
         self.position = self.position.min(core.log().len());
     }
 
-    /// Sends the result of an answer: with the next flush if it was accepted and the seat receives events
-    /// with its decisions, else at once.
+    /// Sends the result of an answer: with the next flush if it was accepted and the seat receives
+    /// events with its decisions, else at once.
     pub fn send_result(&mut self, result: v1::AnswerResult) {
         if self.ended || self.is_saturated() {
             return;
@@ -270,8 +270,8 @@ impl Subscriber {
         }
     }
 
-    /// Sends what is due. `urgent`: send now even if the seat receives events with its decisions. Returns
-    /// `false` when nothing more can follow.
+    /// Sends what is due. `urgent`: send now even if the seat receives events with its decisions.
+    /// Returns `false` when nothing more can follow.
     pub fn deliver(
         &mut self,
         core: &Core,
@@ -352,8 +352,8 @@ impl Subscriber {
         self.position = end;
     }
 
-    /// Moves pending updates to the outbox. If it is full they stay pending, and the room is notified when
-    /// there is space.
+    /// Moves pending updates to the outbox. If it is full they stay pending, and the room is
+    /// notified when there is space.
     fn flush(&mut self) -> bool {
         let stamp = match &self.role {
             Role::Seat(connection) => connection.decision_pending.then_some(&connection.stamp),
@@ -417,8 +417,8 @@ impl PublicEvents {
         }
     }
 
-    /// The events between two positions, encoded for a viewer. The bytes of public events are shared; only
-    /// events that show more to the viewer are encoded separately.
+    /// The events between two positions, encoded for a viewer. The bytes of public events are
+    /// shared; only events that show more to the viewer are encoded separately.
     fn range(
         &self,
         core: &Core,
@@ -464,8 +464,8 @@ fn next_sequence(core: &Core) -> u64 {
     u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
 }
 
-/// The current view of spectators: all hands after the game, or if the room allows it. In a series of
-/// games with the same deals hands stay hidden, because others still play them.
+/// The current view of spectators: all hands after the game, or if the room allows it. In a series
+/// of games with the same deals hands stay hidden, because others still play them.
 fn spectator_view(core: &Core) -> Viewer {
     let header = core.header();
     let shows_hands = header.policy.spectators_see_hands || core.state().is_over();
@@ -476,8 +476,8 @@ fn spectator_view(core: &Core) -> Viewer {
     }
 }
 
-/// Whether an event is always sent to a seat at once: its own finishing, substitution and return, the
-/// end of a Shift and of the game.
+/// Whether an event is always sent to a seat at once: its own finishing, substitution and return,
+/// the end of a Shift and of the game.
 pub fn is_urgent(event: &RoomEvent, seat: Seat) -> bool {
     match event {
         RoomEvent::Substituted(own) | RoomEvent::Returned(own) => *own == seat,

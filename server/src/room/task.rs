@@ -1,6 +1,6 @@
-//! The task of a room: receives from a bounded mailbox, sets one timer, and for every batch of inputs
-//! lets the core apply them, commits the changes and only then publishes them. The core makes all
-//! decisions.
+//! The task of a room: receives from a bounded mailbox, sets one timer, and for every batch of
+//! inputs lets the core apply them, commits the changes and only then publishes them. The core
+//! makes all decisions.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -56,8 +56,8 @@ pub trait RoomWatcher: Send + Sync {
     fn gone(&self, room: Id);
 }
 
-/// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end has
-/// been processed.
+/// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
+/// has been processed.
 pub fn spawn_room(
     core: Core,
     clock: RoomClock,
@@ -131,7 +131,8 @@ struct Task {
     /// Length of the log at the last delivery.
     delivered: usize,
     over_since: Option<Duration>,
-    /// Whether the room ends while its game is unfinished; the game resumes when the server is restarted.
+    /// Whether the room ends while its game is unfinished; the game resumes when the server is
+    /// restarted.
     suspended: bool,
     context: TaskContext,
 }
@@ -190,8 +191,8 @@ impl Task {
         true
     }
 
-    /// Sets the timer to the next deadline. A timer that fires too early finds nothing to do and is set
-    /// again, so that moving a deadline back costs nothing.
+    /// Sets the timer to the next deadline. A timer that fires too early finds nothing to do and is
+    /// set again, so that moving a deadline back costs nothing.
     fn arm(&self, alarm: std::pin::Pin<&mut Sleep>, armed: bool) -> bool {
         let deadline = match self.over_since {
             Some(since) => Some(since + self.context.retention),
@@ -410,8 +411,8 @@ impl Task {
         Ok(())
     }
 
-    /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room must
-    /// stop.
+    /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
+    /// must stop.
     async fn commit_and_publish(&mut self) -> bool {
         if !self.core.pending().is_empty() {
             if let Err(error) = self.journal.append(self.core.pending()).await {
@@ -434,7 +435,8 @@ impl Task {
         self.releases = releases;
         self.deliver();
         if ends {
-            // A shutdown that waits for games to end may close streams at once: everything has been queued.
+            // A shutdown that waits for games to end may close streams at once: everything has been
+            // queued.
             self.context.watcher.game_over(self.core.header().room_id);
         }
         true
@@ -535,8 +537,8 @@ impl Task {
         true
     }
 
-    /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that agents
-    /// reconnect and find the game as the restarted server finds it.
+    /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that
+    /// agents reconnect and find the game as the restarted server finds it.
     fn fail(&mut self, error: &StoreError) {
         error!(room = %self.core.header().room_id, %error, "the room stops");
         self.releases.clear();

@@ -220,7 +220,8 @@ async fn deadlines_fire_without_any_input() {
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    // No seat answers: each one uses up its bank and three decisions, then substitutes end the game.
+    // No seat answers: each one uses up its bank and three decisions, then substitutes end the
+    // game.
     let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
     let numbers = read.await;
     assert!(numbers[0].len() > 12);
@@ -244,7 +245,8 @@ async fn a_flood_does_not_stop_the_clock() {
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
     }
-    // No decision is answered; several clients send requests endlessly, so the mailbox is never empty.
+    // No decision is answered; several clients send requests endlessly, so the mailbox is never
+    // empty.
     let (seat, connection) = (seats[0].seat, seats[0].connection);
     let flood: Vec<_> = (0..8)
         .map(|_| {

@@ -83,8 +83,8 @@ pub struct Created {
 /// The rooms of a server.
 pub struct Rooms {
     table: Mutex<Table>,
-    /// Series of games with the same deals that are not finished, and tournaments all of whose games are
-    /// withheld.
+    /// Series of games with the same deals that are not finished, and tournaments all of whose
+    /// games are withheld.
     closed: Mutex<BTreeSet<Id>>,
     /// Notified when a game has ended or a room is gone.
     changed: Notify,
@@ -143,8 +143,8 @@ impl Rooms {
         if !self.context.store.has_space() {
             return Err(CreateError::DiskNearlyFull);
         }
-        // Runs to completion even if the caller is cancelled: a half-created room would be stored and belong
-        // to nobody.
+        // Runs to completion even if the caller is cancelled: a half-created room would be stored
+        // and belong to nobody.
         let making = self.context.tracker.spawn(reservation.make(new));
         making
             .await
@@ -176,8 +176,8 @@ impl Rooms {
         self.by_code(code).is_some_and(|handle| handle.id() == id)
     }
 
-    /// The newest `count` rooms, only those created before number `before` if set, with their numbers,
-    /// newest first: those whose games are over, those whose are not, or all.
+    /// The newest `count` rooms, only those created before number `before` if set, with their
+    /// numbers, newest first: those whose games are over, those whose are not, or all.
     pub fn newest(
         &self,
         before: Option<u64>,
@@ -219,8 +219,8 @@ impl Rooms {
         self.ended.load(Ordering::Acquire)
     }
 
-    /// Withholds the records of a series, or of all games of a tournament, or releases them once all have
-    /// ended.
+    /// Withholds the records of a series, or of all games of a tournament, or releases them once
+    /// all have ended.
     pub fn withhold(&self, series: Id, withheld: bool) {
         let mut closed = self.closed();
         if withheld {
@@ -268,9 +268,9 @@ impl Rooms {
         self.context.store.outlives_server() && header.policy.durability == Durability::Durable
     }
 
-    /// Accepts no new rooms and lets running games continue for `grace`. The remaining ones are then
-    /// suspended until the server is restarted, or aborted if they cannot resume. Returns when no game is
-    /// open any more.
+    /// Accepts no new rooms and lets running games continue for `grace`. The remaining ones are
+    /// then suspended until the server is restarted, or aborted if they cannot resume. Returns when
+    /// no game is open any more.
     pub async fn shut_down(&self, grace: Duration) {
         self.lock().shutting_down = true;
         let mut playing = HashSet::new();
@@ -279,8 +279,8 @@ impl Rooms {
                 Ok(room) => room.state() == chefshat_proto::v1::RoomState::Waiting,
                 Err(_) => continue,
             };
-            // Games that have not started are not waited for. Ephemeral ones are aborted at once; agents of
-            // durable ones stay connected as long as the server runs.
+            // Games that have not started are not waited for. Ephemeral ones are aborted at once;
+            // agents of durable ones stay connected as long as the server runs.
             match (waits, durable) {
                 (false, _) => drop(playing.insert(handle.id())),
                 (true, false) => handle.end(durable).await,
@@ -290,15 +290,16 @@ impl Rooms {
         // Both waits end: within the grace, or because every room obeys.
         let over = self.until(|table| !table.any_open(|id| playing.contains(&id)));
         let _ = tokio::time::timeout(grace, over).await;
-        // Ephemeral games first: suspending a room ends streams on which other seats may still receive the
-        // end of theirs.
+        // Ephemeral games first: suspending a room ends streams on which other seats may still
+        // receive the end of theirs.
         for durable in [false, true] {
             for (handle, _) in self.open().into_iter().filter(|(_, it)| *it == durable) {
                 handle.end(durable).await;
             }
             self.until(|table| !table.any_open_of(durable)).await;
         }
-        // Dropping the handles ends the rooms that still show their games, and the tracker's tasks with them.
+        // Dropping the handles ends the rooms that still show their games, and the tracker's tasks
+        // with them.
         self.lock().remove_over();
     }
 

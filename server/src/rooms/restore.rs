@@ -22,16 +22,16 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::Fill;
 
 impl Rooms {
-    /// Resumes the unfinished games of the store and returns their number. A game that cannot be resumed
-    /// is logged and left unchanged.
+    /// Resumes the unfinished games of the store and returns their number. A game that cannot be
+    /// resumed is logged and left unchanged.
     ///
     /// # Errors
     /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let retention = u64::try_from(self.context.retention.as_millis()).unwrap_or(u64::MAX);
         let ended_since_ms = since_epoch_ms().saturating_sub(retention);
-        // Before any room could write its record at the same time. Other servers that only write records may
-        // share the folder.
+        // Before any room could write its record at the same time. Other servers that only write
+        // records may share the folder.
         if self.context.store.outlives_server()
             && let Some(data_dir) = self.context.record_writer.data_dir()
             && let Err(error) = jsonl::remove_unfinished(data_dir)
@@ -98,7 +98,8 @@ impl Rooms {
 struct Players(HashMap<(Id, u32), Option<Arc<RecordedPlayer>>>);
 
 impl Players {
-    /// The recorded players of seats that replay one. If a record is gone, the policy's substitute plays.
+    /// The recorded players of seats that replay one. If a record is gone, the policy's substitute
+    /// plays.
     async fn of(
         &mut self,
         store: &Arc<dyn Store>,

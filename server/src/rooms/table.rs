@@ -48,8 +48,8 @@ pub(super) struct Entry {
     pub(super) durable: bool,
     /// The game has ended.
     pub(super) over: bool,
-    /// The room has ended but its game resumes when the server is restarted. It stays in the table, so that
-    /// clients are told to try again rather than that the room is unknown.
+    /// The room has ended but its game resumes when the server is restarted. It stays in the table,
+    /// so that clients are told to try again rather than that the room is unknown.
     pub(super) suspended: bool,
 }
 

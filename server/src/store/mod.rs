@@ -51,8 +51,8 @@ impl StoredGame {
     }
 }
 
-/// A part of the list of finished games, and the order of reading. Games are numbered from 1, oldest
-/// first.
+/// A part of the list of finished games, and the order of reading. Games are numbered from 1,
+/// oldest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The games after this number, oldest first.
@@ -94,9 +94,9 @@ pub trait Store: Send + Sync + 'static {
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
-    /// The unfinished games, and those that have ended since a time (milliseconds since the Unix epoch),
-    /// whose clients may have missed the end; oldest first. A game that cannot be read is logged and
-    /// left unchanged.
+    /// The unfinished games, and those that have ended since a time (milliseconds since the Unix
+    /// epoch), whose clients may have missed the end; oldest first. A game that cannot be read is
+    /// logged and left unchanged.
     fn resumable_games(
         &self,
         ended_since_ms: u64,
@@ -135,8 +135,8 @@ pub trait Store: Send + Sync + 'static {
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// The tournaments that are not over, and the `newest_over` newest ones that are; oldest first. One
-    /// that cannot be read is logged and left unchanged.
+    /// The tournaments that are not over, and the `newest_over` newest ones that are; oldest first.
+    /// One that cannot be read is logged and left unchanged.
     fn tournaments(
         &self,
         newest_over: usize,
@@ -168,7 +168,8 @@ pub trait Journal: Send + 'static {
     ) -> BoxFuture<'_, Result<(), StoreError>>;
 }
 
-/// The identity of a seat's participant: that of a built-in agent is its agent, not its display name.
+/// The identity of a seat's participant: that of a built-in agent is its agent, not its display
+/// name.
 fn identity(seat: &v1::Participant) -> &String {
     match seat.built_in_agent.is_empty() {
         true => &seat.name,

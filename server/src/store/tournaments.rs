@@ -1,5 +1,5 @@
-//! The stored values of a tournament: its header and the entries of its journal. Games are stored as
-//! games. The encoding belongs to the store that needs one.
+//! The stored values of a tournament: its header and the entries of its journal. Games are stored
+//! as games. The encoding belongs to the store that needs one.
 
 use chefshat_proto::v1;
 use chefshat_tournament::Change;
@@ -35,8 +35,8 @@ pub enum TournamentEntry {
         /// The hash of its ticket.
         ticket: SecretHash,
     },
-    /// A game was assigned a room, before the room is created. A later entry for the same game replaces
-    /// an earlier one.
+    /// A game was assigned a room, before the room is created. A later entry for the same game
+    /// replaces an earlier one.
     Placed {
         /// Number of the game in the tournament.
         game: usize,

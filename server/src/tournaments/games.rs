@@ -1,6 +1,7 @@
-//! The games of a tournament and their rooms: a called game is assigned a room, its participants are
-//! notified, and after its end its result is read from the store, so that it counts exactly once even
-//! if the server restarts in between. The core decides when games are called and what counts.
+//! The games of a tournament and their rooms: a called game is assigned a room, its participants
+//! are notified, and after its end its result is read from the store, so that it counts exactly
+//! once even if the server restarts in between. The core decides when games are called and what
+//! counts.
 
 use std::collections::BTreeMap;
 
@@ -58,7 +59,8 @@ impl Task {
                     let change = self.state.core.ended(game, ended);
                     self.fold_all(change.into_iter().collect());
                 }
-                // The server ended before the room was created, or together with it: nothing that counts was played.
+                // The server ended before the room was created, or together with it: nothing that
+                // counts was played.
                 None if !self.rooms.is_shutting_down() => self.place(game),
                 None => {}
             }

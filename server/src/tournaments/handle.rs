@@ -39,8 +39,8 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Sends a call; `false` if the stream is gone or too many calls wait. In the latter case the stream
-    /// is ended, so that its client reconnects.
+    /// Sends a call; `false` if the stream is gone or too many calls wait. In the latter case the
+    /// stream is ended, so that its client reconnects.
     pub(super) fn call(&self, call: Call) -> bool {
         let sent = self.calls.try_send((self.handle, call)).is_ok();
         if !sent {
@@ -370,8 +370,8 @@ impl TournamentHandle {
         read(&self.committed().core)
     }
 
-    /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just before
-    /// the server ended.
+    /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just
+    /// before the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
         let placed: Vec<Id> = (self.committed().placed.values())
             .map(|(room, _)| *room)

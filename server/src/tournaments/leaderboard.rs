@@ -1,7 +1,7 @@
-//! The ratings of all participants of rated games on this server, computed from the summaries of its
-//! games. They are recomputed on request if games have ended since, as often as [`LEADERBOARD_AGE`]
-//! and [`LEADERBOARD_SHARE`] allow: all summaries are read each time, because ratings follow the order
-//! in which games ended, which is not the order of the store.
+//! The ratings of all participants of rated games on this server, computed from the summaries of
+//! its games. They are recomputed on request if games have ended since, as often as
+//! [`LEADERBOARD_AGE`] and [`LEADERBOARD_SHARE`] allow: all summaries are read each time, because
+//! ratings follow the order in which games ended, which is not the order of the store.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -113,8 +113,8 @@ impl Tournaments {
                 None => created.await,
             }
         };
-        // Runs to completion even if the caller is cancelled: a half-created tournament would be stored and
-        // restored with the server.
+        // Runs to completion even if the caller is cancelled: a half-created tournament would be
+        // stored and restored with the server.
         let making = self
             .tracker
             .spawn(reservation.make(name.to_owned(), plan, core));
@@ -123,8 +123,8 @@ impl Tournaments {
             .map_err(|error| StoreError::Failed(format!("creating a tournament failed: {error}")))?
     }
 
-    /// Resumes the tournaments of the store and returns how many are not over. The rooms must be restored
-    /// already.
+    /// Resumes the tournaments of the store and returns how many are not over. The rooms must be
+    /// restored already.
     ///
     /// # Errors
     /// The store failed.
@@ -150,7 +150,8 @@ impl Tournaments {
         Ok(unfinished)
     }
 
-    /// Stops calling and counting games; those that end from here on count when the server is restarted.
+    /// Stops calling and counting games; those that end from here on count when the server is
+    /// restarted.
     pub fn stop(&self) {
         self.stop.no_more_games.cancel();
     }
@@ -181,8 +182,8 @@ impl Tournaments {
         all.iter().any(announces)
     }
 
-    /// The newest `count` tournaments in this state, or in any; only those created before number `before`,
-    /// if set. With their numbers, newest first.
+    /// The newest `count` tournaments in this state, or in any; only those created before number
+    /// `before`, if set. With their numbers, newest first.
     pub fn newest(
         &self,
         before: Option<u64>,
@@ -292,8 +293,8 @@ impl Drop for Reservation {
     }
 }
 
-/// The built-in participants of a tournament, named after their agents, numbered if there are several
-/// of one.
+/// The built-in participants of a tournament, named after their agents, numbered if there are
+/// several of one.
 fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
     let mut entrants: Vec<Entrant> = Vec::new();
     for kind in &plan.built_in {

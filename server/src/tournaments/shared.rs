@@ -1,5 +1,5 @@
-//! Shares an expensive computation among concurrent callers. It runs to completion even if all callers
-//! are cancelled. Users decide what is computed and how long it stays valid.
+//! Shares an expensive computation among concurrent callers. It runs to completion even if all
+//! callers are cancelled. Users decide what is computed and how long it stays valid.
 
 use std::sync::Arc;
 
@@ -33,9 +33,9 @@ pub struct AsOf<M> {
     pub message: M,
 }
 
-/// The state of a tournament as far as it can be read at once. The number of the last change follows
-/// a moment after the change; a client that knows that a tournament has started or is over must not
-/// see an earlier state.
+/// The state of a tournament as far as it can be read at once. The number of the last change
+/// follows a moment after the change; a client that knows that a tournament has started or is over
+/// must not see an earlier state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Mark {
     pub(super) change: u64,
@@ -56,8 +56,8 @@ impl<T> Default for Shared<T> {
 }
 
 impl<T: Send + Sync + 'static> Shared<T> {
-    /// Returns the last value if it is still `valid`, else computes it with `work`. Concurrent callers
-    /// wait for that value and use it if it is valid for them.
+    /// Returns the last value if it is still `valid`, else computes it with `work`. Concurrent
+    /// callers wait for that value and use it if it is valid for them.
     pub(super) async fn get(
         &self,
         is_current: impl FnOnce(&T) -> bool,

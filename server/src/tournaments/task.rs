@@ -1,5 +1,5 @@
-//! The task of one tournament: receives messages, lets the core decide what follows, commits it, and
-//! only then acts on it. `games` acts on games and their rooms.
+//! The task of one tournament: receives messages, lets the core decide what follows, commits it,
+//! and only then acts on it. `games` acts on games and their rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -299,8 +299,8 @@ impl Task {
         }
     }
 
-    /// Computes and commits everything that follows now. With `no_more_games` only pending entries are
-    /// committed.
+    /// Computes and commits everything that follows now. With `no_more_games` only pending entries
+    /// are committed.
     async fn settle(&mut self, no_more_games: bool) -> Result<(), StoreError> {
         loop {
             if !no_more_games {

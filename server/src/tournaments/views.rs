@@ -1,6 +1,6 @@
-//! The public views of a tournament that are expensive to compute: updates for followers, and results.
-//! Both are computed on a copy, on blocking threads, once for each change, however often they are
-//! requested.
+//! The public views of a tournament that are expensive to compute: updates for followers, and
+//! results. Both are computed on a copy, on blocking threads, once for each change, however often
+//! they are requested.
 
 use std::sync::Arc;
 
@@ -108,8 +108,8 @@ impl TournamentHandle {
 }
 
 /// The games in updates for followers, in order: the running games of a round robin, else the games
-/// of the round. If there are more than [`MAX_GAMES_FOLLOWED`], running games come first, then ended
-/// ones, the last before the first, then games that are due.
+/// of the round. If there are more than [`MAX_GAMES_FOLLOWED`], running games come first, then
+/// ended ones, the last before the first, then games that are due.
 fn followed(core: &Tournament) -> Vec<usize> {
     let (games, round) = (core.games(), core.round());
     let by_rounds = core.settings().format != Format::RoundRobin;

@@ -1,5 +1,5 @@
-//! Answers a browser: with the file named by the path, else with the document, which knows all pages.
-//! Sets the headers for caching and content security.
+//! Answers a browser: with the file named by the path, else with the document, which knows all
+//! pages. Sets the headers for caching and content security.
 
 use bytes::Bytes;
 use http::{HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};

@@ -1,6 +1,6 @@
-//! The page for people: serves the built browser client (`clients/web`) on the port of gRPC. All gRPC
-//! calls are POST, so every GET is for the page. A release embeds the files; a debug build reads them
-//! on each request, so that the page can be edited while a server runs.
+//! The page for people: serves the built browser client (`clients/web`) on the port of gRPC. All
+//! gRPC calls are POST, so every GET is for the page. A release embeds the files; a debug build
+//! reads them on each request, so that the page can be edited while a server runs.
 //! `clients/web/vite.config.ts` decides which files there are.
 
 mod answer;

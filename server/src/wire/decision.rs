@@ -1,5 +1,6 @@
 //! Encodes decision requests directly from the engine's values. They are the most frequent message;
-//! this avoids building a message tree for each. A test compares the bytes with the encoded message.
+//! this avoids building a message tree for each. A test compares the bytes with the encoded
+//! message.
 
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! Tests of redaction: two games that differ only in cards hidden from a viewer, played by the same
-//! decisions under the same clock, must send this viewer the same bytes. A deliberate leak is detected
-//! by the same comparison.
+//! decisions under the same clock, must send this viewer the same bytes. A deliberate leak is
+//! detected by the same comparison.
 
 use std::sync::Arc;
 use std::time::Duration;

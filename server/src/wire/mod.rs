@@ -1,6 +1,7 @@
-//! The bodies of streamed responses, encoded when events happen. Public events are encoded once for all
-//! seats and spectators. A body is a sequence of bytes: `PlayResponse` and `PlayServiceWatchResponse`
-//! have their updates in field 1, `SpectatorServiceWatchResponse` has its events.
+//! The bodies of streamed responses, encoded when events happen. Public events are encoded once for
+//! all seats and spectators. A body is a sequence of bytes: `PlayResponse` and
+//! `PlayServiceWatchResponse` have their updates in field 1, `SpectatorServiceWatchResponse` has
+//! its events.
 
 mod decision;
 #[cfg(test)]

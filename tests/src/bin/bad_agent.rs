@@ -1,6 +1,6 @@
-//! An agent that plays well except for one fault, given by name: the examiner must find it. `bad_agent
-//! none ADDRESS CODE` plays without a fault; a further argument makes it play in a tournament. It uses
-//! the protocol directly, because an SDK would prevent most of these faults.
+//! An agent that plays well except for one fault, given by name: the examiner must find it.
+//! `bad_agent none ADDRESS CODE` plays without a fault; a further argument makes it play in a
+//! tournament. It uses the protocol directly, because an SDK would prevent most of these faults.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;

@@ -7,7 +7,8 @@ use chefshat_tests::{
     room_of_four,
 };
 
-/// Attaches all seats; returns the seat with the first open decision, that decision, and the others.
+/// Attaches all seats; returns the seat with the first open decision, that decision, and the
+/// others.
 async fn first_to_act(
     server: &TestServer,
     policy: v1::RoomPolicy,

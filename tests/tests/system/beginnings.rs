@@ -38,8 +38,8 @@ async fn a_game_starts_with_given_hands() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = original(&client).await;
-    // The hands of the second Shift start another game: once as its first Shift, once as a later one with
-    // roles and points.
+    // The hands of the second Shift start another game: once as its first Shift, once as a later
+    // one with roles and points.
     let dealt = first
         .deals_and_results()
         .into_iter()

@@ -1,6 +1,6 @@
 //! A realistic tournament of sixteen: agents in three languages and their own processes, one that
-//! crashes, one that is silent, one that floods, one that never joins its games; and a server that is
-//! killed twice in the middle.
+//! crashes, one that is silent, one that floods, one that never joins its games; and a server that
+//! is killed twice in the middle.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! Failing disks and databases under the real binary: nothing uncommitted is acknowledged, the server
-//! exits with advice, and once the fault is gone every game resumes. `restarts` tests crashes without
-//! failing disks.
+//! Failing disks and databases under the real binary: nothing uncommitted is acknowledged, the
+//! server exits with advice, and once the fault is gone every game resumes. `restarts` tests
+//! crashes without failing disks.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -95,8 +95,8 @@ async fn assert_continues(
     }
 }
 
-/// Checks that every game finished, every record is valid and contains every acknowledged decision, and
-/// no agent timed out. Returns the number of decisions.
+/// Checks that every game finished, every record is valid and contains every acknowledged decision,
+/// and no agent timed out. Returns the number of decisions.
 async fn assert_committed(client: &Client, ledger: &Ledger, games: &[String]) -> usize {
     let mut acknowledged = 0;
     for game in games {
@@ -137,7 +137,8 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
     patiently("decisions", busy_rooms.ledger.reaches(50)).await;
     disk.fill("filler");
     assert_failed(&server.ended().await, "the disk is full: free some space");
-    // A restart while the disk is full fails again: at once, or a little later when its space runs out.
+    // A restart while the disk is full fails again: at once, or a little later when its space runs
+    // out.
     let ended = match launch.start().await {
         Ok(server) => server.ended().await,
         Err(ended) => ended,
@@ -273,7 +274,8 @@ async fn a_disk_that_fails_to_sync_ends_the_server_and_loses_nothing() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let log = folder.path().join("strace.log");
-    // Once some games are running, syncs fail. The tracer is a separate process: the server stays our child.
+    // Once some games are running, syncs fail. The tracer is a separate process: the server stays
+    // our child.
     let strace = [
         "strace".as_ref(),
         "-D".as_ref(),

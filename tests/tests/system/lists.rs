@@ -1,5 +1,5 @@
-//! The lists of rooms and of tournaments: newest first, page by page, by state; items created during
-//! paging do not appear. `records` tests the list of records.
+//! The lists of rooms and of tournaments: newest first, page by page, by state; items created
+//! during paging do not appear. `records` tests the list of records.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};

@@ -147,8 +147,8 @@ pub(crate) async fn original(client: &Client) -> EndedGame {
     ended(client, request).await
 }
 
-/// Points worth branching at: the start, within an exchange, in the middle of a Shift, right after a
-/// Shift, the last decision.
+/// Points worth branching at: the start, within an exchange, in the middle of a Shift, right after
+/// a Shift, the last decision.
 pub(crate) fn points(game: &EndedGame) -> [usize; 5] {
     let positions = game.positions();
     let find = |is: &dyn Fn(&Game) -> bool| {

@@ -1,5 +1,5 @@
-//! Records of finished games: listed, read, streamed, and copied from one server to another, with both
-//! stores.
+//! Records of finished games: listed, read, streamed, and copied from one server to another, with
+//! both stores.
 
 use std::sync::Arc;
 use std::time::Duration;

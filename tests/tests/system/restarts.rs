@@ -31,8 +31,8 @@ fn shifts(count: u32) -> v1::RuleSet {
     }
 }
 
-/// Eight rooms of all kinds: long and short games, shared and separate streams, events at once and with
-/// decisions, with built-in agents.
+/// Eight rooms of all kinds: long and short games, shared and separate streams, events at once and
+/// with decisions, with built-in agents.
 fn eight_rooms() -> Vec<RoomKind> {
     let mut kinds: Vec<RoomKind> = (0..8)
         .map(|number| RoomKind {
@@ -241,7 +241,8 @@ async fn a_stop_suspends_durable_games_and_aborts_the_others() {
 #[tokio::test(flavor = "multi_thread")]
 async fn waiting_agents_return_after_a_stop_and_are_not_refused_during_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // The stop takes long enough for the agents to retry meanwhile: a game without clients delays it.
+    // The stop takes long enough for the agents to retry meanwhile: a game without clients delays
+    // it.
     let mut launch = Launch::new(folder.path()).with("--grace", 2);
     let server = launch.start().await.expect("the server starts");
     let client = connect(&launch).await;

@@ -109,7 +109,8 @@ async fn a_client_that_does_not_read_cannot_delay_a_shutdown() {
         ..v1::RuleSet::default()
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
-    // It answers pings but never reads its stream: data fills its window and then the server's outbox.
+    // It answers pings but never reads its stream: data fills its window and then the server's
+    // outbox.
     let room_id = created.room.expect("a room").room_id;
     let not_reading = narrow_spectator(&server, room_id).await;
     play_out(&server, tickets).await;

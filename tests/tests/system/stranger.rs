@@ -127,7 +127,8 @@ async fn no_bytes_harm_a_server_or_a_game() {
             let path = http::uri::PathAndQuery::from_static(path);
             match grpc.streaming(request, path, Raw).await {
                 Ok(mut response) => {
-                    // One message or the end: only that it arrives matters, not what it says. Watch has no end.
+                    // One message or the end: only that it arrives matters, not what it says. Watch
+                    // has no end.
                     if chefshat_tests::patiently("an answer", response.get_mut().message())
                         .await
                         .is_err()

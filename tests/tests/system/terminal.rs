@@ -103,7 +103,8 @@ async fn a_game_continues_when_the_server_returns_and_is_watched() {
     server.stop().await;
 }
 
-/// A room for one person and three built-in agents, without time pressure: its join code and its id.
+/// A room for one person and three built-in agents, without time pressure: its join code and its
+/// id.
 async fn room(client: &Client) -> (String, String) {
     use v1::seat_config::FilledBy::{BuiltInAgent, ReservedFor};
     let person = ReservedFor(v1::ParticipantKind::Human.into());
@@ -151,8 +152,8 @@ async fn leaving_restores_the_terminal() {
     terminated.ended(1).await;
 }
 
-/// Joins a tournament of built-in agents by its code, leaves in the middle, and resumes with the ticket,
-/// through a restart of the server, to the end.
+/// Joins a tournament of built-in agents by its code, leaves in the middle, and resumes with the
+/// ticket, through a restart of the server, to the end.
 #[tokio::test]
 async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     let data = TempDir::new().expect("a temporary folder");
@@ -200,8 +201,8 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     server.stop().await;
 }
 
-/// A tournament of three rounds for one person and three built-in agents, without time pressure: its
-/// join code and its id.
+/// A tournament of three rounds for one person and three built-in agents, without time pressure:
+/// its join code and its id.
 async fn tournament(client: &Client) -> (String, String) {
     let made = client
         .create_tournament(v1::TournamentSettings {

@@ -17,8 +17,8 @@ pub(crate) struct Terminal {
 }
 
 impl Terminal {
-    /// Starts the program in a terminal of 80 columns and 24 rows; without tmux reports that and returns
-    /// `None`.
+    /// Starts the program in a terminal of 80 columns and 24 rows; without tmux reports that and
+    /// returns `None`.
     pub(crate) fn start(test: &str, arguments: &[&str]) -> Option<Self> {
         let there = Command::new("tmux")
             .arg("-V")

@@ -1,5 +1,5 @@
-//! Agents of the Rust SDK in tournaments: several games at a time, an outcome for each game, and lost
-//! connections in mid-game.
+//! Agents of the Rust SDK in tournaments: several games at a time, an outcome for each game, and
+//! lost connections in mid-game.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -150,7 +150,8 @@ impl Proxy {
     }
 }
 
-/// An agent whose connection is cut before every fifth decision of a game; it checks what it receives.
+/// An agent whose connection is cut before every fifth decision of a game; it checks what it
+/// receives.
 struct Cutting {
     proxy: Proxy,
     cuts: Arc<AtomicUsize>,

@@ -1,5 +1,5 @@
-//! Deals that others still play: nothing that could reveal them is published before the last game with
-//! the deal has ended, and everything afterwards.
+//! Deals that others still play: nothing that could reveal them is published before the last game
+//! with the deal has ended, and everything afterwards.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,5 @@
-//! Invalid settings and forbidden actions of tournaments: refused with a reason and the field at fault.
+//! Invalid settings and forbidden actions of tournaments: refused with a reason and the field at
+//! fault.
 
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
 use chefshat_tests::TestServer;

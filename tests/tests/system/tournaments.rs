@@ -1,5 +1,5 @@
-//! Tournaments from the view of participants, over real connections: seated by the server, placed last
-//! if absent. `tournament_deals` tests withheld deals, `tournament_refusals` refusals.
+//! Tournaments from the view of participants, over real connections: seated by the server, placed
+//! last if absent. `tournament_deals` tests withheld deals, `tournament_refusals` refusals.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;

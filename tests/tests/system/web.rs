@@ -1,5 +1,5 @@
-//! Browsers: the page and gRPC-web on the same port, over HTTP/1.1, with one stream for watching and
-//! single calls for acting; and tools: reflection. clients/web tests the page itself.
+//! Browsers: the page and gRPC-web on the same port, over HTTP/1.1, with one stream for watching
+//! and single calls for acting; and tools: reflection. clients/web tests the page itself.
 
 use std::collections::VecDeque;
 

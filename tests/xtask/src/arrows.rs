@@ -1,6 +1,6 @@
-//! Allowed dependencies between the crates of the workspace. Cargo refuses circles between crates; this
-//! check refuses every dependency that is not in the table below, so that no lower crate starts to
-//! depend on a higher one.
+//! Allowed dependencies between the crates of the workspace. Cargo refuses circles between crates;
+//! this check refuses every dependency that is not in the table below, so that no lower crate
+//! starts to depend on a higher one.
 
 use std::collections::BTreeMap;
 
@@ -10,11 +10,12 @@ use crate::command::{self, cargo};
 use crate::failure::Failure;
 use crate::places::Places;
 
-/// For each crate, the crates of the workspace that it may depend on. ARCHITECTURE.md explains the map.
+/// For each crate, the crates of the workspace that it may depend on. ARCHITECTURE.md explains the
+/// map.
 ///
-/// Two arrows go beyond the map: `chefshat-tournament` depends on `chefshat-agents` (for `AgentKind`,
-/// because built-in agents are fillers), and `chefshat-simulation` on `chefshat-tournament` (it plays
-/// complete tournaments offline).
+/// Two arrows go beyond the map: `chefshat-tournament` depends on `chefshat-agents` (for
+/// `AgentKind`, because built-in agents are fillers), and `chefshat-simulation` on
+/// `chefshat-tournament` (it plays complete tournaments offline).
 const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-engine", &[]),
     ("chefshat-proto", &[]),
@@ -76,7 +77,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-/// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its test features, itself.
+/// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its test features,
+/// itself.
 const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[];
 
 /// Refuses dependencies between crates of the workspace that the tables do not allow.

@@ -4,8 +4,8 @@
 //! - Every path that starts with `crate`, `self`, `super`, a child module or an imported name counts, in
 //!   `use` and elsewhere, macro arguments included.
 //! - Re-exports are followed: `crate::Item` is a dependency on the file that defines `Item`, not on the
-//!   `lib.rs` that re-exports it. Likewise a module in a path is not a dependency: `use super::child`
-//!   counts where `child::Item` is used.
+//! `lib.rs` that re-exports it. Likewise a module in a path is not a dependency: `use super::child`
+//! counts where `child::Item` is used.
 //! - So a `mod.rs` or `lib.rs` that declares and re-exports its children does not depend on them, unless
 //!   its own code uses one of the names.
 //! - Code under `#[cfg(test)]` and attributes, including doc comments, do not count; nor do methods and
@@ -191,7 +191,8 @@ impl Files {
         }
     }
 
-    /// Like [`Files::find`]; an unknown name counts as an item of the module, because macros define items too.
+    /// Like [`Files::find`]; an unknown name counts as an item of the module, because macros define
+    /// items too.
     fn walk(&self, module: usize, path: &[String], hops: usize) -> Option<Target> {
         if path.is_empty() {
             return Some(Target::Module(module));

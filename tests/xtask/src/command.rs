@@ -11,8 +11,8 @@ pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// A module run by the Python package's interpreter, in the package's folder, with all caches in the
-/// build folder.
+/// A module run by the Python package's interpreter, in the package's folder, with all caches in
+/// the build folder.
 pub(crate) fn python_command(places: &Places, module: &str) -> Command {
     let mut command = with_environment(places, Command::new(places.python()));
     command

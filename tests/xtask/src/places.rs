@@ -72,8 +72,8 @@ impl Places {
         self.web_package().join("package-lock.json").exists()
     }
 
-    /// Where the server expects the built page: the only place in the source tree that is written to; Git
-    /// ignores it.
+    /// Where the server expects the built page: the only place in the source tree that is written
+    /// to; Git ignores it.
     pub(crate) fn web_dist(&self) -> PathBuf {
         self.web_package().join("dist")
     }

@@ -1,6 +1,6 @@
 //! Prepares what the steps need: virtual environments, node modules, checkers, Debian packages.
-//! Everything is created inside the build folder and recreated only when its sources have changed; a
-//! Debian package is installed only if it is missing.
+//! Everything is created inside the build folder and recreated only when its sources have changed;
+//! a Debian package is installed only if it is missing.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -26,7 +26,8 @@ pub(crate) fn python_package(places: &Places) -> Result<(), Failure> {
     let project = package.join("pyproject.toml");
     let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
     let editable = format!("{}[dev]", package.display());
-    // The path counts too: clones may share a build folder, and the package runs from its source folder.
+    // The path counts too: clones may share a build folder, and the package runs from its source
+    // folder.
     let made_from = format!("{editable}\n{text}");
     venv(&places.venv(), &made_from, &["--editable", &editable])
 }
@@ -47,8 +48,8 @@ pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
     npm_package(&places.node_package(), &places.node())
 }
 
-/// The page for people, with its modules, in a folder in which the rest of the source tree is where the
-/// page expects it.
+/// The page for people, with its modules, in a folder in which the rest of the source tree is where
+/// the page expects it.
 pub(crate) fn web_package(places: &Places) -> Result<(), Failure> {
     let tree = places.web_tree();
     fs::create_dir_all(&tree).map_err(|error| at(&tree, &error))?;
@@ -132,7 +133,8 @@ pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
             return Ok(Command::new(program));
         }
     }
-    // An unoptimised build takes a fraction of the time and still checks our few hundred crates in seconds.
+    // An unoptimised build takes a fraction of the time and still checks our few hundred crates in
+    // seconds.
     let build = places.cargo_tools().join("build");
     let mut install = cargo();
     install.args([
@@ -192,8 +194,8 @@ fn debian_package(name: &str) -> Result<(), Failure> {
     ]))
 }
 
-/// Makes `copy` equal to `source`, except for the modules: those of `copy` stay, those of `source` are
-/// skipped.
+/// Makes `copy` equal to `source`, except for the modules: those of `copy` stay, those of `source`
+/// are skipped.
 fn copy_package(source: &Path, copy: &Path) -> std::io::Result<()> {
     fs::create_dir_all(copy)?;
     for entry in fs::read_dir(copy)? {

@@ -45,8 +45,8 @@ pub(crate) fn run(
     if has_web && (wants(Language::Rust) || wants(Language::Web)) {
         web::run(places, steps)?;
     }
-    // Libraries, programs and tests together: otherwise hundreds of crates would be built twice, with the
-    // features of the server and with those of its tests.
+    // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
+    // with the features of the server and with those of its tests.
     let build = [
         "build",
         "--workspace",

@@ -47,8 +47,8 @@ fn npm(places: &Places) -> Command {
     command
 }
 
-/// Makes `copy` contain the files of `source`. Unchanged files are not touched, so that Cargo rebuilds
-/// nothing for them; hidden files belong to the source tree.
+/// Makes `copy` contain the files of `source`. Unchanged files are not touched, so that Cargo
+/// rebuilds nothing for them; hidden files belong to the source tree.
 fn follow(source: &Path, copy: &Path) -> std::io::Result<()> {
     fs::create_dir_all(copy)?;
     for entry in fs::read_dir(copy)? {

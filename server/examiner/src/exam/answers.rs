@@ -328,7 +328,8 @@ impl Exam {
                 }
                 decision.state = DecisionState::Closed;
                 if tampered {
-                    // Decisions requested before this result may be answered without having read it.
+                    // Decisions requested before this result may be answered without having read
+                    // it.
                     seen.read_after = seen.newest();
                     self.demand(
                         Fault::StoppedAfterClosed,

@@ -1,4 +1,5 @@
-//! From joining to leaving: seats, streams, the end of the game and of the process, and time limits.
+//! From joining to leaving: seats, streams, the end of the game and of the process, and time
+//! limits.
 
 use std::collections::BTreeSet;
 use std::process::ExitStatus;

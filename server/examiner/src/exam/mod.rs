@@ -1,7 +1,7 @@
 //! A case in progress: every message between the agent and the server passes through here, and is
-//! recorded, judged and sometimes changed. It is synchronous, without IO and with a clock passed in, so
-//! that every sequence of events can be tested as data. `relay` carries the messages, `seats` holds
-//! what is known of each seat and decision.
+//! recorded, judged and sometimes changed. It is synchronous, without IO and with a clock passed
+//! in, so that every sequence of events can be tested as data. `relay` carries the messages,
+//! `seats` holds what is known of each seat and decision.
 
 mod answers;
 mod life;

@@ -240,7 +240,8 @@ fn a_seat_that_attaches_again_plays_for_itself() {
     while table.open().0 != seat {
         table.play_one();
     }
-    // The substitute waits for its pace; the agent returns first and gets the decision with a new clock.
+    // The substitute waits for its pace; the agent returns first and gets the decision with a new
+    // clock.
     table.pass_time(ms(300));
     table.attach(seat);
     assert_eq!(table.open().0, seat);

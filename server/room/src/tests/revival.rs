@@ -1,5 +1,5 @@
-//! Restarts of the server: the game resumes where its journal ended, clients get time to return, and
-//! built-in agents decide as they would have done without the restart.
+//! Restarts of the server: the game resumes where its journal ended, clients get time to return,
+//! and built-in agents decide as they would have done without the restart.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -233,7 +233,8 @@ fn a_freed_seat_has_no_state_of_its_former_participant() {
     for _ in &seats {
         table.join(ParticipantKind::Agent).expect("a seat is free");
     }
-    // The first is never attached, the second loses its connection, the third is attached; they leave.
+    // The first is never attached, the second loses its connection, the third is attached; they
+    // leave.
     let connection = table.attach(seats[1]);
     table.lost(seats[1], connection);
     table.attach(seats[2]);

@@ -1,5 +1,5 @@
-//! Random inputs in random order: no panic, no unchecked change, and a journal that replays to the same
-//! room.
+//! Random inputs in random order: no panic, no unchecked change, and a journal that replays to the
+//! same room.
 
 use chefshat_agents::AgentKind;
 use proptest::prelude::*;

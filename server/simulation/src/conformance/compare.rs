@@ -1,5 +1,5 @@
-//! Compares the expectations of a vector with the engine's results. `game` and `deal` decide what is
-//! compared.
+//! Compares the expectations of a vector with the engine's results. `game` and `deal` decide what
+//! is compared.
 
 use serde::Serialize;
 use serde_json::Value;

@@ -8,7 +8,8 @@ use tokio::sync::Semaphore;
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::store::StoreError;
 
-/// Most lines or entries that are processed in place: moving them to another thread would take longer.
+/// Most lines or entries that are processed in place: moving them to another thread would take
+/// longer.
 const FEW_PIECES: usize = 64;
 
 /// Runs work on blocking threads, at most [`MAX_CONCURRENT_RECORDS`] pieces at a time.
@@ -20,8 +21,8 @@ impl Codec {
         Self(Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)))
     }
 
-    /// Runs `work`, which encodes or decodes `pieces` lines or entries. A few run in place. The work
-    /// holds its permit even if the caller is cancelled.
+    /// Runs `work`, which encodes or decodes `pieces` lines or entries. A few run in place. The
+    /// work holds its permit even if the caller is cancelled.
     pub(super) async fn run<T: Send + 'static>(
         &self,
         pieces: usize,

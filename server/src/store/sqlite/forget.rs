@@ -20,7 +20,8 @@ use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry};
 
-/// The database of a data directory while a participant is removed. No server has it open meanwhile.
+/// The database of a data directory while a participant is removed. No server has it open
+/// meanwhile.
 pub struct Forgetting(Opened);
 
 /// What was removed from the database.
@@ -125,8 +126,8 @@ impl Forgetting {
         Ok(name)
     }
 
-    /// The names of the participants who sat down in a hosted game, in order, whether they stayed or
-    /// not; empty if the game is unknown.
+    /// The names of the participants who sat down in a hosted game, in order, whether they stayed
+    /// or not; empty if the game is unknown.
     ///
     /// # Errors
     /// The database failed, or the game's journal cannot be read.
@@ -151,8 +152,9 @@ impl Forgetting {
         Ok(names)
     }
 
-    /// Marks the records as written and compacts the database, so that unused pages and the write-ahead
-    /// log contain nothing of the participant. This needs as much free disk space as the database has.
+    /// Marks the records as written and compacts the database, so that unused pages and the
+    /// write-ahead log contain nothing of the participant. This needs as much free disk space as
+    /// the database has.
     ///
     /// # Errors
     /// The database failed.
@@ -228,8 +230,8 @@ async fn forget_game(
     Ok(taken_out)
 }
 
-/// The rows of a game's journal, in order. They are decoded one by one with [`entries_of`], because a
-/// long decoded game is much larger.
+/// The rows of a game's journal, in order. They are decoded one by one with [`entries_of`], because
+/// a long decoded game is much larger.
 async fn journal_of(
     connection: &mut SqliteConnection,
     game: &SqliteRow,

@@ -1,5 +1,5 @@
-//! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer` write,
-//! `form` encodes; this file joins them into a store.
+//! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer`
+//! write, `form` encodes; this file joins them into a store.
 
 mod codec;
 mod errors;
@@ -38,8 +38,8 @@ use journals::{DurableJournal, EphemeralJournal, WriteQueue};
 use reader::Reader;
 use writer::{TournamentRow, WriteCommand};
 
-/// Disk space reserved for running games: new ones are refused when only this is left. On a small disk
-/// the reserve is a share of its size.
+/// Disk space reserved for running games: new ones are refused when only this is left. On a small
+/// disk the reserve is a share of its size.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
 const RESERVE_SHARE: u64 = 50;
 

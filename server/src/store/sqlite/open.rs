@@ -214,8 +214,8 @@ fn lock(data_dir: &Path) -> Result<File, OpenError> {
     }
 }
 
-/// Refuses a database of which only the write-ahead log is left: opening it would create an empty one
-/// and lose the log.
+/// Refuses a database of which only the write-ahead log is left: opening it would create an empty
+/// one and lose the log.
 fn check_log(path: &Path) -> Result<(), OpenError> {
     let length = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
     let log = path.with_extension("sqlite3-wal");
@@ -226,8 +226,8 @@ fn check_log(path: &Path) -> Result<(), OpenError> {
     Ok(())
 }
 
-/// Creates the database file, if it is missing, unreadable for other users: it contains the seeds of
-/// running games.
+/// Creates the database file, if it is missing, unreadable for other users: it contains the seeds
+/// of running games.
 fn make_private(path: &Path) -> Result<(), OpenError> {
     File::options()
         .create(true)

@@ -19,8 +19,8 @@ use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// Most ended games whose rooms are restored: the newest ones, because clients know the end of older
-/// ones.
+/// Most ended games whose rooms are restored: the newest ones, because clients know the end of
+/// older ones.
 const MAX_ENDED: i64 = 256;
 
 /// The query for a list of finished games, with the condition on their numbers and the order.
@@ -187,8 +187,8 @@ impl Reader {
         Ok(stored)
     }
 
-    /// The journals of all running games, by game number; the inner result says why one cannot be read.
-    /// Reads everything stored since the oldest of them was created.
+    /// The journals of all running games, by game number; the inner result says why one cannot be
+    /// read. Reads everything stored since the oldest of them was created.
     async fn running_journals(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
         let mut rows = sqlx::query(
             "SELECT row, position, entries, game FROM journal
@@ -209,8 +209,8 @@ impl Reader {
         Ok(journals)
     }
 
-    /// The journal of a finished game, found from its last row back to its first; the inner result says
-    /// why it cannot be read.
+    /// The journal of a finished game, found from its last row back to its first; the inner result
+    /// says why it cannot be read.
     async fn journal(
         &self,
         number: i64,

@@ -1,8 +1,8 @@
-//! The only writer of the database. Rooms send it commands and wait; it executes all waiting commands
-//! in one transaction, so that many rooms share one sync of the disk. While a transaction is synced,
-//! the next one gathers: no command waits for others to arrive. Most transactions are rows of the
-//! journal only; those are written by one call, because every call goes to the database's own thread
-//! and back.
+//! The only writer of the database. Rooms send it commands and wait; it executes all waiting
+//! commands in one transaction, so that many rooms share one sync of the disk. While a transaction
+//! is synced, the next one gathers: no command waits for others to arrive. Most transactions are
+//! rows of the journal only; those are written by one call, because every call goes to the
+//! database's own thread and back.
 
 use std::collections::BTreeMap;
 
@@ -24,8 +24,8 @@ use chefshat_room::ids::Id;
 pub(super) const QUEUE: usize = 1_024;
 /// Most commands in one transaction.
 const MAX_COMMANDS_PER_TRANSACTION: usize = 1_024;
-/// Numbers of rows that one statement inserts. There are only these, so that few statements need to be
-/// prepared.
+/// Numbers of rows that one statement inserts. There are only these, so that few statements need to
+/// be prepared.
 const ROWS: [usize; 5] = [1, 4, 16, 32, 64];
 
 /// A command to the writer.
@@ -190,7 +190,8 @@ async fn write(
     if !rows_alone {
         connection.execute("BEGIN IMMEDIATE").await?;
     }
-    // A game has at most one command at a time, so commands of different kinds may run in any order.
+    // A game has at most one command at a time, so commands of different kinds may run in any
+    // order.
     for (index, (order, _)) in pending.iter_mut().enumerate() {
         match order {
             WriteCommand::Append(row) => rows.push(row),

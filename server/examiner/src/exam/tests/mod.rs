@@ -1,5 +1,5 @@
-//! Sequences of events as data: messages of agent and server, and the faults found. The system tests
-//! run the cases against real agents.
+//! Sequences of events as data: messages of agent and server, and the faults found. The system
+//! tests run the cases against real agents.
 
 mod interferences;
 mod manners;

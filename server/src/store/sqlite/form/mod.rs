@@ -1,7 +1,7 @@
 //! The encoding of headers and journals in the database: separate protocol buffers, so that stored
-//! games do not depend on the engine's types or the protocol's messages. Fields are only ever added.
-//! Messages of the protocol that never change (rule sets, policies, annotations, expressions) are
-//! stored as they are.
+//! games do not depend on the engine's types or the protocol's messages. Fields are only ever
+//! added. Messages of the protocol that never change (rule sets, policies, annotations,
+//! expressions) are stored as they are.
 
 mod entry;
 mod header;
