@@ -1,6 +1,6 @@
 //! The folder of a dataset: written beside its target and moved into place when complete.
 //!
-//! The only thing it replaces is an earlier dataset. A folder with any other file is left unchanged.
+//! It replaces only an earlier dataset; a folder with any other file is left unchanged.
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};

@@ -4,8 +4,7 @@
 use crate::{ActionId, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
 
 /// An event of a game. Private content is in optional fields, which [`Event::seen_by`] removes.
-/// What others must not even know to have happened, such as a declined special action, is not an
-/// event. Large parts are boxed, so that the many small events stay small.
+/// Secret decisions, such as a declined special action, are not events. Large parts are boxed, so that the many small events stay small.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub enum Event {
     /// Cards were dealt.

@@ -9,18 +9,18 @@ impl RuleSetSpec {
 
     /// The preset of this name, or `None` if there is none.
     pub fn preset(name: &str) -> Option<RuleSetSpec> {
-        let standard = RuleSetSpec::default();
+        let default = RuleSetSpec::default();
         match name {
-            "paper" => Some(standard),
+            "paper" => Some(default),
             "rulebook" => Some(RuleSetSpec {
                 points: vec![3, 2, 1, 0],
-                ..standard
+                ..default
             }),
             "original2020" => Some(RuleSetSpec {
                 opening: Opening::AnyTopFace,
                 opening_pass: true,
                 pass_scope: PassScope::Turn,
-                ..standard
+                ..default
             }),
             _ => None,
         }

@@ -98,7 +98,7 @@ pub enum RuleSetError {
     },
     /// There is not one number of points for each place.
     #[error(
-        "{given} numbers of points for {players} players: give one for each place, or none for the standard ones"
+        "{given} numbers of points for {players} players: give one for each place, or none for the default points"
     )]
     PointsCount {
         /// Numbers given.
@@ -118,16 +118,16 @@ pub enum RuleSetError {
     #[error("the first place gets no points: give it at least 1")]
     PointsFirst,
     /// The target is 0 points.
-    #[error("a game to 0 points would never begin: choose at least 1")]
+    #[error("a target of 0 points: choose at least 1")]
     TargetPoints,
     /// The target is 0 Shifts.
-    #[error("a game of 0 Shifts would never begin: choose at least 1")]
+    #[error("a target of 0 Shifts: choose at least 1")]
     TargetShifts,
     /// `max_idle_pizzas` is 0.
-    #[error("max_idle_pizzas is 0: choose at least 1 (standard 3)")]
+    #[error("max_idle_pizzas is 0: choose at least 1 (default 3)")]
     MaxIdlePizzas,
     /// `max_turns` is 0.
-    #[error("max_turns is 0: choose at least 1 (standard 10000)")]
+    #[error("max_turns is 0: choose at least 1 (default 10000)")]
     MaxTurns,
 }
 
@@ -209,7 +209,7 @@ impl RuleSetSpec {
     /// The points by place, padded with zeros.
     fn checked_points(&self) -> Result<[u32; MAX_SEATS], RuleSetError> {
         let given = if self.points.is_empty() {
-            standard_points(self.players)
+            default_points(self.players)
         } else {
             &self.points
         };
@@ -232,7 +232,7 @@ impl RuleSetSpec {
 }
 
 /// The default points by place for a valid number of players (§5.1).
-fn standard_points(players: u8) -> &'static [u32] {
+fn default_points(players: u8) -> &'static [u32] {
     match players {
         2 => &[5, 0],
         3 => &[5, 3, 0],

@@ -1,10 +1,10 @@
-//! A deal that can be checked: what a server commits to before anybody is asked for anything, and
-//! what game seed follows from it.
+//! Where a game's seed comes from. A server commits to its part before the seats add theirs, so that
+//! anyone can check afterwards that neither chose the deals.
 
 use crate::Seed;
 use sha2::{Digest as _, Sha256};
 
-/// Most bytes a seat may add to the game seed.
+/// The most bytes that a seat may add to the game seed.
 pub const MAX_ENTROPY: usize = 32;
 
 /// Where a game's seed comes from.
@@ -14,7 +14,7 @@ pub enum SeedPlan {
     Committed {
         /// The server's part.
         server_seed: [u8; 32],
-        /// What keeps the commitment from being guessed.
+        /// Keeps the commitment from being guessed.
         nonce: [u8; 32],
     },
     /// The room's creator fixed the game seed.
@@ -25,7 +25,7 @@ pub enum SeedPlan {
 }
 
 impl SeedPlan {
-    /// SHA-256("chefshat.v1 seed" ‖ game id ‖ nonce ‖ server seed); `None` when the seed is fixed.
+    /// SHA-256("chefshat.v1 seed" ‖ game id ‖ nonce ‖ server seed); `None` if the seed is fixed.
     pub fn commitment(&self, game_id: &[u8; 16]) -> Option<[u8; 32]> {
         match self {
             Self::Committed { server_seed, nonce } => Some(
@@ -41,10 +41,11 @@ impl SeedPlan {
         }
     }
 
-    /// The game seed: SHA-256("chefshat.v1 game" ‖ server seed ‖ each seat's bytes, each after its length in one byte, in seat order).
+    /// The game seed: SHA-256("chefshat.v1 game" ‖ server seed ‖ for each seat in order the length of
+    /// its bytes in one byte, and the bytes).
     ///
     /// # Panics
-    /// When a seat's bytes are more than [`MAX_ENTROPY`]: they are checked where they enter.
+    /// If a seat adds more than [`MAX_ENTROPY`] bytes.
     pub fn game_seed<B: AsRef<[u8]>>(&self, entropy: &[B]) -> Seed {
         match self {
             Self::Committed { server_seed, .. } => {

@@ -36,7 +36,7 @@ impl AtomicFile {
         let file = tempfile::Builder::new()
             .prefix(&prefix)
             .suffix(".part")
-            // By the standard library, so that its permissions are those of any new file.
+            // Created by the standard library, with the permissions of any new file.
             .make_in(folder_of(path), |part| File::create_new(part))
             .map_err(|source| WriteError {
                 path: path.to_path_buf(),

@@ -130,7 +130,7 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
         taken_over: seeds.parts(&collector.actions),
         later_deals,
     };
-    // With decisions missing, an imported game leads elsewhere.
+    // Without its missing decisions, an imported game continues differently.
     let any = Seed([0; 32]);
     let same = collector.at_point.is_some_and(|mut game| {
         game.reseed(any);

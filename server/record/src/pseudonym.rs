@@ -190,7 +190,7 @@ mod tests {
     use crate::pseudonym::*;
 
     #[test]
-    fn a_name_is_found_in_the_name_of_a_room_where_it_is_a_word() {
+    fn a_name_is_replaced_in_room_names_only_as_a_word() {
         let pseudonym = Pseudonym {
             name: "Ana".into(),
             pseudonym: "X".into(),

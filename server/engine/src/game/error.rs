@@ -20,7 +20,7 @@ pub enum ActionError {
         size: u16,
     },
     /// The action belongs to another kind of decision.
-    #[error("`{attempted}` is no answer to {}", question(*kind))]
+    #[error("`{attempted}` does not fit the open decision: {}", choices(*kind))]
     WrongKind {
         /// The attempted action.
         attempted: Action,
@@ -43,11 +43,18 @@ impl ActionError {
     }
 }
 
-fn question(kind: DecisionKind) -> &'static str {
+fn choices(kind: DecisionKind) -> &'static str {
     match kind {
-        DecisionKind::Turn => "a turn: play or pass",
-        DecisionKind::Exchange => "the exchange: give a card",
-        DecisionKind::SpecialAction => "the offer of a special action: declare or decline",
+        DecisionKind::Turn => "play or pass",
+        DecisionKind::Exchange => "give a card",
+        DecisionKind::SpecialAction => "declare or decline the special action",
+    }
+}
+
+fn last_pizzas(count: u32) -> String {
+    match count {
+        1 => "the last pizza".to_owned(),
+        count => format!("the last {count} pizzas"),
     }
 }
 
@@ -64,7 +71,7 @@ pub enum Refusal {
         board: u8,
     },
     /// The play is smaller than the one on the board.
-    #[error("at least {board} cards must be played, as many as lie on the board")]
+    #[error("at least {board} cards must be played, the number on the board")]
     TooFewCards {
         /// Number of cards on the board.
         board: u8,
@@ -73,7 +80,7 @@ pub enum Refusal {
     #[error("a joker alone can only open a pizza")]
     JokerOnlyOpens,
     /// The Shift's first turn must play the Golden card.
-    #[error("the Shift's first turn must play the Golden card, so cards of face {0}")]
+    #[error("the Shift's first turn must play cards of face {0}, the Golden card among them")]
     MustPlayGolden(Face),
     /// The Shift's first turn must play the top face.
     #[error("the Shift's first turn must play cards of face {0}")]
@@ -82,6 +89,6 @@ pub enum Refusal {
     #[error("passing is not allowed on the Shift's first turn")]
     MayNotPassFirst,
     /// Too many consecutive pizzas ended without a play.
-    #[error("passing is not allowed here: the last {0} pizzas ended without a play")]
+    #[error("passing is not allowed here: {} ended without a play", last_pizzas(*.0))]
     MayNotPassIdle(u32),
 }

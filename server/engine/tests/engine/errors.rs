@@ -38,7 +38,7 @@ fn refused_turns() {
     let mut game = game(&three(), None);
     assert_eq!(
         refusal(&game, "C3;Q1;J0"),
-        "`C3;Q1;J0` is not legal: the Shift's first turn must play the Golden card, so cards of face 4"
+        "`C3;Q1;J0` is not legal: the Shift's first turn must play cards of face 4, the Golden card among them"
     );
     assert_eq!(
         refusal(&game, "pass"),
@@ -50,16 +50,16 @@ fn refused_turns() {
     );
     assert_eq!(
         refusal(&game, "give C4"),
-        "`give C4` is no answer to a turn: play or pass"
+        "`give C4` does not fit the open decision: play or pass"
     );
     assert_eq!(
         refusal(&game, "declare"),
-        "`declare` is no answer to a turn: play or pass"
+        "`declare` does not fit the open decision: play or pass"
     );
     act(&mut game, "C4;Q2;J0");
     assert_eq!(
         refusal(&game, "C1;Q1;J0"),
-        "`C1;Q1;J0` is not legal: at least 2 cards must be played, as many as lie on the board"
+        "`C1;Q1;J0` is not legal: at least 2 cards must be played, the number on the board"
     );
     assert_eq!(
         refusal(&game, "C0;Q0;J1"),
@@ -75,7 +75,7 @@ fn refused_turns() {
     }
     assert_eq!(
         refusal(&game, "pass"),
-        "`pass` is not legal: passing is not allowed here: the last 1 pizzas ended without a play"
+        "`pass` is not legal: passing is not allowed here: the last pizza ended without a play"
     );
     assert_eq!(
         refusal(&game, "C3;Q1;J2"),
@@ -119,12 +119,14 @@ fn refused_special_actions_and_gifts() {
     };
     let mut game =
         Game::scripted(spec.validate().unwrap(), Seed([0; 32]), &script, |_| {}).unwrap();
-    let question = "is no answer to the offer of a special action: declare or decline";
-    assert_eq!(refusal(&game, "pass"), format!("`pass` {question}"));
+    assert_eq!(
+        refusal(&game, "pass"),
+        "`pass` does not fit the open decision: declare or decline the special action"
+    );
     act(&mut game, "decline");
     assert_eq!(
         refusal(&game, "decline"),
-        "`decline` is no answer to the exchange: give a card"
+        "`decline` does not fit the open decision: give a card"
     );
     assert_eq!(
         refusal(&game, "give C1"),

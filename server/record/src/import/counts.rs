@@ -1,5 +1,4 @@
-//! Counts of cards by kind. Unlike the engine's `Cards` they can exceed a deck, as the facts stated of
-//! a real table may.
+//! Counts of cards by kind. Unlike the engine's `Cards` they can exceed a deck, as stated facts may.
 
 use chefshat_engine::{Action, Cards, Face};
 

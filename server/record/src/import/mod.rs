@@ -158,7 +158,7 @@ impl Importer {
             Entry::Hand(_) | Entry::Gives(None) => self.check_shift(row),
             Entry::Gives(Some((_, moves))) => {
                 self.check_shift(row)?;
-                // Forced gifts are no decisions.
+                // Forced gifts are not decisions.
                 if self.is_chooser(row.seat) {
                     let moves = moves.iter().map(|gift| (row.seat, *gift, row.took_us));
                     self.gifts.extend(moves);

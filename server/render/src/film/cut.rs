@@ -44,7 +44,7 @@ pub(super) fn chronicle_of(header: &v1::RecordHeader, viewer: Viewer) -> Option<
     ))
 }
 
-/// A film in the making.
+/// A film being made.
 pub(super) struct Cut {
     viewer: Viewer,
     chronicle: Option<Chronicle>,

@@ -27,7 +27,7 @@ fn impossible_rows_are_reported() {
         ("1,0,hand,1 3 3 4 G", "1,0,hand,1 2 3 4 G", 9, "of face 2 were dealt to or played by the seats together: 3, but the deck has 2"),
         ("1,0,hand,1 3 3 4 G", "1,0,holds,1 3 3 4 G", 7, "`what` is \"holds\""),
         ("1,0,hand,", "1,2,hand,", 7, "there is no seat 2"),
-        ("1,0,plays,4 G,4.5", "1,0,plays,3 3,4.5", 8, "must play the Golden card"),
+        ("1,0,plays,4 G,4.5", "1,0,plays,3 3,4.5", 8, "must play cards of face 4, the Golden card among them"),
         ("1,0,plays,4 G,4.5", "1,0,plays,4 3,4.5", 8, "a play must be cards of one face"),
         ("1,0,plays,4 G,4.5", "1,0,plays,J J,4.5", 8, "or a single one alone"),
         ("1,0,plays,4 G,4.5", "1,0,passes,,4.5", 8, "passing is not allowed on the Shift's first turn"),
@@ -91,7 +91,7 @@ fn facts_that_no_gifts_explain_are_refused() {
     #[rustfmt::skip] // One row each.
     let cases = [
         ("2,0,plays,G 15", "2,0,plays,1", 17, "too many cards of face 1 were dealt to or played by the seats together: 2, but the deck has 1"),
-        ("2,0,plays,G 15", "2,0,plays,14", 17, "must play the Golden card"),
+        ("2,0,plays,G 15", "2,0,plays,14", 17, "must play cards of face 15, the Golden card among them"),
         ("2,0,plays,G 15", "2,2,plays,G 15", 17, "seat 2 does not hold these cards"),
         ("8 8 9 9 9 9", "8 8 9 9 9 G", 17, "no seat can have been dealt the Golden card"),
         // The Dishwasher plays a card rarer than those it gave, and received none that rare.
