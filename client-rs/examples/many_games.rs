@@ -1,5 +1,5 @@
-//! Steps many games of its own in batches, as learning agents do: a program that plays any legal action on one seat of each, against three
-//! built-in agents, until 1,000 Shifts are over.
+//! Steps 256 games in batches, as learning agents do: plays a random legal action on one seat of
+//! each against three built-in agents, until 1,000 Shifts are over.
 //!
 //! `cargo run --release -p chefshat-client --example many_games -- [SERVER]`
 

@@ -1,10 +1,10 @@
-//! Makes a room and plays all of its seats over one stream, each with its own agent.
+//! Creates a room and plays all of its seats over one stream, each with its own agent.
 //!
 //! `cargo run -p chefshat-client --example many_seats -- [SERVER]`
 
 use chefshat_client::{ActionId, Agent, Client, RandomAgent, legal_actions, v1};
 
-/// Plays the first legal action: of the rarest face that goes, as few cards as possible.
+/// Takes the first legal action: the rarest playable face with the fewest cards.
 struct First;
 
 impl Agent for First {

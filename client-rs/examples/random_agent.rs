@@ -1,4 +1,5 @@
-//! Plays one game at random legal actions, on a seat taken with a join code, and prints the standings.
+//! Takes a seat with a join code, plays one game with random legal actions, and prints the
+//! standings.
 //!
 //! `cargo run -p chefshat-client --example random_agent -- JOIN-CODE [SERVER]`
 

@@ -1,4 +1,5 @@
-//! Takes part in a tournament with agents that play at random legal actions, a new one for each game, and prints how it stands in the end.
+//! Takes part in a tournament with a new random agent for each game, and prints the final
+//! standings.
 //!
 //! `cargo run -p chefshat-client --example tournament_agent -- JOIN-CODE [NAME] [SERVER]`
 

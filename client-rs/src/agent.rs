@@ -1,11 +1,12 @@
-//! What an agent is: one method that answers a decision, and hooks for what it may want to know besides. How its answers reach the
-//! server is not here (see `run`), nor how legal actions are read from a request (see `mask`).
+//! The trait of agents: one method that answers decisions, and optional hooks. `run` sends the
+//! answers; `mask` reads the legal actions of a request.
 
 use std::fmt;
 
 use crate::{Outcome, v1};
 
-/// The index of an action: of a bit in [`v1::DecisionRequest::action_mask`]. `Client::action_table` gives the text of each.
+/// The index of an action: of a bit in [`v1::DecisionRequest::action_mask`]. `Client::action_table`
+/// returns their texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ActionId(pub u32);
 
@@ -17,37 +18,41 @@ impl fmt::Display for ActionId {
 
 /// Plays one seat.
 ///
-/// The run loop calls every method on its own task, one at a time, in the order of the game: what a seat is told before a decision
-/// reaches `on_event` and `on_result` before `decide` is called for it.
+/// The run loop calls all methods on its own task, one at a time and in the order of the game:
+/// everything the seat received before a decision reaches `on_event` and `on_result` before
+/// `decide`.
 ///
-/// An agent that thinks for more than about a millisecond should wrap its thinking in [`tokio::task::block_in_place`] (on the
-/// multi-threaded runtime), so that the connection is served meanwhile. Seats that think for long should not share a stream: each call
-/// of [`Client::play`](crate::Client::play) has one of its own, on the same connection.
+/// An agent that computes for more than about a millisecond should do so inside
+/// [`tokio::task::block_in_place`] (on the multi-threaded runtime), so that the connection is
+/// served meanwhile. Slow seats should not share a stream: each call of
+/// [`Client::play`](crate::Client::play) opens its own stream on the same connection.
 pub trait Agent: Send {
-    /// Chooses an action, any of [`legal_actions`](crate::legal_actions). Called again with the same request if the server refused
-    /// the answer and the decision is still open; `invalid_attempts_left` is then brought up to date, the times are as first told.
+    /// Chooses an action, any of [`legal_actions`](crate::legal_actions). Called again with the
+    /// same request if the answer was invalid and the decision is still open; then
+    /// `invalid_attempts_left` is updated, and the times are those of the original request.
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId;
 
-    /// What to record with the decision just made; asked right after [`Agent::decide`]. See [`v1::Annotations`] for the limits.
+    /// Annotations to record with the decision; called after [`Agent::decide`]. See
+    /// [`v1::Annotations`] for the limits.
     fn annotate(&mut self) -> Option<v1::Annotations> {
         None
     }
 
-    /// The seat is attached: to begin with, and again after every lost connection.
+    /// Called when the seat is attached: at the start, and after every reconnection.
     fn on_attached(&mut self, _attached: &v1::Attached) {}
 
-    /// Something happened in the game. Every event comes once and in order, lost connections or not.
+    /// Called for every event of the game, once and in order, also across lost connections.
     fn on_event(&mut self, _event: &v1::GameEvent) {}
 
-    /// The server's word on an answer.
+    /// Called with the result of an answer.
     fn on_result(&mut self, _result: &v1::AnswerResult) {}
 
-    /// The game is over; the last call.
+    /// Called last, when the game is over.
     fn on_game_over(&mut self, _outcome: &Outcome) {}
 }
 
-/// What holds an agent plays as the agent does: `play(ticket, &mut agent)` gives the agent back, boxes let agents of different types
-/// share a stream.
+/// Containers of agents are agents: `play(ticket, &mut agent)` leaves the agent with the caller,
+/// and boxes allow agents of different types on one stream.
 macro_rules! forward_agent {
     ($($generics:tt)*) => {
         impl $($generics)* {

@@ -1,26 +1,28 @@
-//! How long to wait before connecting again, and when to give up. Only arithmetic: whoever waits lives in `run` and `spectate`.
+//! Delays between connection attempts, and when to give up. Arithmetic only: `run` and `spectate`
+//! do the waiting.
 
 use std::time::Duration;
 
 use rand::{Rng, RngExt as _};
 use tokio::time::Instant;
 
-/// Standard wait before the first attempt to connect again.
+/// Default delay before the first reconnection attempt.
 pub const FIRST_DELAY: Duration = Duration::from_millis(100);
-/// Standard longest wait between two attempts.
+/// Default maximum delay between two attempts.
 pub const MAX_DELAY: Duration = Duration::from_secs(5);
-/// Standard time without a connection after which the seats are given up.
+/// Default time without a connection after which the client gives up.
 pub const GIVE_UP_AFTER: Duration = Duration::from_secs(600);
 
-/// How a lost connection is made anew: waits that double from `first` to `max`, each shortened at random by up to a half so that many
-/// clients do not come back at the same instant.
+/// The delays between connection attempts: they double from `first` to `max`, each shortened at
+/// random by up to a half, so that many clients do not reconnect at the same instant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Backoff {
-    /// Wait before the first attempt.
+    /// Delay before the first attempt.
     pub first: Duration,
-    /// Longest wait between two attempts. A connection that has held this long ends the outage before it.
+    /// Maximum delay between two attempts. A connection that lasts this long ends the outage before
+    /// it.
     pub max: Duration,
-    /// Length of an outage after which nothing is tried any more; zero never connects again.
+    /// Length of an outage after which the client gives up; zero disables reconnecting.
     pub give_up_after: Duration,
 }
 
@@ -43,7 +45,7 @@ impl Backoff {
     }
 }
 
-/// An outage under way, or none.
+/// The current outage, if any.
 #[derive(Debug, Default)]
 pub(crate) struct Outage {
     since: Option<Instant>,
@@ -51,12 +53,13 @@ pub(crate) struct Outage {
 }
 
 impl Outage {
-    /// The connection is proven to work.
+    /// Ends the outage: the connection works.
     pub(crate) fn over(&mut self) {
         *self = Self::default();
     }
 
-    /// The connection failed at `now`: how long to wait before the next attempt, or the length of the outage if it is time to give up.
+    /// Records a failure at `now`. Returns the delay before the next attempt, or the length of the
+    /// outage if it is time to give up.
     pub(crate) fn failed(&mut self, backoff: &Backoff, now: Instant) -> Result<Duration, Duration> {
         let lasted = now.duration_since(*self.since.get_or_insert(now));
         let delay = backoff.delay(self.attempts, &mut rand::rng());

@@ -1,5 +1,6 @@
-//! The client and its calls about servers, rooms, seats and records. `tournaments` adds those about tournaments, `vector` those about
-//! games that the caller steps. A `Client` holds a connection and nothing else: it is cheap to clone, and its calls may run in parallel.
+//! The client and its calls about servers, rooms, seats and records. `tournaments` adds calls about
+//! tournaments, `vector` those about games stepped in batches. A `Client` holds only a connection:
+//! it is cheap to clone, and calls may run in parallel.
 
 use tonic::transport::Channel;
 
@@ -13,7 +14,7 @@ use crate::v1::room_service_client::RoomServiceClient;
 use crate::v1::server_service_client::ServerServiceClient;
 use crate::{Agent, Error, Outcome, PlayError, PlayOptions, Spectator, run, v1};
 
-/// A connection to a server, made again by itself when it is lost.
+/// A connection to a server, restored automatically when it is lost.
 #[derive(Clone, Debug)]
 pub struct Client {
     channel: Channel,
@@ -23,24 +24,25 @@ impl Client {
     /// Connects to a server at `http://host:port`, or `host:port`.
     ///
     /// # Errors
-    /// `ADDRESS_REFUSED` if that is no address with a port, or one of another scheme (for TLS, make a channel and use
-    /// [`from_channel`](Self::from_channel)); `CONNECT_FAILED` if nobody answers there within five seconds.
+    /// `ADDRESS_REFUSED` for an address without a port or with another scheme (for TLS, create a
+    /// channel and use [`from_channel`](Self::from_channel)); `CONNECT_FAILED` if no server answers
+    /// within five seconds.
     pub async fn connect(url: impl AsRef<str>) -> Result<Self, Error> {
         let channel = connection::connect(url.as_ref()).await?;
         Ok(Self::from_channel(channel))
     }
 
-    /// Takes a channel made otherwise: with TLS, over a Unix socket, on a simulated network.
+    /// Uses an existing channel: with TLS, over a Unix socket, on a simulated network.
     pub fn from_channel(channel: Channel) -> Self {
         Self { channel }
     }
 
-    /// The channel, for calls of the protocol that have no method here.
+    /// The channel, for calls of the protocol without a method here.
     pub fn channel(&self) -> Channel {
         self.channel.clone()
     }
 
-    /// What the server is and can do.
+    /// The server's version, limits and features.
     ///
     /// # Errors
     /// A failed connection.
@@ -50,7 +52,7 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// The texts of all actions for a number of faces, 4..=15; 0 means the standard 11.
+    /// The texts of all actions for a number of faces, 4..=15; 0 means the default, 11.
     ///
     /// # Errors
     /// `FACES_OUT_OF_RANGE`.
@@ -60,12 +62,12 @@ impl Client {
         Ok(service.get_action_table(request).await?.into_inner())
     }
 
-    /// Creates a room. The response holds the join code for its participants and the token that closes it. A call whose
-    /// response is lost is repeated and creates no second room.
+    /// Creates a room. The response has the join code for its participants and the token that
+    /// closes it. If the response is lost, the call is repeated and creates no second room.
     ///
     /// # Errors
-    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SEATS_REFUSED`, `SEED_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
-    /// `TOO_MANY_ROOMS`; `SHUTTING_DOWN`.
+    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SEATS_REFUSED`, `SEED_REFUSED` or `NAME_REFUSED`,
+    /// with the offending field in the metadata; `TOO_MANY_ROOMS`; `SHUTTING_DOWN`.
     pub async fn create_room(
         &self,
         mut request: v1::CreateRoomRequest,
@@ -79,7 +81,7 @@ impl Client {
         .await
     }
 
-    /// One room.
+    /// The public view of a room.
     ///
     /// # Errors
     /// `ROOM_UNKNOWN`.
@@ -93,7 +95,7 @@ impl Client {
         response.room.ok_or_else(|| Error::incomplete("room"))
     }
 
-    /// Gives back a seat before the game begins: others can take it, and its ticket opens nothing any more.
+    /// Gives up a seat before the game starts: the seat becomes free and the ticket invalid.
     ///
     /// # Errors
     /// `TICKET_UNKNOWN`, `GAME_STARTED` or `GAME_OVER`.
@@ -109,7 +111,7 @@ impl Client {
     /// A page of the server's rooms, newest first.
     ///
     /// # Errors
-    /// A failed connection, or a page token that the server does not know.
+    /// A failed connection, or an unknown page token.
     pub async fn list_rooms(
         &self,
         request: v1::ListRoomsRequest,
@@ -118,8 +120,8 @@ impl Client {
         Ok(service.list_rooms(request).await?.into_inner())
     }
 
-    /// Takes a seat. The response holds the ticket to play on it. A call whose response is lost is repeated and takes no
-    /// second seat.
+    /// Takes a seat. The response has the ticket to play on it. If the response is lost, the call
+    /// is repeated and takes no second seat.
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`, `GAME_STARTED`, `ROOM_UNKNOWN`.
@@ -172,10 +174,10 @@ impl Client {
         response.room.ok_or_else(|| Error::incomplete("room"))
     }
 
-    /// A page of the records of the server's games, oldest first unless the request says otherwise.
+    /// A page of the server's records, oldest first by default.
     ///
     /// # Errors
-    /// A failed connection, or a page token that the server does not know.
+    /// A failed connection, or an unknown page token.
     pub async fn list_records(
         &self,
         request: v1::ListRecordsRequest,
@@ -203,7 +205,7 @@ impl Client {
         Ok(lines)
     }
 
-    /// Has a seat express something, also while it is being played.
+    /// Sends an expression of affect for a seat, at any time.
     ///
     /// # Errors
     /// `TICKET_UNKNOWN`, `EXPRESSION_REFUSED`, `GAME_OVER`.
@@ -221,15 +223,17 @@ impl Client {
         Ok(())
     }
 
-    /// Watches a room, from an event number on; 0 and 1 are its beginning. The connection is made with the first event asked for.
+    /// Watches a room from an event number on; 0 and 1 are the first event. Connects when the first
+    /// event is requested.
     pub fn spectate(&self, room_id: impl Into<String>, from_sequence: u64) -> Spectator {
         Spectator::new(self.channel(), room_id.into(), from_sequence)
     }
 
-    /// Plays a seat to the end of its game. Dropping the future leaves the seat.
+    /// Plays a seat until its game is over. Dropping the future leaves the seat.
     ///
     /// # Errors
-    /// See [`PlayError`]; lost connections are made again with the standard [`Backoff`](crate::Backoff).
+    /// See [`PlayError`]. Lost connections are restored with the default
+    /// [`Backoff`](crate::Backoff).
     pub async fn play(
         &self,
         ticket: impl Into<String>,
@@ -239,7 +243,7 @@ impl Client {
         self.play_with(ticket, agent, &options).await
     }
 
-    /// The same with options.
+    /// [`play`](Self::play) with options.
     ///
     /// # Errors
     /// See [`PlayError`].
@@ -254,8 +258,9 @@ impl Client {
         outcome.expect("there is an outcome for each seat")
     }
 
-    /// Plays any number of seats, in any number of games, over one stream. The outcomes come when all games are over, in the order of the
-    /// seats. For agents of different types give `Box<dyn Agent>`.
+    /// Plays any number of seats, in any number of games, over one stream. Returns the outcomes
+    /// when all games are over, in the order of the seats. For agents of different types use
+    /// `Box<dyn Agent>`.
     pub async fn play_many<A: Agent>(
         &self,
         seats: impl IntoIterator<Item = (String, A)>,
@@ -264,7 +269,7 @@ impl Client {
         self.play_many_with(seats, &options).await
     }
 
-    /// The same with options.
+    /// [`play_many`](Self::play_many) with options.
     pub async fn play_many_with<A: Agent>(
         &self,
         seats: impl IntoIterator<Item = (String, A)>,

@@ -1,4 +1,4 @@
-//! How a client connects to a server: the address, keepalive and limits.
+//! Opening a connection: address, keepalive and limits.
 
 use std::time::Duration;
 
@@ -13,9 +13,10 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(20);
 /// Time limit for the answer to a probe; after it the connection is closed.
 const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
-/// Bytes that the server may send on a stream before the client has read them: enough for messages to hundreds of seats.
+/// Bytes that the server may send on a stream before the client reads them: enough for messages to
+/// hundreds of seats.
 const STREAM_WINDOW_BYTES: u32 = 1 << 20;
-/// The same for all streams of the connection together.
+/// The same limit for all streams of a connection together.
 const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
 /// Maximum size of a response: enough for the history of hundreds of seats in one message.
 pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;

@@ -1,5 +1,5 @@
-//! What can go wrong, in a form one can act on: the gRPC code, the reason in UPPER_SNAKE that the server names (google.rpc.ErrorInfo),
-//! words, and the offending field or limit.
+//! Errors: the gRPC code, the server's reason in UPPER_SNAKE (google.rpc.ErrorInfo), a message, and
+//! the offending field or limit.
 
 use std::collections::BTreeMap;
 use std::error::Error as _;
@@ -11,14 +11,14 @@ use tonic_types::StatusExt as _;
 
 use crate::v1;
 
-/// Reason of an address that names no server; made by the client.
+/// Reason of an invalid address; set by the client.
 const ADDRESS_REFUSED: &str = "ADDRESS_REFUSED";
-/// Reason of a connection that could not be made; made by the client.
+/// Reason of a failed connection; set by the client.
 const CONNECT_FAILED: &str = "CONNECT_FAILED";
-/// Reason of a response without a part that the protocol promises; made by the client.
+/// Reason of a response without a required part; set by the client.
 const RESPONSE_INCOMPLETE: &str = "RESPONSE_INCOMPLETE";
 
-/// Reason of a step of games that have ended with the step before; made by the client.
+/// Reason of a step of games that ended with the previous step; set by the client.
 const STEP_GIVEN_UP: &str = "STEP_GIVEN_UP";
 
 /// A call that failed.
@@ -36,13 +36,14 @@ impl Error {
         self.code
     }
 
-    /// The reason in UPPER_SNAKE, for instance `JOIN_CODE_WRONG`; `None` if whoever failed named none, as when a connection breaks.
-    /// The client's own are `ADDRESS_REFUSED`, `CONNECT_FAILED`, `RESPONSE_INCOMPLETE` and `STEP_GIVEN_UP`.
+    /// The reason in UPPER_SNAKE, for example `JOIN_CODE_WRONG`; `None` if there is none, as after
+    /// a lost connection. The client itself sets `ADDRESS_REFUSED`, `CONNECT_FAILED`,
+    /// `RESPONSE_INCOMPLETE` and `STEP_GIVEN_UP`.
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
 
-    /// What is wrong, in words.
+    /// The message, for people.
     pub fn message(&self) -> &str {
         &self.message
     }
@@ -79,7 +80,7 @@ impl Error {
 
     pub(crate) fn step_given_up() -> Self {
         let message =
-            "the step before was refused or given up, which ended these games; begin new ones";
+            "the previous step was refused or cancelled, which ended these games; start new ones";
         Self::own(Code::FailedPrecondition, STEP_GIVEN_UP, message.to_owned())
     }
 
@@ -127,7 +128,7 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-/// An error and all that caused it, each once: transport errors keep what happened in their causes.
+/// Formats an error with its causes, each once: transport errors have the details in their causes.
 pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut next = error.source();
@@ -141,8 +142,9 @@ pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// Whether a stream that ended with this code may be tried again: everything but what would only be refused once more. tonic reports
-/// a broken connection as UNKNOWN, INTERNAL, CANCELLED or UNAVAILABLE, so these must be tried.
+/// Whether a stream that ended with this code should be retried: every code except those that would
+/// be refused again. tonic reports a lost connection as UNKNOWN, INTERNAL, CANCELLED or
+/// UNAVAILABLE, so these are retried.
 pub(crate) fn may_retry(code: Code) -> bool {
     !matches!(
         code,
@@ -161,24 +163,24 @@ pub(crate) fn may_retry(code: Code) -> bool {
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlayError {
-    /// The server refused the seat or the stream; trying again would not help.
+    /// The server refused the seat or the stream; a retry would not help.
     #[error("the server refused the seat: {0}")]
     Refused(Error),
-    /// A newer connection has the seat.
+    /// A newer connection has taken the seat.
     #[error("a newer connection has taken the seat")]
     Superseded,
-    /// The seat has left the stream before its game was over.
+    /// The seat left the stream before its game was over.
     #[error("the seat was detached before its game was over")]
     Detached,
-    /// The game is over, but how it ended was not told.
+    /// The game is over, but its result is unknown.
     #[error("the game is over, but the server did not say how it ended")]
     EndingUnknown,
-    /// The connection was lost and could not be made again in time.
+    /// The connection was lost and could not be restored in time.
     #[error("no connection for {} s, given up: {last}", outage.as_secs())]
     ConnectionLost {
-        /// How long there was none.
+        /// Length of the outage.
         outage: Duration,
-        /// What the last attempt said.
+        /// Error of the last attempt.
         last: Error,
     },
 }

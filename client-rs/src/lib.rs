@@ -1,6 +1,7 @@
-//! The parts, each in a module of its own: what an agent is ([`Agent`]), how it is connected ([`Client`]), what it gets out of a game
-//! ([`Outcome`], [`PlayError`]), how one watches ([`Spectator`]). The messages are those of the protocol, re-exported as [`v1`].
-//! No rules of the game live here: the server says what is legal.
+//! The modules: agents ([`Agent`]), connections and calls ([`Client`]), results of games
+//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]). The messages of the protocol are
+//! re-exported as [`v1`]. The crate contains no rules of the game: the server sends the legal
+//! actions.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
 

@@ -1,5 +1,5 @@
-//! Reading the mask of legal actions: bit i%8 of byte i/8 is action i. An empty mask (the seat asked for none) has no legal actions
-//! here; the server still knows them.
+//! Reading masks of legal actions: bit i%8 of byte i/8 is action i. An empty mask (if the seat
+//! requested none) has no legal actions here; the server still enforces them.
 
 use crate::{ActionId, v1};
 
@@ -22,17 +22,17 @@ pub fn legal_count(request: &v1::DecisionRequest) -> usize {
     count_in(&request.action_mask)
 }
 
-/// The legal action with `n` legal ones below it; `None` if there are not that many.
+/// The legal action number `n`, from 0, in ascending order; `None` if there are fewer.
 pub fn nth_legal(request: &v1::DecisionRequest, n: usize) -> Option<ActionId> {
     nth_in(&request.action_mask, n)
 }
 
-/// The number of actions of a mask, for instance of a row of [`v1::VectorBatch::action_masks`].
+/// The number of actions of a mask, for example of a row of [`v1::VectorBatch::action_masks`].
 pub fn count_in(mask: &[u8]) -> usize {
     words(mask).map(|word| word.count_ones() as usize).sum()
 }
 
-/// The action of a mask with `n` of its actions below it; `None` if there are not that many.
+/// The action number `n` of a mask, from 0, in ascending order; `None` if there are fewer.
 pub fn nth_in(mask: &[u8], n: usize) -> Option<ActionId> {
     let mut left = n;
     for (index, word) in (0u32..).zip(words(mask)) {
@@ -49,7 +49,7 @@ pub fn nth_in(mask: &[u8], n: usize) -> Option<ActionId> {
     None
 }
 
-/// A mask by eight bytes at a time, the last filled up with zeros.
+/// A mask as 64-bit words, the last one padded with zeros.
 fn words(mask: &[u8]) -> impl Iterator<Item = u64> + '_ {
     let (whole, rest) = mask.as_chunks::<8>();
     let mut last = [0; 8];

@@ -1,14 +1,14 @@
-//! How seats are played. What is played, and by whom, is said in the calls of `Client`.
+//! Options of playing. The calls of `Client` say which seats are played, and by which agents.
 
 use crate::{Backoff, v1};
 
-/// The most bytes a seat may add to the game seed.
+/// Maximum size of a seat's contribution to the game seed, bytes.
 pub const ENTROPY_BYTES: usize = 32;
 
-/// A seat's own part of the game seed.
+/// A seat's contribution to the game seed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Entropy {
-    /// Fresh random bytes for each seat, so that nobody alone chose the deals.
+    /// Random bytes for each seat, so that no single party chooses the deals.
     #[default]
     Fresh,
     /// These bytes for every seat of the call, at most [`ENTROPY_BYTES`].
@@ -28,15 +28,16 @@ impl Entropy {
     }
 }
 
-/// How seats are played.
+/// How to play seats.
 #[derive(Clone, Debug, Default)]
 pub struct PlayOptions {
-    /// How events reach the agents; standard: with their decisions.
+    /// How events reach the agents; default: with their decisions.
     pub delivery: v1::EventDelivery,
-    /// Leave the mask of legal actions out of the requests.
+    /// Omits the mask of legal actions from requests.
     pub no_mask: bool,
-    /// The seats' own part of the game seed; counts in games that have not begun when the seat is first attached.
+    /// The seats' contribution to the game seed; it counts in games that start after the seat is
+    /// first attached.
     pub entropy: Entropy,
-    /// What to do about lost connections.
+    /// Handling of lost connections.
     pub backoff: Backoff,
 }

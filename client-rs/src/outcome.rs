@@ -1,21 +1,21 @@
-//! What a seat has at the end of its game.
+//! The result of a seat's game.
 
 use crate::v1;
 
-/// How a game ended for one seat.
+/// The result of a game for one seat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Identifies the room.
     pub room_id: String,
-    /// Identifies the game; its record can be asked for by it.
+    /// Identifies the game and its record.
     pub game_id: String,
     /// The seat.
     pub seat: u32,
     /// With a result or without.
     pub ending: Ending,
-    /// What the seat added to the game seed, to be compared with the reveal.
+    /// The seat's contribution to the game seed, to be compared with the reveal.
     pub entropy: Vec<u8>,
-    /// Answers of the agent, refused ones included.
+    /// Answers of the agent, including refused ones.
     pub answers: u64,
 }
 

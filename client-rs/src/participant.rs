@@ -1,22 +1,23 @@
-//! A participant of a tournament on a stream: it enters, is given a seat in each of its games, and leaves when the tournament is over.
-//! What happens on its seats is in `seat`; they share the stream as any others do (see `session`).
+//! A tournament participant on a stream: it enters, gets a seat in each of its games, and leaves
+//! when the tournament is over. `seat` handles its seats, which share the stream with others (see
+//! `session`).
 
 use crate::seat::{SeatSession, attach};
 use crate::v1;
 use crate::{Error, PlayError, PlayOptions};
 
-/// Gives the agent of a game that the participant is seated in.
+/// Creates the agent of a game in which the participant is seated.
 type MakeAgent<'a, A> = Box<dyn FnMut(&v1::Attached) -> A + Send + 'a>;
 
 /// One participant, from its ticket to the end of the tournament, across any number of connections.
 pub(crate) struct Participant<'a, A> {
     ticket: String,
     make: MakeAgent<'a, A>,
-    /// One for all its games, as the protocol has it.
+    /// One contribution to the seed for all its games, as in the protocol.
     entropy: Vec<u8>,
-    /// Its handle on the present stream.
+    /// Its handle on the current stream.
     handle: Option<u32>,
-    /// How its part in the tournament ended.
+    /// How its participation ended.
     end: Option<Result<(), PlayError>>,
 }
 
@@ -35,7 +36,7 @@ impl<'a, A> Participant<'a, A> {
         }
     }
 
-    /// Begins on a new connection.
+    /// Attaches on a new connection.
     pub(crate) fn attach(&mut self, request_id: u32, options: &PlayOptions) -> v1::SeatCommand {
         self.handle = None;
         attach(&self.ticket, request_id, 0, &self.entropy, options)
@@ -45,12 +46,12 @@ impl<'a, A> Participant<'a, A> {
         self.handle = Some(handle);
     }
 
-    /// Whether a handle of the present stream is the participant's.
+    /// Whether a handle of the current stream is the participant's.
     pub(crate) fn has(&self, handle: u32) -> bool {
         self.handle == Some(handle)
     }
 
-    /// A new seat, with an agent of its own.
+    /// Creates a seat with its own agent.
     pub(crate) fn seated(&mut self, attached: &v1::Attached) -> SeatSession<A>
     where
         A: crate::Agent,
@@ -72,7 +73,7 @@ impl<'a, A> Participant<'a, A> {
         });
     }
 
-    /// Settles for good how its part ended; what was settled before stays.
+    /// Settles how the participation ended; the first call counts.
     pub(crate) fn settle(&mut self, end: Result<(), PlayError>) {
         self.end.get_or_insert(end);
     }

@@ -1,20 +1,21 @@
-//! Participants of tournaments, as courses of events: who is attached when, which agent plays which game, how it ends.
+//! Sequences of events for tournament participants: what is attached when, which agent plays which
+//! game, how it ends.
 
 use super::*;
 
-/// First handle of the seats that the server attaches by itself.
-const CALLED: u32 = 1 << 31;
+/// First handle of the seats that the server attaches.
+const FIRST_HANDLE: u32 = 1 << 31;
 
 type Logs = Arc<Mutex<Vec<(String, Arc<Mutex<Vec<String>>>)>>>;
 
-/// A session of one participant, and the log of the agent of each game, in the order in which they were made.
+/// A session of one participant, and the log of each game's agent, in the order of creation.
 struct Cup {
     session: Session<'static, Scripted>,
     logs: Logs,
 }
 
 impl Cup {
-    /// Every agent answers with the number of its game times ten, again and again.
+    /// Every agent always answers with ten times the number of its game.
     fn new() -> Self {
         let logs = Logs::default();
         let making = Arc::clone(&logs);
@@ -39,7 +40,7 @@ impl Cup {
     fn entered() -> Self {
         let mut cup = Self::new();
         assert_eq!(cup.attach(), ["cup from 0"]);
-        assert!(cup.hear(vec![(0, entered())]).is_empty());
+        assert!(cup.receive(vec![(0, entered())]).is_empty());
         cup
     }
 
@@ -58,9 +59,9 @@ impl Cup {
             .collect()
     }
 
-    fn hear(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
+    fn receive(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
         let requests = self.session.receive(response(updates));
-        requests.iter().map(said).collect()
+        requests.iter().map(in_short).collect()
     }
 
     /// What the agents were told, by game.
@@ -108,7 +109,7 @@ fn over() -> Update {
     detached(v1::DetachReason::TournamentOver)
 }
 
-/// What came of the games, in short.
+/// The results of the games, in short.
 fn played(cup: Cup) -> Result<Vec<String>, String> {
     assert!(cup.session.is_over());
     match cup.session.into_played() {
@@ -124,16 +125,19 @@ fn played(cup: Cup) -> Result<Vec<String>, String> {
 }
 
 #[test]
-fn every_game_has_an_agent_of_its_own() {
+fn every_game_has_its_own_agent() {
     let mut cup = Cup::entered();
-    let said = cup.hear(vec![
-        (CALLED, seated(0, "a", 0, 1)),
-        (CALLED + 1, seated(0, "b", 1, 1)),
-        (CALLED, events(&[(1, None)])),
-        (CALLED + 1, decision(5)),
-        (CALLED, decision(4)),
+    let sent = cup.receive(vec![
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE + 1, seated(0, "b", 1, 1)),
+        (FIRST_HANDLE, events(&[(1, None)])),
+        (FIRST_HANDLE + 1, decision(5)),
+        (FIRST_HANDLE, decision(4)),
     ]);
-    assert_eq!(said, [format!("{}:5=20 {CALLED}:4=10", CALLED + 1)]);
+    assert_eq!(
+        sent,
+        [format!("{}:5=20 {FIRST_HANDLE}:4=10", FIRST_HANDLE + 1)]
+    );
     let told = cup.told();
     assert_eq!(told[0].0, "a");
     assert_eq!(told[0].1, ["attached 0", "event 1", "decide 4 None"]);
@@ -143,11 +147,11 @@ fn every_game_has_an_agent_of_its_own() {
         let end = (seat, events(&[(2, ended())]));
         vec![end, (seat, detached(v1::DetachReason::GameOver))]
     };
-    cup.hear(end(CALLED + 1));
+    cup.receive(end(FIRST_HANDLE + 1));
     assert!(!cup.session.is_over());
-    cup.hear(end(CALLED));
+    cup.receive(end(FIRST_HANDLE));
     assert!(!cup.session.is_over(), "there may be more games");
-    cup.hear(vec![(0, over())]);
+    cup.receive(vec![(0, over())]);
     assert_eq!(
         played(cup),
         Ok(vec!["a Some(2)".to_owned(), "b Some(1)".to_owned()])
@@ -155,13 +159,13 @@ fn every_game_has_an_agent_of_its_own() {
 }
 
 #[test]
-fn a_new_stream_goes_on_with_the_same_agents() {
+fn a_new_stream_continues_with_the_same_agents() {
     let mut cup = Cup::entered();
-    cup.hear(vec![
-        (CALLED, seated(0, "a", 0, 1)),
-        (CALLED + 1, seated(0, "b", 1, 1)),
-        (CALLED, events(&[(1, None), (2, None)])),
-        (CALLED, decision(4)),
+    cup.receive(vec![
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE + 1, seated(0, "b", 1, 1)),
+        (FIRST_HANDLE, events(&[(1, None), (2, None)])),
+        (FIRST_HANDLE, decision(4)),
     ]);
     cup.told();
     cup.session.disconnected();
@@ -170,17 +174,17 @@ fn a_new_stream_goes_on_with_the_same_agents() {
         attached,
         ["ticket of a from 3", "ticket of b from 1", "cup from 0"]
     );
-    let said = cup.hear(vec![
+    let sent = cup.receive(vec![
         (0, seated(1, "a", 0, 4)),
         (1, seated(2, "b", 1, 1)),
         (2, entered()),
-        (CALLED, seated(0, "c", 1, 1)),
+        (FIRST_HANDLE, seated(0, "c", 1, 1)),
         (0, events(&[(3, None)])),
         (0, decision(4)),
         (1, decision(1)),
-        (CALLED, decision(2)),
+        (FIRST_HANDLE, decision(2)),
     ]);
-    assert_eq!(said, [format!("0:4=10 1:1=20 {CALLED}:2=30")]);
+    assert_eq!(sent, [format!("0:4=10 1:1=20 {FIRST_HANDLE}:2=30")]);
     let told: Vec<_> = cup.told().into_iter().map(|(_, lines)| lines).collect();
     assert_eq!(
         told[0],
@@ -191,19 +195,19 @@ fn a_new_stream_goes_on_with_the_same_agents() {
     assert_eq!(told[2], ["attached 1", "decide 2 None"]);
 }
 
-/// A server that attaches anew what the client has attached already: the newest attachment of a seat holds.
+/// A server attaches a seat again that the client has attached already: the newest attachment wins.
 #[test]
 fn a_seat_attached_twice_is_one_seat() {
     let mut cup = Cup::entered();
-    let said = cup.hear(vec![
-        (CALLED, seated(0, "a", 0, 1)),
-        (CALLED, events(&[(1, None)])),
-        (CALLED + 1, seated(0, "a", 0, 2)),
-        (CALLED, detached(v1::DetachReason::Superseded)),
-        (CALLED + 1, events(&[(1, None), (2, None)])),
-        (CALLED + 1, decision(4)),
+    let sent = cup.receive(vec![
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE, events(&[(1, None)])),
+        (FIRST_HANDLE + 1, seated(0, "a", 0, 2)),
+        (FIRST_HANDLE, detached(v1::DetachReason::Superseded)),
+        (FIRST_HANDLE + 1, events(&[(1, None), (2, None)])),
+        (FIRST_HANDLE + 1, decision(4)),
     ]);
-    assert_eq!(said, [format!("{}:4=10", CALLED + 1)]);
+    assert_eq!(sent, [format!("{}:4=10", FIRST_HANDLE + 1)]);
     let told = cup.told();
     assert_eq!(told.len(), 1);
     let lines = [
@@ -217,13 +221,13 @@ fn a_seat_attached_twice_is_one_seat() {
 }
 
 #[test]
-fn the_end_of_the_tournament_waits_for_what_is_left_of_its_games() {
+fn the_end_of_the_tournament_waits_for_open_games() {
     let mut cup = Cup::entered();
     let aborted = Kind::GameAborted(Box::new(v1::GameAborted {
         reason: v1::AbortReason::Closed.into(),
         reveal: None,
     }));
-    cup.hear(vec![(CALLED, seated(0, "a", 0, 1)), (0, over())]);
+    cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1)), (0, over())]);
     assert!(!cup.session.is_over());
     cup.session.disconnected();
     assert_eq!(
@@ -231,7 +235,7 @@ fn the_end_of_the_tournament_waits_for_what_is_left_of_its_games() {
         ["ticket of a from 1"],
         "nobody enters what is over"
     );
-    cup.hear(vec![
+    cup.receive(vec![
         (0, seated(1, "a", 0, 2)),
         (0, events(&[(1, Some(aborted))])),
         (0, detached(v1::DetachReason::GameOver)),
@@ -240,72 +244,75 @@ fn the_end_of_the_tournament_waits_for_what_is_left_of_its_games() {
 }
 
 #[test]
-fn a_game_whose_room_is_gone_has_no_outcome_and_stops_no_other() {
+fn a_game_without_a_room_has_no_outcome_and_does_not_stop_others() {
     let mut cup = Cup::entered();
-    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1))]);
     cup.session.disconnected();
     assert_eq!(cup.attach().len(), 2);
-    cup.hear(vec![
+    cup.receive(vec![
         (0, refused(1)),
         (1, entered()),
-        (CALLED, seated(0, "b", 0, 1)),
-        (CALLED, events(&[(1, ended())])),
-        (CALLED, detached(v1::DetachReason::GameOver)),
+        (FIRST_HANDLE, seated(0, "b", 0, 1)),
+        (FIRST_HANDLE, events(&[(1, ended())])),
+        (FIRST_HANDLE, detached(v1::DetachReason::GameOver)),
         (1, over()),
     ]);
     assert_eq!(played(cup), Ok(vec!["b Some(2)".to_owned()]));
 }
 
 #[test]
-fn participants_leave_each_for_its_own_reason() {
-    let table = [
+fn each_participant_has_its_own_reason_to_leave() {
+    let harness = [
         (refused(PARTICIPANT), "TICKET_UNKNOWN"),
         (detached(v1::DetachReason::Superseded), "SUPERSEDED"),
         (detached(v1::DetachReason::Requested), "DETACHED"),
     ];
-    for (update, reason) in table {
+    for (update, reason) in harness {
         let mut cup = Cup::entered();
-        cup.hear(vec![(CALLED, seated(0, "a", 0, 1)), (0, update)]);
+        cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1)), (0, update)]);
         assert!(!cup.session.is_over(), "its game may go on");
-        cup.hear(vec![(CALLED, detached(v1::DetachReason::Superseded))]);
+        cup.receive(vec![(FIRST_HANDLE, detached(v1::DetachReason::Superseded))]);
         assert_eq!(played(cup), Err(reason.to_owned()));
     }
     let mut cup = Cup::entered();
-    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1))]);
     cup.session.give_up(&PlayError::Superseded);
     assert_eq!(played(cup), Err("SUPERSEDED".to_owned()));
 }
 
 #[test]
-fn of_a_game_that_is_over_no_agent_is_kept() {
+fn agents_of_finished_games_are_dropped() {
     let mut cup = Cup::entered();
-    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1))]);
     let held = |cup: &Cup| Arc::strong_count(&cup.logs.lock().unwrap()[0].1);
     assert_eq!(held(&cup), 2);
-    cup.hear(vec![
-        (CALLED, events(&[(1, ended())])),
-        (CALLED, detached(v1::DetachReason::GameOver)),
+    cup.receive(vec![
+        (FIRST_HANDLE, events(&[(1, ended())])),
+        (FIRST_HANDLE, detached(v1::DetachReason::GameOver)),
     ]);
     assert_eq!(held(&cup), 1);
 }
 
 #[test]
-fn strange_updates_stop_no_participant() {
+fn unexpected_updates_do_not_stop_a_participant() {
     let mut cup = Cup::entered();
-    let said = cup.hear(vec![
+    let sent = cup.receive(vec![
         (9, entered()),
         (0, entered()),
-        (CALLED, decision(1)),
-        (CALLED, detached(v1::DetachReason::GameOver)),
-        (CALLED, seated(77, "a", 0, 1)),
-        (CALLED, seated(0, "b", 0, 1)),
-        (CALLED, decision(1)),
+        (FIRST_HANDLE, decision(1)),
+        (FIRST_HANDLE, detached(v1::DetachReason::GameOver)),
+        (FIRST_HANDLE, seated(77, "a", 0, 1)),
+        (FIRST_HANDLE, seated(0, "b", 0, 1)),
+        (FIRST_HANDLE, decision(1)),
         (0, decision(1)),
     ]);
-    assert_eq!(said, [format!("{CALLED}:1=10")]);
+    assert_eq!(sent, [format!("{FIRST_HANDLE}:1=10")]);
     assert!(!cup.session.is_over());
-    // Without a participant nobody is seated by the server.
-    let mut table = Table::seated(&[5]);
-    let said = table.hear(vec![(CALLED, seated(0, "a", 0, 1)), (CALLED, decision(1))]);
-    assert!(said.is_empty());
+    // The server seats only participants.
+    let mut harness = Harness::seated(&[5]);
+    let sent = harness.receive(vec![
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE, decision(1)),
+    ]);
+    assert!(sent.is_empty());
 }

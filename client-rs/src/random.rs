@@ -1,17 +1,17 @@
-//! The simplest agent: any legal action, all equally likely.
+//! The simplest agent: a random legal action.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::{ActionId, Agent, count_in, nth_in, v1};
 
-/// Actions of a turn in the standard numbering, until the start of the game names another.
+/// Actions of a turn by default, until the start of the game states the number.
 const STANDARD_TURN_ACTIONS: u32 = 200;
-/// All actions in the standard numbering, until the start of the game names another.
+/// All actions by default, until the start of the game states the number.
 const STANDARD_ACTIONS: u32 = 214;
 
-/// Plays uniformly at random among the legal actions; without a mask among all actions of the decision's kind, legal or not. Its choices
-/// are a function of its seed and of what it is asked.
+/// Plays uniformly at random among the legal actions; without a mask, among all actions of the
+/// decision's kind, legal or not. Its choices depend only on its seed and the requests.
 #[derive(Debug, Clone)]
 pub struct RandomAgent {
     rng: ChaCha8Rng,
@@ -20,7 +20,7 @@ pub struct RandomAgent {
 }
 
 impl RandomAgent {
-    /// An agent with this seed.
+    /// Creates an agent with this seed.
     pub fn new(seed: u64) -> Self {
         Self {
             rng: ChaCha8Rng::seed_from_u64(seed),
@@ -29,13 +29,14 @@ impl RandomAgent {
         }
     }
 
-    /// One of the actions of a mask; `None` if it has none.
+    /// A random action of a mask; `None` if it has none.
     pub fn choose(&mut self, mask: &[u8]) -> Option<ActionId> {
         let n = self.below(u32::try_from(count_in(mask)).unwrap_or(u32::MAX));
         nth_in(mask, n as usize)
     }
 
-    /// A number below `n`, by multiplication: of a bias nobody can measure at these sizes, and the same in every version.
+    /// A number below `n`, by multiplication: the bias is negligible at these sizes, and the result
+    /// is the same in every version.
     fn below(&mut self, n: u32) -> u32 {
         let product = u64::from(self.rng.next_u32()) * u64::from(n);
         u32::try_from(product >> 32).expect("the upper half of a product of two u32 is a u32")

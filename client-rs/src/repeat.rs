@@ -1,4 +1,4 @@
-//! Requests that are repeated when their response is lost. Their id tells the server that they are the same.
+//! Repeats requests whose response was lost. Their id tells the server that they are the same.
 
 use std::time::Duration;
 
@@ -8,15 +8,15 @@ use tonic::{Response, Status};
 use crate::Error;
 use crate::error::may_retry;
 
-/// How often a request is sent before the client gives up.
+/// Maximum number of attempts.
 const ATTEMPTS: u32 = 5;
-/// The pause after the first attempt; it doubles with each further one.
+/// Pause after the first attempt; it doubles with each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 
-/// Gives a request an id, unless the caller has.
+/// Gives a request an id unless the caller has.
 ///
 /// # Panics
-/// When the operating system has no random bytes.
+/// If the operating system has no random bytes.
 pub(crate) fn identify(request_id: &mut Vec<u8>) {
     if request_id.is_empty() {
         let mut bytes = [0; 32];
@@ -27,7 +27,7 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
     }
 }
 
-/// Sends a request, and sends it again when the connection is lost before its response has arrived.
+/// Sends a request, and again if the connection is lost before its response arrives.
 pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
@@ -38,7 +38,7 @@ where
             Ok(response) => return Ok(response.into_inner()),
             Err(status) => Error::from(status),
         };
-        // With a reason the server has answered.
+        // An error with a reason is an answer of the server.
         if attempt == ATTEMPTS || error.reason().is_some() || !may_retry(error.code()) {
             return Err(error);
         }

@@ -1,5 +1,5 @@
-//! Carries the messages between a session and the server: opens the stream, opens it again when it breaks, gives up in the end. What
-//! the messages mean is in `session`.
+//! Carries messages between a session and the server: opens the stream, reopens it when it breaks,
+//! and finally gives up. `session` interprets the messages.
 
 use std::time::Duration;
 
@@ -16,17 +16,17 @@ use crate::session::Session;
 use crate::v1::{self, play_service_client::PlayServiceClient};
 use crate::{Agent, Error};
 
-/// Requests that may wait for the transport.
+/// Maximum number of requests waiting for the transport.
 const REQUEST_QUEUE: usize = 64;
-/// Time for the server to accept a stream.
+/// Time limit for the server to accept a stream.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time for the server to end a stream that has been half-closed.
+/// Time limit for the server to end a half-closed stream.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How a stream ended before its seats' games did.
+/// A stream that ended before the games of its seats.
 struct Lost {
     status: Status,
-    /// How long it had been open.
+    /// How long the stream was open.
     held: Duration,
 }
 
@@ -67,13 +67,13 @@ pub(crate) async fn run<A: Agent>(
     }
 }
 
-/// One stream, until the session is over or the stream breaks.
+/// Runs one stream, until the session is over or the stream breaks.
 async fn converse<A: Agent>(
     client: &mut PlayServiceClient<Channel>,
     session: &mut Session<'_, A>,
 ) -> Result<(), Lost> {
     let attach = session.attach();
-    // The attachments must all fit: nothing is read from the queue before the stream is open.
+    // All attachments must fit: nothing is read from the queue before the stream is open.
     let (requests, queue) = mpsc::channel(REQUEST_QUEUE.max(attach.len()));
     for request in attach {
         requests
@@ -97,13 +97,13 @@ async fn converse<A: Agent>(
         };
         for request in session.receive(response) {
             if requests.send(request).await.is_err() {
-                // The transport takes no more; the stream of responses says why.
+                // The transport accepts no more requests; the response stream has the reason.
                 break;
             }
         }
     }
     drop(requests);
-    // Leave in good order, but do not depend on it: everything has been said.
+    // Ends the stream cleanly, but does not depend on it: everything has been sent.
     let _ended = timeout(LEAVE_TIMEOUT, drain(responses)).await;
     Ok(())
 }

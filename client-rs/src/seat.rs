@@ -1,22 +1,23 @@
-//! The protocol as one seat lives it: what it is told goes in, what it has to say comes out. No stream, no clock, no other seat (see
-//! `session`), so that every course of events can be tested as data.
+//! The protocol for one seat: updates go in, commands come out. No stream, no clock and no other
+//! seats (see `session`), so every sequence of events can be tested as data.
 
 use prost::Message as _;
 
 use crate::v1::{self, game_event, seat_command::Command};
 use crate::{Agent, Ending, Outcome, PlayError, PlayOptions};
 
-/// Annotations above this size are not sent: the server drops them from 4 KiB on, and a message of 64 KiB would end the stream.
+/// Larger annotations are not sent: the server drops them above 4 KiB, and a message of 64 KiB
+/// would end the stream.
 const MAX_ANNOTATIONS_BYTES: usize = 16 * 1024;
 
-/// What a seat owes the server for its open decision.
+/// What a seat has to send for its open decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Owed {
-    /// Nothing: there is none, or its answer is on the way.
+    /// Nothing: there is no decision, or the answer has been sent.
     Nothing,
-    /// A decision of the agent.
+    /// A new decision of the agent.
     Decision,
-    /// The answer already given, whose acknowledgement may have been lost.
+    /// The previous answer, whose acknowledgement may have been lost.
     SameAnswer,
 }
 
@@ -29,15 +30,15 @@ pub(crate) struct SeatSession<A> {
     room_id: String,
     game_id: String,
     seat: u32,
-    /// Number of the first event not seen yet.
+    /// Number of the next event.
     next_event: u64,
     /// Events below this number happened before the seat was last attached.
     live_from: u64,
     open: Option<v1::DecisionRequest>,
-    /// The last answer given, until it is acknowledged.
+    /// The last answer, until it is acknowledged.
     answered: Option<v1::Answer>,
     owed: Owed,
-    /// A substitute plays for the seat although its agent is here.
+    /// A substitute plays for the attached seat.
     substituted: bool,
     answers: u64,
     ending: Option<Ending>,
@@ -65,7 +66,8 @@ impl<A: Agent> SeatSession<A> {
         }
     }
 
-    /// Begins on a new connection. The answer not yet acknowledged is kept: the server puts its decision again if it never arrived.
+    /// Attaches on a new connection. An unacknowledged answer is stored: the server requests its
+    /// decision again if the answer never arrived.
     pub(crate) fn attach(&mut self, request_id: u32, options: &PlayOptions) -> v1::SeatCommand {
         self.open = None;
         self.owed = Owed::Nothing;
@@ -87,7 +89,7 @@ impl<A: Agent> SeatSession<A> {
         self.outcome.take()
     }
 
-    /// The game it was last attached to; empty before.
+    /// The game it was last attached to; empty before the first attachment.
     pub(crate) fn game_id(&self) -> &str {
         &self.game_id
     }
@@ -100,7 +102,7 @@ impl<A: Agent> SeatSession<A> {
         self.game_id = attached.game_id;
     }
 
-    /// Hands the agent the events it has not seen; says whether there were any.
+    /// Passes new events to the agent. Returns whether there were any.
     pub(crate) fn events(&mut self, batch: v1::EventBatch) -> bool {
         let mut any = false;
         for event in batch.events {
@@ -123,7 +125,7 @@ impl<A: Agent> SeatSession<A> {
         any
     }
 
-    /// Notes what an event means for the connection itself. A substitution of the past is over: attaching ended it.
+    /// Updates the state after an event. Attaching ends earlier substitutions.
     fn follow(&mut self, event: v1::GameEvent) {
         match event.kind {
             Some(game_event::Kind::Substituted(it)) if it.seat == self.seat => {
@@ -149,7 +151,7 @@ impl<A: Agent> SeatSession<A> {
         self.open = Some(request);
     }
 
-    /// Takes the server's word on an answer; says whether it moved the game or the decision on.
+    /// Processes the result of an answer. Returns whether it closed or changed the open decision.
     pub(crate) fn result(&mut self, result: &v1::AnswerResult) -> bool {
         self.agent.on_result(result);
         let answered = self.answered.as_ref();
@@ -184,7 +186,7 @@ impl<A: Agent> SeatSession<A> {
         }
     }
 
-    /// Settles the seat if it knows how its game ended.
+    /// Settles the seat if the result of its game is known.
     pub(crate) fn finish(&mut self) {
         if let Some(ending) = self.ending.take() {
             let outcome = Outcome {
@@ -200,19 +202,19 @@ impl<A: Agent> SeatSession<A> {
         }
     }
 
-    /// Settles the seat for good.
+    /// Settles the seat.
     pub(crate) fn settle(&mut self, outcome: Result<Outcome, PlayError>) {
         self.outcome = Some(outcome);
         self.open = None;
         self.owed = Owed::Nothing;
     }
 
-    /// Whether `speak` would say something.
+    /// Whether `speak` would add commands.
     pub(crate) fn has_to_speak(&self) -> bool {
         self.substituted || self.owed != Owed::Nothing
     }
 
-    /// Says what the seat owes now, asking the agent if need be. Once said it is not owed any more.
+    /// Adds the commands to send now; calls the agent if necessary.
     pub(crate) fn speak(&mut self, handle: u32, out: &mut Vec<v1::SeatCommand>) {
         if self.is_settled() {
             return;

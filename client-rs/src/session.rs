@@ -1,5 +1,6 @@
-//! All seats of one stream: turns responses into the commands to send next, without a stream or a clock of its own. What a single
-//! seat makes of an update is in `seat`, what a participant of a tournament makes of it in `participant`; who carries the messages is `run`.
+//! All seats of one stream: converts responses to the commands to send next, without a stream or a
+//! clock. `seat` handles a seat's updates, `participant` those of a tournament participant, and
+//! `run` carries the messages.
 
 use std::collections::BTreeMap;
 
@@ -10,11 +11,11 @@ use crate::seat::SeatSession;
 use crate::v1::{self, seat_update::Update};
 use crate::{Agent, Outcome, PlayError, PlayOptions};
 
-/// The protocol's limit of commands in a message.
+/// Maximum number of commands in a message.
 const MAX_COMMANDS: usize = 1024;
-/// Requests are cut at this size; servers take 64 KiB a message.
+/// Requests are split at this size; servers accept 64 KiB per message.
 const MAX_REQUEST_BYTES: usize = 32 * 1024;
-/// Upper bound of what an encoded command adds to its message besides its own length: a tag and a length.
+/// Upper bound of a command's overhead in its message: a tag and a length.
 const COMMAND_OVERHEAD_BYTES: usize = 6;
 /// Number of the first seat.
 const FIRST_SEAT: u32 = 1;
@@ -23,22 +24,22 @@ const PARTICIPANT: u32 = u32::MAX;
 
 /// The seats of one call of `play`.
 pub(crate) struct Session<'a, A> {
-    /// Seats whose games go on, by number; the number of a seat is the request id of its attachments.
+    /// Seats in play, by number; the number of a seat is the request id of its attachments.
     seats: BTreeMap<u32, SeatSession<A>>,
-    /// What has come of the others, by number.
+    /// Results of the other seats, by number.
     outcomes: BTreeMap<u32, Result<Outcome, PlayError>>,
     next_seat: u32,
     participant: Option<Participant<'a, A>>,
     options: PlayOptions,
-    /// The seat behind each handle of the present stream.
+    /// The seat of each handle of the current stream.
     by_handle: BTreeMap<u32, u32>,
-    /// Handles whose seats may owe an answer, in the order in which they were told so.
+    /// Handles of seats that may have to send something, in order.
     asked: Vec<u32>,
     progress: bool,
 }
 
 impl<'a, A: Agent> Session<'a, A> {
-    /// These seats, each with its agent.
+    /// Creates a session of seats, each with its agent.
     pub(crate) fn new(seats: impl IntoIterator<Item = (String, A)>, options: &PlayOptions) -> Self {
         let mut session = Self {
             seats: BTreeMap::new(),
@@ -56,7 +57,7 @@ impl<'a, A: Agent> Session<'a, A> {
         session
     }
 
-    /// The seats that this participant of a tournament will be given.
+    /// Creates a session of the seats of a tournament participant.
     pub(crate) fn of_participant(participant: Participant<'a, A>, options: &PlayOptions) -> Self {
         Self {
             participant: Some(participant),
@@ -64,8 +65,9 @@ impl<'a, A: Agent> Session<'a, A> {
         }
     }
 
-    /// What to say first on a new stream: an attachment of every seat whose game goes on. Those of a participant come before itself, each
-    /// with its own ticket: so it is told what it has not seen alone, and how a game ended meanwhile. The server leaves such seats as they are.
+    /// The first requests of a new stream: attach every seat in play. The seats of a participant
+    /// come before the participant, each with its own ticket, to resume after the last event seen
+    /// and to receive results of games that ended meanwhile. The server keeps these attachments.
     pub(crate) fn attach(&mut self) -> Vec<v1::PlayRequest> {
         self.by_handle.clear();
         self.asked.clear();
@@ -81,7 +83,7 @@ impl<'a, A: Agent> Session<'a, A> {
         pack(commands)
     }
 
-    /// Takes one response, all of it, then has every seat say what it owes.
+    /// Processes a response, then collects the commands of every seat.
     pub(crate) fn receive(&mut self, response: v1::PlayResponse) -> Vec<v1::PlayRequest> {
         for update in response.updates {
             if let Some(what) = update.update {
@@ -98,12 +100,12 @@ impl<'a, A: Agent> Session<'a, A> {
         pack(commands)
     }
 
-    /// The stream is gone: seats whose games are known to be over need no other.
+    /// Handles the loss of a stream: seats that know the result of their game are settled.
     pub(crate) fn disconnected(&mut self) {
         self.settling_all(SeatSession::finish);
     }
 
-    /// Gives up all seats whose games go on.
+    /// Gives up all seats in play.
     pub(crate) fn give_up(&mut self, error: &PlayError) {
         self.settling_all(|seat| seat.settle(Err(error.clone())));
         if let Some(participant) = &mut self.participant {
@@ -111,7 +113,7 @@ impl<'a, A: Agent> Session<'a, A> {
         }
     }
 
-    /// Whether every seat has its outcome and no other is to come.
+    /// Whether every seat has its result and no further seats can follow.
     pub(crate) fn is_over(&self) -> bool {
         self.seats.is_empty()
             && self
@@ -120,17 +122,18 @@ impl<'a, A: Agent> Session<'a, A> {
                 .is_none_or(Participant::is_settled)
     }
 
-    /// Whether anything new has happened since this was last asked.
+    /// Whether there was progress since the last call.
     pub(crate) fn take_progress(&mut self) -> bool {
         std::mem::take(&mut self.progress)
     }
 
-    /// The outcomes, in the order in which the seats were given.
+    /// The outcomes, in the order of the seats given.
     pub(crate) fn into_outcomes(self) -> Vec<Result<Outcome, PlayError>> {
         self.outcomes.into_values().collect()
     }
 
-    /// The outcomes of a participant's games, in the order in which it was seated, unless it could not take part to the end.
+    /// The outcomes of a participant's games, in the order in which it was seated; an error if it
+    /// could not take part to the end.
     pub(crate) fn into_played(self) -> Result<Vec<Outcome>, PlayError> {
         if let Some(participant) = self.participant {
             participant.into_end()?;
@@ -176,7 +179,8 @@ impl<'a, A: Agent> Session<'a, A> {
         }
     }
 
-    /// Which seat is attached: one that asked for it, or one in a game of a tournament, which may be new.
+    /// Finds the seat of an attachment: one that was requested, or one of a tournament's game,
+    /// which may be new.
     fn seat_attached(&mut self, attached: &v1::Attached) -> Option<u32> {
         if attached.request_id != 0 {
             let number = attached.request_id;
@@ -186,7 +190,7 @@ impl<'a, A: Agent> Session<'a, A> {
         let mut seats = self.seats.iter();
         let known = seats.find(|(_, seat)| seat.game_id() == attached.game_id);
         if let Some((&number, _)) = known {
-            // The newest handle of a seat is its only one: what becomes of an older does not concern it.
+            // The newest handle of a seat replaces older ones, whose updates are ignored.
             self.by_handle.retain(|_, other| *other != number);
             return Some(number);
         }
@@ -194,7 +198,7 @@ impl<'a, A: Agent> Session<'a, A> {
         Some(self.add(seat))
     }
 
-    /// Updates of seats that are attached. A handle without a seat is no reason to stop the others.
+    /// Handles updates of attached seats. Ignores unknown handles.
     fn seat_update(&mut self, handle: u32, update: Update) {
         if let (Update::Detached(detached), Some(participant)) = (&update, &mut self.participant)
             && participant.has(handle)
@@ -233,7 +237,8 @@ impl<'a, A: Agent> Session<'a, A> {
         }
     }
 
-    /// Does what may settle a seat. Of one that is settled nothing is kept but its outcome, lest a long tournament keep all its agents.
+    /// Runs an action that may settle a seat. Keeps only the outcome of a settled seat, to free
+    /// agents during a long tournament.
     fn settling(&mut self, number: u32, act: impl FnOnce(&mut SeatSession<A>)) {
         let Some(seat) = self.seats.get_mut(&number) else {
             return;
@@ -249,7 +254,7 @@ impl<'a, A: Agent> Session<'a, A> {
     }
 }
 
-/// Commands in as few messages as the limits allow; nearly always one.
+/// Packs commands into as few messages as the limits allow; nearly always one.
 fn pack(commands: Vec<v1::SeatCommand>) -> Vec<v1::PlayRequest> {
     let mut requests: Vec<v1::PlayRequest> = Vec::new();
     let mut bytes = 0;

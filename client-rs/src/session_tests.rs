@@ -1,4 +1,4 @@
-//! Courses of events as data: what the server says goes in as responses, what the client says is compared.
+//! Sequences of events as data: responses go in, commands are compared.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -11,14 +11,14 @@ use crate::v1::game_event::Kind;
 use crate::v1::seat_command::Command;
 use crate::{ActionId, Ending, Entropy};
 
-/// Answers with the actions it was given, in order, and writes down all that reaches it.
+/// Answers with given actions, in order, and logs all calls.
 struct Scripted {
     log: Arc<Mutex<Vec<String>>>,
     actions: VecDeque<u32>,
 }
 
 impl Scripted {
-    fn note(&self, line: String) {
+    fn log_line(&self, line: String) {
         self.log.lock().unwrap().push(line);
     }
 }
@@ -26,7 +26,7 @@ impl Scripted {
 impl Agent for Scripted {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let left = request.invalid_attempts_left;
-        self.note(format!("decide {} {left:?}", request.decision_id));
+        self.log_line(format!("decide {} {left:?}", request.decision_id));
         ActionId(
             self.actions
                 .pop_front()
@@ -34,29 +34,29 @@ impl Agent for Scripted {
         )
     }
     fn on_attached(&mut self, attached: &v1::Attached) {
-        self.note(format!("attached {}", attached.seat));
+        self.log_line(format!("attached {}", attached.seat));
     }
     fn on_event(&mut self, event: &v1::GameEvent) {
-        self.note(format!("event {}", event.sequence));
+        self.log_line(format!("event {}", event.sequence));
     }
     fn on_result(&mut self, result: &v1::AnswerResult) {
-        self.note(format!("result {}", result.status().as_str_name()));
+        self.log_line(format!("result {}", result.status().as_str_name()));
     }
     fn on_game_over(&mut self, outcome: &Outcome) {
-        self.note(format!(
+        self.log_line(format!(
             "over, place {:?}",
             outcome.standing().map(|line| line.place)
         ));
     }
 }
 
-/// A session of as many seats as there are lists of actions, and the log of each.
-struct Table {
+/// A session with one seat per list of actions, and their logs.
+struct Harness {
     session: Session<'static, Scripted>,
     logs: Vec<Arc<Mutex<Vec<String>>>>,
 }
 
-impl Table {
+impl Harness {
     fn new(actions: &[&[u32]]) -> Self {
         let logs: Vec<_> = actions.iter().map(|_| Arc::default()).collect();
         let seats = actions
@@ -78,14 +78,15 @@ impl Table {
         Self { session, logs }
     }
 
-    /// One seat, attached with handle 0 to a game whose next event is number 1.
+    /// A session of one seat, attached with handle 0 to a game whose next event is number 1.
     fn seated(actions: &[u32]) -> Self {
-        let mut table = Self::new(&[actions]);
-        table.connect(&[(0, 1, 1)]);
-        table
+        let mut harness = Self::new(&[actions]);
+        harness.connect(&[(0, 1, 1)]);
+        harness
     }
 
-    /// Connects, and attaches (handle, request id, next event). Gives the attachments asked for, as (request id, first event).
+    /// Connects and attaches (handle, request id, next event). Returns the requested attachments as
+    /// (request id, first event).
     fn connect(&mut self, attached: &[(u32, u32, u64)]) -> Vec<(u32, u64)> {
         let mut asked = Vec::new();
         for request in self.session.attach() {
@@ -109,15 +110,15 @@ impl Table {
             };
             (handle, Update::Attached(attached))
         });
-        assert_eq!(self.hear(updates.collect()), Vec::<String>::new());
+        assert_eq!(self.receive(updates.collect()), Vec::<String>::new());
         self.clear();
         asked
     }
 
-    /// What the session says to one response, request by request.
-    fn hear(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
+    /// The requests of the session after a response, in short.
+    fn receive(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
         let requests = self.session.receive(response(updates));
-        requests.iter().map(said).collect()
+        requests.iter().map(in_short).collect()
     }
 
     fn log(&self, seat: usize) -> Vec<String> {
@@ -142,7 +143,7 @@ fn response(updates: Vec<(u32, Update)>) -> v1::PlayResponse {
 }
 
 /// A request in short: `handle:decision=action` or `handle:resume`.
-fn said(request: &v1::PlayRequest) -> String {
+fn in_short(request: &v1::PlayRequest) -> String {
     let words = request
         .commands
         .iter()
@@ -216,26 +217,26 @@ fn substituted(seat: u32) -> Option<Kind> {
 
 #[test]
 fn answers_of_one_response_go_out_as_one_request_after_all_its_updates() {
-    let mut table = Table::new(&[&[10], &[20], &[]]);
-    let asked = table.connect(&[(0, 1, 1), (1, 2, 1), (2, 3, 1)]);
+    let mut harness = Harness::new(&[&[10], &[20], &[]]);
+    let asked = harness.connect(&[(0, 1, 1), (1, 2, 1), (2, 3, 1)]);
     assert_eq!(asked, [(1, 1), (2, 1), (3, 1)]);
-    let said = table.hear(vec![
+    let sent = harness.receive(vec![
         (1, decision(4)),
         (2, events(&[(1, None)])),
         (0, events(&[(1, None), (2, None)])),
         (0, decision(9)),
         (1, events(&[(1, None)])),
     ]);
-    assert_eq!(said, ["1:4=20 0:9=10"]);
-    assert_eq!(table.log(0), ["event 1", "event 2", "decide 9 None"]);
-    assert_eq!(table.log(1), ["event 1", "decide 4 None"]);
-    assert_eq!(table.log(2), ["event 1"]);
+    assert_eq!(sent, ["1:4=20 0:9=10"]);
+    assert_eq!(harness.log(0), ["event 1", "event 2", "decide 9 None"]);
+    assert_eq!(harness.log(1), ["event 1", "decide 4 None"]);
+    assert_eq!(harness.log(2), ["event 1"]);
 }
 
 #[test]
 fn only_an_invalid_answer_is_followed_by_another() {
     use v1::AnswerStatus::{Accepted, Closed, Invalid, UnknownDecision, Unspecified};
-    let table = [
+    let harness = [
         (Accepted, None, false),
         (Closed, None, false),
         (UnknownDecision, None, false),
@@ -244,113 +245,116 @@ fn only_an_invalid_answer_is_followed_by_another() {
         (Invalid, Some(3), true),
         (Invalid, Some(0), false),
     ];
-    for (status, left, again) in table {
-        let mut table = Table::seated(&[5, 6, 7]);
-        assert_eq!(table.hear(vec![(0, decision(1))]), ["0:1=5"]);
-        let said = table.hear(vec![(0, result(1, 5, status, left))]);
+    for (status, left, again) in harness {
+        let mut harness = Harness::seated(&[5, 6, 7]);
+        assert_eq!(harness.receive(vec![(0, decision(1))]), ["0:1=5"]);
+        let sent = harness.receive(vec![(0, result(1, 5, status, left))]);
         let expected: &[&str] = if again { &["0:1=6"] } else { &[] };
-        assert_eq!(said, expected, "{status:?} {left:?}");
+        assert_eq!(sent, expected, "{status:?} {left:?}");
         if again {
-            assert_eq!(table.log(0).last(), Some(&format!("decide 1 {left:?}")));
+            assert_eq!(harness.log(0).last(), Some(&format!("decide 1 {left:?}")));
         }
-        assert_eq!(table.hear(vec![(0, decision(2))]).len(), 1);
+        assert_eq!(harness.receive(vec![(0, decision(2))]).len(), 1);
     }
 }
 
 #[test]
-fn an_acknowledgement_that_comes_twice_does_not_ask_twice() {
-    let mut table = Table::seated(&[5, 6]);
-    table.hear(vec![(0, decision(1))]);
+fn a_repeated_acknowledgement_does_not_ask_twice() {
+    let mut harness = Harness::seated(&[5, 6]);
+    harness.receive(vec![(0, decision(1))]);
     let invalid = || (0, result(1, 5, v1::AnswerStatus::Invalid, Some(9)));
-    assert_eq!(table.hear(vec![invalid()]), ["0:1=6"]);
-    assert!(table.hear(vec![invalid()]).is_empty());
+    assert_eq!(harness.receive(vec![invalid()]), ["0:1=6"]);
+    assert!(harness.receive(vec![invalid()]).is_empty());
 }
 
 #[test]
-fn a_decision_closed_in_the_response_that_puts_the_next_is_not_answered() {
-    let mut table = Table::seated(&[5, 6, 7]);
-    table.hear(vec![(0, decision(1))]);
+fn a_decision_closed_in_the_response_with_the_next_is_not_answered() {
+    let mut harness = Harness::seated(&[5, 6, 7]);
+    harness.receive(vec![(0, decision(1))]);
     let closed = result(1, 5, v1::AnswerStatus::Closed, None);
-    assert_eq!(table.hear(vec![(0, closed), (0, decision(2))]), ["0:2=6"]);
-    let said = table.hear(vec![(0, decision(3)), (0, decision(4))]);
-    assert_eq!(said, ["0:4=7"]);
+    assert_eq!(
+        harness.receive(vec![(0, closed), (0, decision(2))]),
+        ["0:2=6"]
+    );
+    let sent = harness.receive(vec![(0, decision(3)), (0, decision(4))]);
+    assert_eq!(sent, ["0:4=7"]);
 }
 
 #[test]
 fn after_a_lost_connection_the_same_decision_gets_the_same_answer() {
-    let mut table = Table::seated(&[5, 6]);
-    table.hear(vec![(0, events(&[(1, None), (2, None)])), (0, decision(1))]);
-    table.session.disconnected();
-    assert_eq!(table.connect(&[(0, 1, 4)]), [(1, 3)]);
-    let said = table.hear(vec![(0, events(&[(2, None), (3, None)])), (0, decision(1))]);
-    assert_eq!(said, ["0:1=5"]);
+    let mut harness = Harness::seated(&[5, 6]);
+    harness.receive(vec![(0, events(&[(1, None), (2, None)])), (0, decision(1))]);
+    harness.session.disconnected();
+    assert_eq!(harness.connect(&[(0, 1, 4)]), [(1, 3)]);
+    let sent = harness.receive(vec![(0, events(&[(2, None), (3, None)])), (0, decision(1))]);
+    assert_eq!(sent, ["0:1=5"]);
     assert_eq!(
-        table.log(0),
+        harness.log(0),
         ["event 3"],
         "asked for nothing, told nothing twice"
     );
-    // The answer was wrong all along: now the agent is asked again.
+    // The answer was invalid: the agent is asked again.
     let invalid = result(1, 5, v1::AnswerStatus::Invalid, Some(1));
-    assert_eq!(table.hear(vec![(0, invalid)]), ["0:1=6"]);
+    assert_eq!(harness.receive(vec![(0, invalid)]), ["0:1=6"]);
 }
 
 #[test]
-fn after_a_lost_connection_another_decision_is_the_agents() {
-    let mut table = Table::seated(&[5, 6]);
-    table.hear(vec![(0, decision(1))]);
-    table.session.disconnected();
-    table.connect(&[(0, 1, 1)]);
-    assert_eq!(table.hear(vec![(0, decision(2))]), ["0:2=6"]);
+fn after_a_lost_connection_the_agent_takes_new_decisions() {
+    let mut harness = Harness::seated(&[5, 6]);
+    harness.receive(vec![(0, decision(1))]);
+    harness.session.disconnected();
+    harness.connect(&[(0, 1, 1)]);
+    assert_eq!(harness.receive(vec![(0, decision(2))]), ["0:2=6"]);
 }
 
 #[test]
-fn an_acknowledged_answer_is_not_kept() {
-    let mut table = Table::seated(&[5, 6]);
-    table.hear(vec![(0, decision(1))]);
-    table.hear(vec![(0, result(1, 5, v1::AnswerStatus::Invalid, Some(0)))]);
-    table.session.disconnected();
-    table.connect(&[(0, 1, 1)]);
-    assert_eq!(table.hear(vec![(0, decision(1))]), ["0:1=6"]);
+fn an_acknowledged_answer_is_not_stored() {
+    let mut harness = Harness::seated(&[5, 6]);
+    harness.receive(vec![(0, decision(1))]);
+    harness.receive(vec![(0, result(1, 5, v1::AnswerStatus::Invalid, Some(0)))]);
+    harness.session.disconnected();
+    harness.connect(&[(0, 1, 1)]);
+    assert_eq!(harness.receive(vec![(0, decision(1))]), ["0:1=6"]);
 }
 
 #[test]
-fn handles_are_those_of_the_present_stream() {
-    let mut table = Table::new(&[&[], &[20, 21]]);
-    table.connect(&[(0, 1, 1), (1, 2, 1)]);
-    assert_eq!(table.hear(vec![(1, decision(1))]), ["1:1=20"]);
+fn handles_belong_to_the_current_stream() {
+    let mut harness = Harness::new(&[&[], &[20, 21]]);
+    harness.connect(&[(0, 1, 1), (1, 2, 1)]);
+    assert_eq!(harness.receive(vec![(1, decision(1))]), ["1:1=20"]);
     assert!(
-        table
-            .hear(vec![
+        harness
+            .receive(vec![
                 (0, events(&[(1, ended())])),
                 (0, detached(v1::DetachReason::GameOver))
             ])
             .is_empty()
     );
-    table.session.disconnected();
-    assert_eq!(table.connect(&[(0, 2, 1)]), [(2, 1)]);
-    assert_eq!(table.hear(vec![(0, decision(2))]), ["0:2=21"]);
+    harness.session.disconnected();
+    assert_eq!(harness.connect(&[(0, 2, 1)]), [(2, 1)]);
+    assert_eq!(harness.receive(vec![(0, decision(2))]), ["0:2=21"]);
 }
 
 #[test]
-fn seats_leave_each_for_its_own_reason() {
+fn each_seat_has_its_own_reason_to_leave() {
     use v1::DetachReason::{GameOver, Requested, Superseded};
     let aborted = Kind::GameAborted(Box::new(v1::GameAborted {
         reason: v1::AbortReason::Closed.into(),
         reveal: None,
     }));
-    let mut table = Table::new(&[&[], &[], &[], &[], &[], &[]]);
-    table.connect(&[(0, 1, 1), (1, 2, 1), (2, 3, 1), (3, 4, 1), (4, 5, 1)]);
-    table.hear(vec![(0, events(&[(1, ended())])), (0, detached(GameOver))]);
-    table.hear(vec![
+    let mut harness = Harness::new(&[&[], &[], &[], &[], &[], &[]]);
+    harness.connect(&[(0, 1, 1), (1, 2, 1), (2, 3, 1), (3, 4, 1), (4, 5, 1)]);
+    harness.receive(vec![(0, events(&[(1, ended())])), (0, detached(GameOver))]);
+    harness.receive(vec![
         (1, detached(Superseded)),
         (2, detached(Requested)),
         (3, detached(GameOver)),
     ]);
-    table.hear(vec![
+    harness.receive(vec![
         (4, events(&[(1, Some(aborted))])),
         (4, detached(GameOver)),
     ]);
-    assert!(!table.session.is_over());
+    assert!(!harness.session.is_over());
     let refused = v1::Refused {
         code: 16,
         request_id: 6,
@@ -358,12 +362,12 @@ fn seats_leave_each_for_its_own_reason() {
         message: "no such ticket".to_owned(),
         metadata: [("field".to_owned(), "ticket".to_owned())].into(),
     };
-    table.hear(vec![(0, Update::Refused(refused))]);
-    assert!(table.session.is_over());
-    assert_eq!(table.log(0), ["event 1", "over, place Some(2)"]);
-    assert_eq!(table.log(4), ["event 1", "over, place None"]);
+    harness.receive(vec![(0, Update::Refused(refused))]);
+    assert!(harness.session.is_over());
+    assert_eq!(harness.log(0), ["event 1", "over, place Some(2)"]);
+    assert_eq!(harness.log(4), ["event 1", "over, place None"]);
 
-    let outcomes = table.session.into_outcomes();
+    let outcomes = harness.session.into_outcomes();
     let finished = outcomes[0].as_ref().unwrap();
     assert_eq!(
         (
@@ -397,60 +401,60 @@ fn seats_leave_each_for_its_own_reason() {
 }
 
 #[test]
-fn an_ending_seen_needs_no_new_connection() {
-    let mut table = Table::seated(&[]);
-    table.hear(vec![(0, events(&[(1, ended())]))]);
-    assert!(!table.session.is_over(), "there may be more to come");
-    table.session.disconnected();
-    assert!(table.session.is_over());
-    assert!(table.session.into_outcomes()[0].is_ok());
+fn a_known_result_needs_no_new_connection() {
+    let mut harness = Harness::seated(&[]);
+    harness.receive(vec![(0, events(&[(1, ended())]))]);
+    assert!(!harness.session.is_over(), "there may be more to come");
+    harness.session.disconnected();
+    assert!(harness.session.is_over());
+    assert!(harness.session.into_outcomes()[0].is_ok());
 }
 
 #[test]
-fn giving_up_leaves_outcomes_alone() {
-    let mut table = Table::new(&[&[], &[]]);
-    table.connect(&[(0, 1, 1), (1, 2, 1)]);
-    table.hear(vec![
+fn giving_up_does_not_change_outcomes() {
+    let mut harness = Harness::new(&[&[], &[]]);
+    harness.connect(&[(0, 1, 1), (1, 2, 1)]);
+    harness.receive(vec![
         (0, events(&[(1, ended())])),
         (0, detached(v1::DetachReason::GameOver)),
     ]);
-    table.session.give_up(&PlayError::Superseded);
-    assert!(table.session.is_over());
-    let outcomes = table.session.into_outcomes();
+    harness.session.give_up(&PlayError::Superseded);
+    assert!(harness.session.is_over());
+    let outcomes = harness.session.into_outcomes();
     assert!(outcomes[0].is_ok() && outcomes[1].is_err());
 }
 
 #[test]
-fn a_substituted_seat_says_once_that_it_is_back() {
-    let mut table = Table::seated(&[5]);
-    let said = table.hear(vec![(
+fn a_substituted_seat_resumes_once() {
+    let mut harness = Harness::seated(&[5]);
+    let sent = harness.receive(vec![(
         0,
         events(&[(1, substituted(3)), (2, substituted(0))]),
     )]);
-    assert_eq!(said, ["0:resume"]);
-    assert!(table.hear(vec![(0, events(&[(3, None)]))]).is_empty());
+    assert_eq!(sent, ["0:resume"]);
+    assert!(harness.receive(vec![(0, events(&[(3, None)]))]).is_empty());
     let returned = Some(Kind::Returned(v1::Returned { seat: 0 }));
-    let said = table.hear(vec![
+    let sent = harness.receive(vec![
         (0, events(&[(4, substituted(0)), (5, returned)])),
         (0, decision(1)),
     ]);
-    assert_eq!(said, ["0:1=5"]);
+    assert_eq!(sent, ["0:1=5"]);
 }
 
 #[test]
 fn a_substitution_before_the_attachment_is_over() {
-    let mut table = Table::new(&[&[]]);
-    table.connect(&[(0, 1, 10)]);
+    let mut harness = Harness::new(&[&[]]);
+    harness.connect(&[(0, 1, 10)]);
     assert!(
-        table
-            .hear(vec![(0, events(&[(1, substituted(0))]))])
+        harness
+            .receive(vec![(0, events(&[(1, substituted(0))]))])
             .is_empty()
     );
 }
 
 #[test]
-fn strange_handles_and_numbers_stop_nobody() {
-    let mut table = Table::seated(&[5]);
+fn unknown_handles_and_numbers_are_ignored() {
+    let mut harness = Harness::seated(&[5]);
     let stray = |request_id| {
         Update::Attached(v1::Attached {
             request_id,
@@ -463,7 +467,7 @@ fn strange_handles_and_numbers_stop_nobody() {
             ..Default::default()
         })
     };
-    let said = table.hear(vec![
+    let sent = harness.receive(vec![
         (u32::MAX, decision(1)),
         (7, detached(v1::DetachReason::Superseded)),
         (u32::MAX, stray(1)),
@@ -475,8 +479,8 @@ fn strange_handles_and_numbers_stop_nobody() {
         (0, events(&[(u64::MAX, None)])),
         (0, decision(1)),
     ]);
-    assert_eq!(said, ["0:1=5"]);
-    assert!(!table.session.is_over());
+    assert_eq!(sent, ["0:1=5"]);
+    assert!(!harness.session.is_over());
 }
 
 #[test]
@@ -493,14 +497,14 @@ fn requests_stay_within_the_limits_of_a_message() {
         action_scores: vec![0.5; 1000],
         ..Default::default()
     };
-    let table = [
+    let harness = [
         (vec![], 0),
         (vec![answer(None); 1000], 1),
         (vec![answer(None); 1025], 2),
         (vec![answer(Some(large.clone())); 20], 3),
         (vec![answer(None), answer(Some(large))], 1),
     ];
-    for (commands, expected) in table {
+    for (commands, expected) in harness {
         let requests = pack(commands.clone());
         assert_eq!(requests.len(), expected);
         for request in &requests {

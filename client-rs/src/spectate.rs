@@ -12,7 +12,7 @@ use crate::connection::MAX_RESPONSE_BYTES;
 use crate::error::{Error, may_retry};
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 
-/// A spectator of one room. Made by [`Client::spectate`](crate::Client::spectate).
+/// A spectator of one room, created by [`Client::spectate`](crate::Client::spectate).
 #[derive(Debug)]
 pub struct Spectator {
     client: SpectatorServiceClient<Channel>,
@@ -42,29 +42,30 @@ impl Spectator {
         }
     }
 
-    /// With this backoff instead of the standard one.
+    /// Replaces the default backoff.
     #[must_use]
     pub fn with_backoff(mut self, backoff: Backoff) -> Self {
         self.backoff = backoff;
         self
     }
 
-    /// The room as it stood when the watching last began; `None` before the first event.
+    /// The room when the latest connection was made; `None` before the first event.
     pub fn room(&self) -> Option<&v1::Room> {
         self.room.as_ref()
     }
 
-    /// Number of the next event to come: where to go on in another process.
+    /// Number of the next event, for resuming in another process.
     pub fn next_sequence(&self) -> u64 {
         let first = self.ready.front().map(|event| event.sequence);
         first.unwrap_or(self.next_event).max(1)
     }
 
-    /// The next event, or `None` when the game is over. May be dropped while it waits: nothing is lost.
+    /// The next event, or `None` when the game is over. Cancel safe: dropping the future loses no
+    /// event.
     ///
     /// # Errors
-    /// What the server refuses (`ROOM_UNKNOWN`, `SPECTATORS_NOT_ADMITTED`), or the last failure when the connection cannot be made
-    /// again in time. After an error there is nothing more.
+    /// The server's refusal (`ROOM_UNKNOWN`, `SPECTATORS_NOT_ADMITTED`), or the last failure if the
+    /// connection cannot be restored in time. After an error there are no more events.
     pub async fn next(&mut self) -> Result<Option<v1::GameEvent>, Error> {
         loop {
             if let Some(event) = self.ready.pop_front() {
@@ -81,7 +82,7 @@ impl Spectator {
         }
     }
 
-    /// The same as a [`Stream`].
+    /// Converts the spectator to a [`Stream`].
     pub fn into_stream(self) -> impl Stream<Item = Result<v1::GameEvent, Error>> + Send {
         futures::stream::try_unfold(self, |mut spectator| async {
             let event = spectator.next().await?;

@@ -1,5 +1,5 @@
-//! Tournaments: the calls of their service, following one, and taking part in one. What a participant makes of what it is told is in
-//! `participant`.
+//! Tournaments: calls, following a tournament, and taking part in one. `participant` processes the
+//! updates of a participant.
 
 use futures::Stream;
 use tokio::time::{Instant, sleep};
@@ -16,11 +16,13 @@ use crate::v1::tournament_service_client::TournamentServiceClient;
 use crate::{Agent, Client, Outcome, PlayOptions, run, v1};
 
 impl Client {
-    /// Makes a tournament. The response holds the join code for its participants and the token that starts and closes it.
+    /// Creates a tournament. The response has the join code for its participants and the token that
+    /// starts and closes it.
     ///
     /// # Errors
-    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SETTINGS_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
-    /// `TOO_MANY_TOURNAMENTS`, `DISK_NEARLY_FULL`; `SHUTTING_DOWN`.
+    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SETTINGS_REFUSED` or `NAME_REFUSED`, with the
+    /// offending field in the metadata; `TOO_MANY_TOURNAMENTS`, `DISK_NEARLY_FULL`;
+    /// `SHUTTING_DOWN`.
     pub async fn create_tournament(
         &self,
         settings: v1::TournamentSettings,
@@ -37,7 +39,7 @@ impl Client {
         .await
     }
 
-    /// One tournament.
+    /// The public view of a tournament.
     ///
     /// # Errors
     /// `TOURNAMENT_UNKNOWN`.
@@ -53,10 +55,10 @@ impl Client {
         one(response.tournament)
     }
 
-    /// A page of the server's tournaments, newest first, without their participants.
+    /// A page of the server's tournaments, newest first, without participants.
     ///
     /// # Errors
-    /// A failed connection, or a page token that the server does not know.
+    /// A failed connection, or an unknown page token.
     pub async fn list_tournaments(
         &self,
         request: v1::ListTournamentsRequest,
@@ -65,8 +67,9 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// Joins a tournament; its join code is enough to find it. The response holds the ticket for
-    /// [`play_tournament`](Self::play_tournament). A call whose response is lost is repeated and adds no second participant.
+    /// Joins a tournament, which the join code identifies. The response has the ticket for
+    /// [`play_tournament`](Self::play_tournament). If the response is lost, the call is repeated
+    /// and adds no second participant.
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_NOT_ADMITTED`, `KIND_REFUSED`,
@@ -83,7 +86,7 @@ impl Client {
         .await
     }
 
-    /// Begins a tournament.
+    /// Starts a tournament.
     ///
     /// # Errors
     /// `OWNER_TOKEN_WRONG`, `TOO_FEW_PARTICIPANTS`, `TOURNAMENT_STARTED`, `TOURNAMENT_UNKNOWN`.
@@ -100,7 +103,7 @@ impl Client {
         one(response.into_inner().tournament)
     }
 
-    /// Closes a tournament: running games are aborted, what has been counted stays.
+    /// Closes a tournament: running games are aborted, counted results remain.
     ///
     /// # Errors
     /// `OWNER_TOKEN_WRONG`, `TOURNAMENT_UNKNOWN`.
@@ -117,7 +120,7 @@ impl Client {
         one(response.into_inner().tournament)
     }
 
-    /// Standings of a tournament, ratings, and how sure the order is; final once it is over.
+    /// Standings, ratings and the certainty of the order; final once the tournament is over.
     ///
     /// # Errors
     /// `TOURNAMENT_UNKNOWN`.
@@ -144,7 +147,7 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// Everybody who has played a rated game on the server, best first.
+    /// The ratings of everybody who has played rated games on the server, best first.
     ///
     /// # Errors
     /// A failed connection.
@@ -156,7 +159,7 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// Follows a tournament. The connection is made when the first report is asked for.
+    /// Follows a tournament. Connects when the first report is requested.
     pub fn follow_tournament(&self, tournament_id: impl Into<String>) -> TournamentFollower {
         TournamentFollower {
             service: service(self),
@@ -168,17 +171,19 @@ impl Client {
         }
     }
 
-    /// Takes part in a tournament to its end, with the ticket from [`join_tournament`](Self::join_tournament): over one stream, in as many
-    /// games at a time as the participant said it can play. `make` gives an agent for each game when the participant is seated in it; the
-    /// agent keeps its game across lost connections. Dropping the future leaves: the tournament's games wait for the participant for a
-    /// while, then count as forfeited.
+    /// Takes part in a tournament until it is over, with the ticket from
+    /// [`join_tournament`](Self::join_tournament): over one stream, in up to as many games at a
+    /// time as declared when joining. `make` creates the agent of each game; it survives lost
+    /// connections. Dropping the future leaves: games wait for the participant for a while, then it
+    /// forfeits them.
     ///
-    /// The outcomes come in the order in which games were begun, aborted ones among them. A game that was not played to its end here,
-    /// because its room was gone when the connection was made again, has none; the server counts it, or calls it again.
+    /// Returns the outcomes in the order in which the games started, including aborted ones. A game
+    /// whose room was gone after a reconnection has no outcome; the server counts it or calls it
+    /// again.
     ///
     /// # Errors
-    /// See [`PlayError`], of the participant: `Superseded` when a newer connection takes part in its place. What had come of games by then
-    /// their agents were told ([`Agent::on_game_over`]).
+    /// See [`PlayError`], for the participant: `Superseded` if a newer connection takes part in its
+    /// place. Agents of games that had ended by then have been notified ([`Agent::on_game_over`]).
     pub async fn play_tournament<A: Agent>(
         &self,
         ticket: impl Into<String>,
@@ -188,7 +193,8 @@ impl Client {
         self.play_tournament_with(ticket, make, &options).await
     }
 
-    /// The same with options. The entropy is one for all games of the participant; it counts in those that are dealt independently.
+    /// [`play_tournament`](Self::play_tournament) with options. The entropy is the same for all
+    /// games of the participant; it counts in those that are dealt independently.
     ///
     /// # Errors
     /// As [`play_tournament`](Self::play_tournament).
@@ -205,7 +211,7 @@ impl Client {
     }
 }
 
-/// Follows one tournament, across lost connections. Made by [`Client::follow_tournament`].
+/// Follows one tournament across lost connections; created by [`Client::follow_tournament`].
 #[derive(Debug)]
 pub struct TournamentFollower {
     service: TournamentServiceClient<Channel>,
@@ -217,19 +223,19 @@ pub struct TournamentFollower {
 }
 
 impl TournamentFollower {
-    /// With this backoff instead of the standard one.
+    /// Replaces the default backoff.
     #[must_use]
     pub fn with_backoff(mut self, backoff: Backoff) -> Self {
         self.backoff = backoff;
         self
     }
 
-    /// How the tournament stands: at once, then whenever that has changed; `None` after the report of its end. May be dropped while it
-    /// waits: nothing is lost.
+    /// The state of the tournament: at once, then after every change; `None` after the report of
+    /// its end. Cancel safe: dropping the future loses nothing.
     ///
     /// # Errors
-    /// What the server refuses (`TOURNAMENT_UNKNOWN`, `TOO_MANY_FOLLOWERS`), or the last failure when the connection cannot be made again in
-    /// time. After an error there is nothing more.
+    /// The server's refusal (`TOURNAMENT_UNKNOWN`, `TOO_MANY_FOLLOWERS`), or the last failure if
+    /// the connection cannot be restored in time. After an error there are no more reports.
     pub async fn next(&mut self) -> Result<Option<v1::FollowTournamentResponse>, Error> {
         while !self.over {
             match self.receive().await {
@@ -247,7 +253,7 @@ impl TournamentFollower {
         Ok(None)
     }
 
-    /// The same as a [`Stream`].
+    /// Converts the follower to a [`Stream`].
     pub fn into_stream(
         self,
     ) -> impl Stream<Item = Result<v1::FollowTournamentResponse, Error>> + Send {

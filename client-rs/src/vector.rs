@@ -1,5 +1,5 @@
-//! Games of one's own, stepped in batches: the stream of `VectorService`, and nothing of what is done with the columns. Where the service
-//! stands in what is measured, as in the load program, this is the whole client.
+//! Games stepped in batches: the stream of `VectorService`, without any interpretation of the
+//! columns.
 
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -18,21 +18,21 @@ pub struct VectorGames {
     responses: Streaming<v1::RunResponse>,
     started: v1::VectorStarted,
     records: Vec<v1::VectorRecord>,
-    /// Whether a batch is on its way that nobody waits for any more.
+    /// Whether the response to a cancelled call is still to come.
     given_up: bool,
 }
 
 impl Client {
-    /// Begins games of one's own and gives their first batch.
+    /// Starts games and returns their first batch.
     ///
     /// # Errors
-    /// `SETUP_REFUSED`, `RULE_SET_REFUSED`, `SCRIPT_REFUSED`, `BRANCH_REFUSED`, `SEED_REFUSED`, `GAME_UNKNOWN` with the field at fault in
-    /// the metadata; `TOO_MANY_VECTOR_STREAMS`.
+    /// `SETUP_REFUSED`, `RULE_SET_REFUSED`, `SCRIPT_REFUSED`, `BRANCH_REFUSED`, `SEED_REFUSED`,
+    /// `GAME_UNKNOWN` with the offending field in the metadata; `TOO_MANY_VECTOR_STREAMS`.
     pub async fn vector(
         &self,
         setup: v1::VectorSetup,
     ) -> Result<(VectorGames, Box<v1::VectorBatch>), Error> {
-        // One answer is on its way at a time.
+        // One request is in flight at a time.
         let (requests, stream) = mpsc::channel(1);
         send(&requests, Request::Setup(Box::new(setup))).await;
         let mut service = VectorServiceClient::new(self.channel())
@@ -55,21 +55,23 @@ impl Client {
 }
 
 impl VectorGames {
-    /// What the server made of the setup.
+    /// The setup as the server applied it.
     pub fn started(&self) -> &v1::VectorStarted {
         &self.started
     }
 
-    /// Answers each row of the last batch, in its order, and gives the next batch. A call that is dropped before it has its batch ends
-    /// the games: nobody would know which rows the next actions are for.
+    /// Answers each row of the last batch, in order, and returns the next batch. Not cancel safe:
+    /// dropping the future before the batch arrives ends the games, because it would be unknown
+    /// which rows the next actions are for.
     ///
     /// # Errors
-    /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` where that is an error; either ends the games. `STEP_GIVEN_UP` when a call was dropped.
+    /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` if configured as an error; both end the games.
+    /// `STEP_GIVEN_UP` after a dropped call.
     pub async fn step(
         &mut self,
         actions: impl IntoIterator<Item = ActionId>,
     ) -> Result<Box<v1::VectorBatch>, Error> {
-        // An action beyond 16 bits is as illegal as the largest of them.
+        // An action beyond 16 bits is as illegal as the largest index.
         let column: Vec<u8> = (actions.into_iter())
             .flat_map(|action| u16::try_from(action.0).unwrap_or(u16::MAX).to_le_bytes())
             .collect();
@@ -79,7 +81,8 @@ impl VectorGames {
         self.ask(Request::Actions(actions)).await
     }
 
-    /// Gives up games and begins them anew; gives the next batch. Dropped calls as with [`step`](Self::step).
+    /// Abandons games and starts new ones in their place; returns the next batch. As cancel safe as
+    /// [`step`](Self::step).
     ///
     /// # Errors
     /// `RESET_REFUSED`, which ends the games. `STEP_GIVEN_UP`.
@@ -87,7 +90,8 @@ impl VectorGames {
         self.ask(Request::Reset(reset)).await
     }
 
-    /// The parts of records that have come since this was last called, in order, if the setup asked for records. Until then they are kept.
+    /// The parts of records received since the last call, in order, if the setup requests records.
+    /// They are stored until then.
     pub fn take_records(&mut self) -> Vec<v1::VectorRecord> {
         std::mem::take(&mut self.records)
     }

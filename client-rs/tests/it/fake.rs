@@ -1,4 +1,4 @@
-//! A server that follows a script, one per stream. It knows no rules and no rooms.
+//! A server that follows scripts, one per stream. It has no rules and no rooms.
 
 use std::collections::VecDeque;
 use std::future::Future;
@@ -14,20 +14,21 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
 use tonic::{Request, Response, Status, Streaming};
 
-/// One Play stream as the script sees it.
+/// A Play stream in a script.
 pub(crate) struct Line {
     requests: Streaming<v1::PlayRequest>,
     responses: mpsc::Sender<Result<v1::PlayResponse, Status>>,
 }
 
 impl Line {
-    /// The commands of the next request; none when the client has half-closed.
+    /// The commands of the next request; `None` after the client has half-closed.
     pub(crate) async fn heard(&mut self) -> Vec<v1::SeatCommand> {
         let request = self.requests.message().await.expect("the client is there");
         request.map(|it| it.commands).unwrap_or_default()
     }
 
-    /// The next request, which must be one attachment; attaches it as the handle and seat of its request id, less one.
+    /// Reads a request with one attachment, and attaches it as handle and seat number request id -
+    /// 1.
     pub(crate) async fn attaches(&mut self) -> v1::Attach {
         let commands = self.heard().await;
         let [
@@ -86,10 +87,11 @@ impl Line {
 
 type Scripted = Pin<Box<dyn Future<Output = ()> + Send>>;
 type PlayScript = Box<dyn FnOnce(Line) -> Scripted + Send>;
-/// What a spectator's stream gives, in order; it ends after the last.
+/// The responses of a spectator's stream, in order; it ends after the last.
 pub(crate) type WatchScript = Vec<Result<v1::SpectatorServiceWatchResponse, Status>>;
 
-/// The scripts still to be followed. A panic in one fails the test through the client, which then finds no server.
+/// The remaining scripts. A panic in one fails the test through the client, which then finds no
+/// server.
 #[derive(Clone, Default)]
 pub(crate) struct Fake {
     plays: Arc<Mutex<VecDeque<PlayScript>>>,
@@ -112,7 +114,7 @@ impl Fake {
         self.watches.lock().unwrap().push_back(script);
     }
 
-    /// Where each spectator's stream was asked to begin.
+    /// The first event requested on each spectator's stream.
     pub(crate) fn watched_from(&self) -> Vec<u64> {
         self.watched_from.lock().unwrap().clone()
     }
@@ -206,7 +208,7 @@ impl spectator_service_server::SpectatorService for Fake {
     }
 }
 
-/// An event with nothing in it but its number.
+/// An event with only a number.
 pub(crate) fn event(sequence: u64) -> v1::GameEvent {
     v1::GameEvent {
         sequence,

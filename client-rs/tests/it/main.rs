@@ -1,4 +1,4 @@
-//! The client against a small server of the test's own, over sockets. What the real server does is tested with the whole system.
+//! The client on a scripted server, over sockets. The whole-system tests use the real server.
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod fake;

@@ -1,4 +1,4 @@
-//! Streams that break, seats that are lost, many seats on one stream.
+//! Lost streams, lost seats, and many seats on one stream.
 
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
@@ -9,12 +9,12 @@ use tonic::Status;
 
 use crate::fake::{Fake, Line, connect, event, listen};
 
-/// Answers every decision with ten times its number; reports what reaches it.
+/// Answers every decision with ten times its number, and reports all calls.
 struct Tens(Sender<String>);
 
 impl Tens {
     fn note(&self, line: String) {
-        // A test that does not look at the notes has dropped their receiver.
+        // Tests that do not read the notes have dropped the receiver.
         let _sent = self.0.send(line);
     }
 }
@@ -62,7 +62,8 @@ fn accepted(decision_id: u64, action: u32) -> Update {
     })
 }
 
-/// The end of the game as event `sequence`, and of the seat, to the seats with these handles; then waits for the client to leave.
+/// Ends the game with event `sequence`, and the seats with these handles; then waits for the client
+/// to leave.
 async fn ends(mut line: Line, handles: &[u32], sequence: u64) {
     let standing = |&seat: &u32| v1::Standing {
         seat,
@@ -86,7 +87,7 @@ async fn ends(mut line: Line, handles: &[u32], sequence: u64) {
 }
 
 #[tokio::test]
-async fn a_stream_lost_in_mid_decision_is_resumed_with_the_same_answer() {
+async fn a_stream_lost_during_a_decision_resumes_with_the_same_answer() {
     let fake = Fake::default();
     fake.play(async |mut line: Line| {
         let attach = line.attaches().await;
@@ -122,7 +123,7 @@ async fn a_stream_lost_in_mid_decision_is_resumed_with_the_same_answer() {
 }
 
 #[test]
-fn a_server_that_dies_and_comes_back_is_found_again() {
+fn the_client_reconnects_to_a_restarted_server() {
     let runtime = || {
         let mut builder = tokio::runtime::Builder::new_multi_thread();
         builder.worker_threads(1).enable_all().build().unwrap()
@@ -157,7 +158,7 @@ fn a_server_that_dies_and_comes_back_is_found_again() {
             .await
     });
     hears.recv().unwrap();
-    // With its runtime go all its connections.
+    // Dropping the runtime closes all its connections.
     server.shutdown_background();
     let server = runtime();
     server.spawn(second.clone().serve(again));
@@ -202,7 +203,7 @@ async fn many_seats_answer_in_one_request() {
 }
 
 #[tokio::test]
-async fn a_superseded_seat_is_not_fought_for() {
+async fn a_superseded_seat_does_not_reconnect() {
     let fake = Fake::default();
     fake.play(async |mut line: Line| {
         line.attaches().await;
@@ -221,7 +222,7 @@ async fn a_superseded_seat_is_not_fought_for() {
 }
 
 #[tokio::test]
-async fn what_is_refused_for_good_is_not_tried_again() {
+async fn a_permanent_refusal_is_not_retried() {
     let fake = Fake::default();
     fake.play(async |line: Line| line.fails(Status::unauthenticated("who are you")).await);
     fake.play(async |_line: Line| panic!("there is no second stream"));
@@ -239,7 +240,7 @@ async fn what_is_refused_for_good_is_not_tried_again() {
 }
 
 #[tokio::test]
-async fn an_outage_is_given_up_in_the_end() {
+async fn the_client_gives_up_after_a_long_outage() {
     let fake = Fake::default();
     let client = fake.start().await;
     for _ in 0..1000 {
@@ -259,7 +260,7 @@ async fn an_outage_is_given_up_in_the_end() {
 }
 
 #[tokio::test]
-async fn addresses_that_lead_nowhere_say_so() {
+async fn invalid_addresses_are_reported() {
     let closed = {
         let listener = listen();
         listener.local_addr().unwrap().to_string()
