@@ -139,7 +139,7 @@ impl Export {
 
     /// The report for people.
     fn write_report(&self, out: &mut impl Write, exported: &Exported) -> std::io::Result<()> {
-        for left_out in &exported.left_out {
+        for left_out in &exported.skipped {
             anstream::eprintln!(
                 "left out: {}: {}",
                 left_out.path.display(),
@@ -171,7 +171,7 @@ impl Export {
 
     fn json_report(&self, exported: &Exported) -> Value {
         let left_out: Vec<Value> = exported
-            .left_out
+            .skipped
             .iter()
             .map(|record| json!({ "path": record.path.display().to_string(), "problem": record.problem }))
             .collect();

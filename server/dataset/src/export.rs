@@ -50,7 +50,7 @@ pub struct Export {
 
 /// A skipped record.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct Skipped {
     /// The file.
     pub path: PathBuf,
     /// The reason.
@@ -71,7 +71,7 @@ pub struct Exported {
     /// Games excluded by the filter.
     pub filtered: u64,
     /// Damaged records and duplicate games.
-    pub left_out: Vec<LeftOut>,
+    pub skipped: Vec<Skipped>,
     /// The files except the list of checksums.
     pub files: Vec<FileSummary>,
     /// Games by origin.

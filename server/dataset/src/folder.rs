@@ -92,7 +92,7 @@ impl NewFolder {
     }
 
     /// Writes the checksums and moves the folder into place.
-    pub(super) fn put_in_place(self, files: &[FileSummary]) -> Result<(), FolderError> {
+    pub(super) fn move_into_place(self, files: &[FileSummary]) -> Result<(), FolderError> {
         let target = self.target.clone();
         let io = |source| FolderError::Io {
             path: target.clone(),

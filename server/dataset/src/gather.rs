@@ -55,7 +55,7 @@ struct Gatherer {
     /// Known gifts of the Shift's exchange.
     known_gifts: BySeat<KnownGifts>,
     /// The current participants, which can change before the game.
-    sitting: Vec<Option<Arc<SeatInfo>>>,
+    participants: Vec<Option<Arc<SeatInfo>>>,
     latest: Vec<Option<LatestExpression>>,
     problem: Option<ReplayError>,
 }
@@ -65,7 +65,7 @@ impl Gatherer {
         let players = game.seats.len();
         let built_in = |seat: &Arc<SeatInfo>| seat.built_in.is_some().then(|| seat.clone());
         Self {
-            sitting: game.seats.iter().map(built_in).collect(),
+            participants: game.seats.iter().map(built_in).collect(),
             rows: GameRows {
                 game,
                 decisions: Vec::new(),
@@ -90,9 +90,9 @@ impl Gatherer {
             Line::Event(event) => match &event.kind {
                 Some(Kind::Seated(seated)) => {
                     let info = SeatInfo::new(&seated.name, seated.kind(), "");
-                    self.sit(seated.seat, Some(info));
+                    self.set_participant(seated.seat, Some(info));
                 }
-                Some(Kind::Vacated(vacated)) => self.sit(vacated.seat, None),
+                Some(Kind::Vacated(vacated)) => self.set_participant(vacated.seat, None),
                 Some(Kind::ShiftStarted(_)) => {
                     // Only imported records lack cards.
                     let all = self.rows.game.origin != IMPORTED;
@@ -130,12 +130,12 @@ impl Gatherer {
     }
 
     /// Changes the participant of a seat, dropping the last expression.
-    fn sit(&mut self, seat: u32, who: Option<SeatInfo>) {
+    fn set_participant(&mut self, seat: u32, participant: Option<SeatInfo>) {
         let seat = seat as usize;
-        if let (Some(sitting), Some(latest)) =
-            (self.sitting.get_mut(seat), self.latest.get_mut(seat))
+        if let (Some(current), Some(latest)) =
+            (self.participants.get_mut(seat), self.latest.get_mut(seat))
         {
-            *sitting = who.map(Arc::new);
+            *current = participant.map(Arc::new);
             *latest = None;
         }
     }
@@ -277,7 +277,7 @@ impl Gatherer {
         self.rows.expressions.push(ExpressionRow {
             game: Arc::clone(&self.rows.game),
             seat,
-            player: self.sitting[seat].clone(),
+            player: self.participants[seat].clone(),
             elapsed_ms,
             decisions_before: self.rows.decisions.len() as u64,
             public,

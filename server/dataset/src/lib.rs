@@ -19,7 +19,7 @@ mod run;
 mod sheet;
 
 pub use column::{ColumnInfo, Type, markdown};
-pub use export::{Export, Exported, Filter, Layout, LeftOut};
+pub use export::{Export, Exported, Filter, Layout, Skipped};
 pub use files::FileSummary;
 pub use folder::FolderError;
 pub use formats::Format;

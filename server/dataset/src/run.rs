@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::card;
 use super::chefshatgym::lay_out;
 use super::decisions::{self, DecisionRow};
-use super::export::{Export, Exported, Layout, LeftOut};
+use super::export::{Export, Exported, Layout, Skipped};
 use super::expressions::{self, ExpressionRow};
 use super::files::{FileSummary, SummedFile};
 use super::folder::{FolderError, NewFolder};
@@ -36,7 +36,7 @@ pub enum ExportError {
     #[error("{}", damages(.named, *.more))]
     Damaged {
         /// The first of them.
-        named: Vec<LeftOut>,
+        named: Vec<Skipped>,
         /// The number of further ones.
         more: u64,
     },
@@ -53,9 +53,9 @@ pub enum ExportError {
     },
 }
 
-fn damages(named: &[LeftOut], more: u64) -> String {
+fn damages(named: &[Skipped], more: u64) -> String {
     let mut text = String::from("nothing was exported because of damaged records:\n");
-    for LeftOut { path, problem } in named {
+    for Skipped { path, problem } in named {
         text.push_str(&format!("  {}: {problem}\n", path.display()));
     }
     if more > 0 {
@@ -84,7 +84,7 @@ impl Export {
         let mut games: HashMap<String, PathBuf> = HashMap::new();
         let mut damaged = 0;
         for RecordFile { path, bytes } in records {
-            let left_out = match self.read(path) {
+            let skipped = match self.read(path) {
                 Err(problem) => {
                     damaged += 1;
                     Some(problem)
@@ -105,14 +105,14 @@ impl Export {
                     }
                 },
             };
-            exported.left_out.extend(left_out.map(|problem| LeftOut {
+            exported.skipped.extend(skipped.map(|problem| Skipped {
                 path: path.clone(),
                 problem,
             }));
             progress(*bytes);
         }
         if damaged > 0 && !self.skip_damaged {
-            return Err(damaged_error(exported.left_out));
+            return Err(damaged_error(exported.skipped));
         }
         if exported.games == 0 {
             return Err(ExportError::NothingLeft {
@@ -124,7 +124,7 @@ impl Export {
         let mut file = SummedFile::create(folder.path(), card::FILE_NAME).map_err(write)?;
         file.write_all(card.as_bytes()).map_err(write)?;
         exported.files.push(file.finish().map_err(write)?);
-        folder.put_in_place(&exported.files)?;
+        folder.move_into_place(&exported.files)?;
         Ok(exported)
     }
 
@@ -146,7 +146,7 @@ impl Export {
     }
 }
 
-fn damaged_error(mut damaged: Vec<LeftOut>) -> ExportError {
+fn damaged_error(mut damaged: Vec<Skipped>) -> ExportError {
     let more = damaged.len().saturating_sub(NAMED_DAMAGES) as u64;
     damaged.truncate(NAMED_DAMAGES);
     ExportError::Damaged {

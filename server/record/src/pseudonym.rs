@@ -15,9 +15,9 @@ pub struct Pseudonym {
     pub pseudonym: String,
 }
 
-/// The changes made to a record.
+/// Numbers of changes to a record.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct TakenOut {
+pub struct Redactions {
     /// Occurrences of the name replaced.
     pub names: u64,
     /// Expressions dropped.
@@ -26,7 +26,7 @@ pub struct TakenOut {
     pub annotations: u64,
 }
 
-impl std::ops::AddAssign for TakenOut {
+impl std::ops::AddAssign for Redactions {
     fn add_assign(&mut self, more: Self) {
         self.names += more.names;
         self.expressions += more.expressions;
@@ -36,9 +36,9 @@ impl std::ops::AddAssign for TakenOut {
 
 /// The seats of one participant, followed through the events of a game.
 #[derive(Debug, Clone, Default)]
-pub struct OwnSeats(Vec<u32>);
+pub struct ParticipantSeats(Vec<u32>);
 
-impl OwnSeats {
+impl ParticipantSeats {
     /// The seats at the start of a record; in imported games no event seats a participant.
     pub fn at_start(lines: &[v1::RecordLine], name: &str) -> Self {
         let mut own = Self::default();
@@ -91,9 +91,9 @@ impl OwnSeats {
 
 impl Pseudonym {
     /// Pseudonymizes a record. Built-in agents of the same name are unaffected.
-    pub fn take_out(&self, lines: &mut Vec<v1::RecordLine>) -> TakenOut {
-        let mut out = TakenOut::default();
-        let mut own = OwnSeats::at_start(lines, &self.name);
+    pub fn redact(&self, lines: &mut Vec<v1::RecordLine>) -> Redactions {
+        let mut out = Redactions::default();
+        let mut own = ParticipantSeats::at_start(lines, &self.name);
         let mut dropped_events = 0;
         lines.retain_mut(|line| match &mut line.line {
             Some(Line::Header(header)) => {

@@ -44,9 +44,9 @@ pub enum ParticipantKind {
 pub enum Presence {
     /// Connected.
     #[default]
-    Here,
+    Connected,
     /// Disconnected.
-    Away,
+    Disconnected,
     /// Substituted by the built-in agent of this name.
     Substituted(String),
 }
@@ -201,8 +201,8 @@ impl Chronicle {
                 self.seat_all(&started.seats);
                 None
             }
-            Kind::Disconnected(gone) => self.set_presence(gone.seat, Presence::Away),
-            Kind::Returned(back) => self.set_presence(back.seat, Presence::Here),
+            Kind::Disconnected(gone) => self.set_presence(gone.seat, Presence::Disconnected),
+            Kind::Returned(back) => self.set_presence(back.seat, Presence::Connected),
             Kind::Substituted(substituted) => {
                 let agent = substituted.built_in_agent.clone();
                 self.set_presence(substituted.seat, Presence::Substituted(agent))

@@ -229,8 +229,8 @@ fn label(painter: &Painter, shown: &SeatScene, width: f32) -> (&'static str, Str
         }
     };
     let (symbol, long, short) = match &participant.presence {
-        Presence::Here => (symbol, what, short.to_owned()),
-        Presence::Away => (
+        Presence::Connected => (symbol, what, short.to_owned()),
+        Presence::Disconnected => (
             symbol,
             format!("{what}, disconnected"),
             format!("{short}, away"),
@@ -367,8 +367,8 @@ mod tests {
             ParticipantKind::BuiltIn("a built-in agent of a long name".to_owned()),
         ];
         let presences = [
-            Presence::Here,
-            Presence::Away,
+            Presence::Connected,
+            Presence::Disconnected,
             Presence::Substituted("greedy".to_owned()),
         ];
         let roles = [
@@ -408,7 +408,8 @@ mod tests {
             assert!(right <= role_begins, "{panel}: {text} {role:?}");
             let held = words::held(&shown.hand);
             assert!(text.ends_with(&held), "{text}");
-            if *presence == Presence::Here && *kind == ParticipantKind::BuiltIn("random".to_owned())
+            if *presence == Presence::Connected
+                && *kind == ParticipantKind::BuiltIn("random".to_owned())
             {
                 assert!(!text.contains('…'), "{panel}: {text}");
             }

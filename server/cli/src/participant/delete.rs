@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::jsonl;
-use chefshat_record::pseudonym::{Pseudonym, TakenOut};
+use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use clap::Args;
 use serde_json::json;
 
@@ -51,7 +51,7 @@ pub(super) struct Delete {
 #[derive(Default)]
 struct Files {
     changed: u64,
-    taken_out: TakenOut,
+    redactions: Redactions,
     /// The pseudonym that an interrupted run stored in the database.
     earlier: Option<String>,
     skipped: Skipped,
@@ -78,10 +78,10 @@ impl Delete {
                 format!("{error}; not all records were rewritten: run the command again")
             })?;
         database.finish(&forgotten).await?;
-        let taken_out = TakenOut {
-            names: forgotten.taken_out.names.max(files.taken_out.names),
-            expressions: (forgotten.taken_out.expressions).max(files.taken_out.expressions),
-            annotations: (forgotten.taken_out.annotations).max(files.taken_out.annotations),
+        let redactions = Redactions {
+            names: forgotten.redactions.names.max(files.redactions.names),
+            expressions: (forgotten.redactions.expressions).max(files.redactions.expressions),
+            annotations: (forgotten.redactions.annotations).max(files.redactions.annotations),
         };
         let games = forgotten.games.max(files.changed);
         let found = games + forgotten.tournaments > 0;
@@ -95,8 +95,8 @@ impl Delete {
                 "games": games,
                 "tournaments": forgotten.tournaments,
                 "files": files.changed,
-                "expressions": taken_out.expressions,
-                "annotations": taken_out.annotations,
+                "expressions": redactions.expressions,
+                "annotations": redactions.annotations,
             }))?;
         } else if found {
             say(format_args!(
@@ -106,8 +106,8 @@ impl Delete {
                 counted(games, "game"),
                 counted(forgotten.tournaments, "tournament"),
                 counted(files.changed, "record file"),
-                counted(taken_out.expressions, "expression"),
-                counted(taken_out.annotations, "annotation"),
+                counted(redactions.expressions, "expression"),
+                counted(redactions.annotations, "annotation"),
             ))?;
         }
         files.skipped.check(&who.name)?;
@@ -164,8 +164,8 @@ async fn rewrite(
             who.pseudonym.clone_from(&held);
             files.earlier = Some(held);
         }
-        let taken_out = who.take_out(&mut lines);
-        if taken_out == TakenOut::default() {
+        let redactions = who.redact(&mut lines);
+        if redactions == Redactions::default() {
             continue;
         }
         if let Err(error) = jsonl::write(&candidate.path, &lines) {
@@ -173,7 +173,7 @@ async fn rewrite(
             continue;
         }
         files.changed += 1;
-        files.taken_out += taken_out;
+        files.redactions += redactions;
     }
     Ok(files)
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::atomic_file::AtomicFile;
-use chefshat_record::pseudonym::OwnSeats;
+use chefshat_record::pseudonym::ParticipantSeats;
 use chefshat_record::replay::replay;
 use chefshat_record::summary::summary;
 use chefshat_tournament::Change;
@@ -175,7 +175,7 @@ impl Sheet {
     /// Adds what the participant did in a game, if it took part.
     fn add_game(&mut self, summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &str) {
         let game_id = &summary.game_id;
-        let mut own = OwnSeats::at_start(lines, name);
+        let mut own = ParticipantSeats::at_start(lines, name);
         let mut rest = Vec::new();
         let (mut decisions, mut expressions) = (0, 0);
         for line in lines.iter().filter_map(|line| line.line.as_ref()) {

@@ -27,7 +27,7 @@ fn damaged_records_are_reported_and_nothing_is_written() {
         ..stage.export()
     };
     let exported = stage.run(&skipping).unwrap();
-    assert_eq!((exported.games, exported.left_out.len()), (1, 2));
+    assert_eq!((exported.games, exported.skipped.len()), (1, 2));
     assert_eq!(stage.leftovers(), ["out"]);
 }
 
@@ -36,7 +36,7 @@ fn a_game_is_exported_once() {
     let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", a_record(1))]);
     let exported = stage.run(&stage.export()).unwrap();
     assert_eq!(exported.games, 1);
-    assert!(exported.left_out[0].problem.contains("a.jsonl"));
+    assert!(exported.skipped[0].problem.contains("a.jsonl"));
     let file = stage.records().join("a.jsonl");
     let twice = find_records(&[file.clone(), stage.records(), file]).unwrap();
     assert_eq!(twice.len(), 2);
@@ -107,7 +107,7 @@ fn a_time_after_the_year_9999_damages_only_its_own_record() {
         ..stage.export()
     };
     let exported = stage.run(&skipping).unwrap();
-    assert_eq!((exported.games, exported.left_out.len()), (2, 1));
+    assert_eq!((exported.games, exported.skipped.len()), (2, 1));
     let rows = stage.rows("decisions");
     let of_last = rows.iter().rfind(|row| row["room_name"] == "room 2");
     assert_eq!(

@@ -82,7 +82,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Transcript, TranscriptError> {
         .from_reader(bytes);
     let headers = reader
         .headers()
-        .map_err(|error| at(line_of(&error), words(&error)))?
+        .map_err(|error| at(line_of(&error), message(&error)))?
         .clone();
     if headers.len() == 1 && headers.iter().any(|name| name.contains([';', '\t'])) {
         return Err(at(
@@ -110,7 +110,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Transcript, TranscriptError> {
     let mut settings = Settings::default();
     let (mut rules, mut rows, mut last_line) = (None, Vec::new(), 1);
     for record in reader.records() {
-        let record = record.map_err(|error| at(line_of(&error), words(&error)))?;
+        let record = record.map_err(|error| at(line_of(&error), message(&error)))?;
         let line = record.position().map_or(last_line + 1, |position| {
             usize::try_from(position.line()).unwrap_or(usize::MAX)
         });
@@ -178,7 +178,7 @@ impl Settings {
                 })?;
                 self.scheme = reward_scheme_to_proto(Some(scheme));
             }
-            "began" => self.began_ms = moment(value()?).map_err(|problem| cells.wrong(problem))?,
+            "began" => self.began_ms = time_ms(value()?).map_err(|problem| cells.wrong(problem))?,
             kind @ ("agent" | "human" | "robot") => {
                 let seat: u32 = cells.number("seat")?;
                 let player = Player {
@@ -222,7 +222,7 @@ impl Settings {
 }
 
 /// Parses an RFC 3339 time as milliseconds since the Unix epoch.
-fn moment(text: &str) -> Result<u64, String> {
+fn time_ms(text: &str) -> Result<u64, String> {
     let time: chefshat_proto::Timestamp = serde_json::from_value(text.into())
         .map_err(|_| "a time must be written like 2026-03-14T15:00:00Z".to_owned())?;
     let seconds = u64::try_from(time.seconds)
@@ -238,7 +238,7 @@ fn line_of(error: &csv::Error) -> usize {
     })
 }
 
-fn words(error: &csv::Error) -> String {
+fn message(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..

@@ -277,7 +277,7 @@ impl<'a> Replay<'a> {
     }
 
     fn begin(&mut self, started: &v1::GameStarted) -> Result<(), Fault> {
-        if self.seats.have_begun() {
+        if self.seats.has_started() {
             return Err("the game starts a second time".into());
         }
         self.seats.begin(started, self.header, &self.setup.rules)?;

@@ -52,7 +52,7 @@ impl Seats {
     }
 
     /// Whether the game has started.
-    pub(super) fn have_begun(&self) -> bool {
+    pub(super) fn has_started(&self) -> bool {
         self.begun
     }
 

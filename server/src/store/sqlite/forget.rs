@@ -6,7 +6,7 @@ use std::path::Path;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
-use chefshat_record::pseudonym::{OwnSeats, Pseudonym, TakenOut};
+use chefshat_record::pseudonym::{ParticipantSeats, Pseudonym, Redactions};
 use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -32,7 +32,7 @@ pub struct Forgotten {
     /// Tournaments that contained the name.
     pub tournaments: u64,
     /// The changes in the games.
-    pub taken_out: TakenOut,
+    pub redactions: Redactions,
     /// Numbers of the games whose record file must be rewritten.
     filed: Vec<i64>,
 }
@@ -97,10 +97,10 @@ impl Forgetting {
         .fetch_all(&mut *transaction)
         .await?;
         for game in &games {
-            let taken_out = forget_game(&mut transaction, game, who).await?;
-            if taken_out != TakenOut::default() {
+            let redactions = forget_game(&mut transaction, game, who).await?;
+            if redactions != Redactions::default() {
                 forgotten.games += 1;
-                forgotten.taken_out += taken_out;
+                forgotten.redactions += redactions;
                 if game.get::<bool, _>("filed") {
                     forgotten.filed.push(game.get("number"));
                 }
@@ -178,31 +178,31 @@ async fn forget_game(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
     who: &Pseudonym,
-) -> Result<TakenOut, ForgetError> {
+) -> Result<Redactions, ForgetError> {
     let number: i64 = game.get("number");
     let unreadable = |problem: Unreadable| ForgetError::Unreadable {
         what: format!("game number {number}"),
         problem: problem.to_string(),
     };
-    let mut taken_out = forget_journal(connection, game, who).await?;
+    let mut redactions = forget_journal(connection, game, who).await?;
     if let Some(record) = game.get::<Option<Vec<u8>>, _>("record") {
         let mut lines = form::lines_from_bytes(&record).map_err(unreadable)?;
-        taken_out += who.take_out(&mut lines);
+        redactions += who.redact(&mut lines);
         sqlx::query("UPDATE added_records SET record = $2 WHERE game = $1")
             .bind(number)
             .bind(form::lines_to_bytes(&lines))
             .execute(&mut *connection)
             .await?;
     }
-    if taken_out == TakenOut::default() {
-        return Ok(taken_out);
+    if redactions == Redactions::default() {
+        return Ok(redactions);
     }
     if game.get::<i64, _>("state") == 0 {
         return Err(ForgetError::GameRunning(who.name.clone()));
     }
     if let Some(header) = game.get::<Option<Vec<u8>>, _>("header") {
         let mut header = form::header_from_bytes(&header).map_err(unreadable)?;
-        taken_out.names += who.in_text(&mut header.name);
+        redactions.names += who.in_text(&mut header.name);
         sqlx::query("UPDATE games SET header = $2 WHERE number = $1")
             .bind(number)
             .bind(form::header_to_bytes(&header))
@@ -227,7 +227,7 @@ async fn forget_game(
         .bind(who.pseudonym.as_str())
         .execute(&mut *connection)
         .await?;
-    Ok(taken_out)
+    Ok(redactions)
 }
 
 /// The rows of a game's journal, in order. They are decoded one by one with [`entries_of`], because
@@ -275,15 +275,15 @@ async fn forget_journal(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
     who: &Pseudonym,
-) -> Result<TakenOut, ForgetError> {
-    let (mut own, mut all) = (OwnSeats::default(), TakenOut::default());
+) -> Result<Redactions, ForgetError> {
+    let (mut own, mut all) = (ParticipantSeats::default(), Redactions::default());
     for row in journal_of(connection, game).await? {
         let mut entries = entries_of(&row)?;
-        let taken_out = forget_entries(&mut entries, &mut own, who);
-        if taken_out == TakenOut::default() {
+        let redactions = forget_entries(&mut entries, &mut own, who);
+        if redactions == Redactions::default() {
             continue;
         }
-        all += taken_out;
+        all += redactions;
         let mut bytes = Vec::new();
         for entry in &entries {
             form::put_entry(entry, &mut bytes);
@@ -297,8 +297,12 @@ async fn forget_journal(
     Ok(all)
 }
 
-fn forget_entries(entries: &mut Vec<Entry>, own: &mut OwnSeats, who: &Pseudonym) -> TakenOut {
-    let mut out = TakenOut::default();
+fn forget_entries(
+    entries: &mut Vec<Entry>,
+    own: &mut ParticipantSeats,
+    who: &Pseudonym,
+) -> Redactions {
+    let mut out = Redactions::default();
     entries.retain_mut(|entry| match &mut entry.change {
         Change::Seated { seat, participant } => {
             let is_own = participant.name == who.name;
