@@ -39,7 +39,7 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
             match listener.accept().await {
                 Ok((stream, _)) => break stream,
                 Err(error) => {
-                    debug!(%error, "a connection was not accepted");
+                    debug!(%error, "accepting a connection failed");
                     tokio::time::sleep(ACCEPT_PAUSE).await;
                 }
             }

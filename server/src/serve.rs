@@ -172,7 +172,7 @@ impl Server {
             info!(
                 grace_seconds = config.grace.as_secs(),
                 open_rooms = rooms.open_count(),
-                "shutting down: no new rooms; running games may end"
+                "shutting down: no new rooms; running games may finish"
             );
             health
                 .set_service_status("", tonic_health::ServingStatus::NotServing)

@@ -300,9 +300,7 @@ fn check_records(setup: &VectorSetup, dealt: bool) -> Result<(), FieldProblem> {
     }
     let max_turns = RuleSetSpec::default().max_turns;
     if setup.rules().max_turns() > max_turns {
-        return refused(format!(
-            "a recorded Shift has at most {max_turns} max_turns"
-        ));
+        return refused(format!("with records, max_turns is at most {max_turns}"));
     }
     let (Stop::Points(length) | Stop::Shifts(length)) = setup.rules().stop();
     if length > MAX_HOSTED_SHIFTS {

@@ -19,14 +19,14 @@ type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
 /// # Errors
 /// The follower has gone, is too slow, or the message could not be computed.
 pub(super) async fn follow(
-    hosted: &Arc<TournamentHandle>,
+    handle: &Arc<TournamentHandle>,
     permits: &Arc<Semaphore>,
     sender: &Sender,
 ) -> Result<(), Status> {
-    let mut changes = hosted.changes();
+    let mut changes = handle.changes();
     loop {
         changes.mark_unchanged();
-        let update = hosted
+        let update = handle
             .follower_update(permits)
             .await
             .map_err(compute_failed)?;
@@ -88,11 +88,11 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_follower_that_does_not_read_is_dropped() {
-        let hosted = TournamentHandle::for_tests(4);
+        let handle = TournamentHandle::for_tests(4);
         let (sender, mut receiver) = mpsc::channel(1);
         let permits = Arc::new(Semaphore::new(1));
         // The first message goes into the channel, the heartbeat does not.
-        let ended = follow(&hosted, &permits, &sender).await;
+        let ended = follow(&handle, &permits, &sender).await;
         let ended = ended.expect_err("the follower is too slow");
         let info = ended.get_details_error_info().expect("error info");
         assert_eq!(info.reason, "FOLLOWER_TOO_SLOW");

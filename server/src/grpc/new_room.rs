@@ -155,7 +155,8 @@ async fn branched(
         return Err(refused("rules", message.to_owned()));
     }
     if point.same_deals && game_seed.is_some() {
-        let message = "with `same_deals` the recorded game's seed deals; leave one of them unset";
+        let message =
+            "with `same_deals` the seed is that of the recorded game; leave one of them unset";
         return Err(refused("game_seed", message.to_owned()));
     }
     let decisions = point.decisions;

@@ -85,7 +85,7 @@ impl PlayService for Play {
         if !(1..=MAX_SEATS_PER_WATCH).contains(&seats.len()) {
             return Err(field(
                 "SEATS_REFUSED",
-                &FieldProblem::new("seats", format!("name 1 to {MAX_SEATS_PER_WATCH} seats")),
+                &FieldProblem::new("seats", format!("list 1 to {MAX_SEATS_PER_WATCH} seats")),
             ));
         }
         let (outbox, updates) = Outbox::new();

@@ -199,7 +199,7 @@ impl RoomService for RoomCalls {
             status::status(
                 Code::PermissionDenied,
                 "OWNER_TOKEN_WRONG",
-                "this is not the owner token that CreateRoom gave for this room",
+                "this is not the owner token that CreateRoom returned for this room",
                 [("field", "owner_token")],
             )
         };

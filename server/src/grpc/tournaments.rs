@@ -70,12 +70,12 @@ impl TournamentCalls {
 
     /// The tournament with a join code; if an id is given too, it must match.
     fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<TournamentHandle>, Status> {
-        let hosted = match id {
+        let handle = match id {
             "" => self.tournaments.by_code(join_code),
             id => Some(self.find(id)?)
-                .filter(|hosted| chefshat_room::ids::normal_code(join_code) == hosted.join_code()),
+                .filter(|handle| chefshat_room::ids::normal_code(join_code) == handle.join_code()),
         };
-        hosted.ok_or_else(|| {
+        handle.ok_or_else(|| {
             status(
                 Code::PermissionDenied,
                 "JOIN_CODE_WRONG",
@@ -86,14 +86,14 @@ impl TournamentCalls {
     }
 
     fn find_owned(&self, id: &str, owner_token: &str) -> Result<Arc<TournamentHandle>, Status> {
-        let hosted = self.find(id)?;
-        if hosted.is_owner(owner_token) {
-            return Ok(hosted);
+        let handle = self.find(id)?;
+        if handle.is_owner(owner_token) {
+            return Ok(handle);
         }
         Err(status(
             Code::PermissionDenied,
             "OWNER_TOKEN_WRONG",
-            "this is not the owner token that CreateTournament gave for this tournament",
+            "this is not the owner token that CreateTournament returned for this tournament",
             [("field", "owner_token")],
         ))
     }
@@ -123,14 +123,14 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
-        let (hosted, owner) = self
+        let (handle, owner) = self
             .tournaments
             .create(&name, plan, request_key)
             .await
             .map_err(create_refused)?;
         Ok(Response::new(v1::CreateTournamentResponse {
-            tournament: Some(hosted.describe()),
-            join_code: hosted.join_code().to_owned(),
+            tournament: Some(handle.describe()),
+            join_code: handle.join_code().to_owned(),
             owner_token: owner.word(),
         }))
     }
@@ -140,11 +140,11 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentRequest>,
     ) -> Result<Response<v1::GetTournamentResponse>, Status> {
         let request = request.into_inner();
-        let hosted = match request.join_code.as_str() {
+        let handle = match request.join_code.as_str() {
             "" => self.find(&request.tournament_id)?,
             code => self.find_by_code(&request.tournament_id, code)?,
         };
-        let tournament = Some(hosted.describe());
+        let tournament = Some(handle.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
     }
 
@@ -165,7 +165,7 @@ impl TournamentService for TournamentCalls {
             _ => String::new(),
         };
         let tournaments = (found.iter())
-            .map(|(_, hosted)| hosted.describe_briefly())
+            .map(|(_, handle)| handle.describe_briefly())
             .collect();
         Ok(Response::new(v1::ListTournamentsResponse {
             tournaments,
@@ -181,10 +181,10 @@ impl TournamentService for TournamentCalls {
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let hosted = self.find_by_code(&request.tournament_id, &request.join_code)?;
+        let handle = self.find_by_code(&request.tournament_id, &request.join_code)?;
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
-        if !hosted.admits(kind) {
+        if !handle.admits(kind) {
             return Err(status(
                 Code::FailedPrecondition,
                 "KIND_NOT_ADMITTED",
@@ -199,13 +199,13 @@ impl TournamentService for TournamentCalls {
             stateless: request.stateless,
             request_id: request_id(&request.request_id)?,
         };
-        let (participant, ticket) = hosted
+        let (participant, ticket) = handle
             .join(entry)
             .await
             .map_err(stopped)?
             .map_err(join_refused)?;
         Ok(Response::new(v1::JoinTournamentResponse {
-            tournament: Some(hosted.describe()),
+            tournament: Some(handle.describe()),
             participant: convert::number(participant),
             ticket: ticket.word(),
         }))
@@ -216,8 +216,8 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::StartTournamentRequest>,
     ) -> Result<Response<v1::StartTournamentResponse>, Status> {
         let request = request.into_inner();
-        let hosted = self.find_owned(&request.tournament_id, &request.owner_token)?;
-        let started = hosted.begin().await.map_err(stopped)?;
+        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let started = handle.begin().await.map_err(stopped)?;
         started.map_err(|problem| {
             let reason = match problem {
                 BeginProblem::TooFew { .. } => "TOO_FEW_PARTICIPANTS",
@@ -225,7 +225,7 @@ impl TournamentService for TournamentCalls {
             };
             status(Code::FailedPrecondition, reason, problem.to_string(), [])
         })?;
-        let tournament = Some(hosted.describe());
+        let tournament = Some(handle.describe());
         Ok(Response::new(v1::StartTournamentResponse { tournament }))
     }
 
@@ -234,9 +234,9 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::CloseTournamentRequest>,
     ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
         let request = request.into_inner();
-        let hosted = self.find_owned(&request.tournament_id, &request.owner_token)?;
-        hosted.close().await.map_err(stopped)?;
-        let tournament = Some(hosted.describe());
+        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        handle.close().await.map_err(stopped)?;
+        let tournament = Some(handle.describe());
         Ok(Response::new(v1::CloseTournamentResponse { tournament }))
     }
 
@@ -244,20 +244,20 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::FollowTournamentRequest>,
     ) -> Result<Response<Self::FollowTournamentStream>, Status> {
-        let hosted = self.find(&request.into_inner().tournament_id)?;
+        let handle = self.find(&request.into_inner().tournament_id)?;
         let place = Arc::clone(&self.followers).try_acquire_owned();
         let place = place.map_err(|_| {
             status(
                 Code::ResourceExhausted,
                 "TOO_MANY_FOLLOWERS",
-                "the server's tournaments have the most followers it allows",
+                "the server has no space for more followers of tournaments",
                 [("max_followers", &MAX_FOLLOWERS.to_string())],
             )
         })?;
         let (sender, responses) = mpsc::channel(1);
         let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
         let following = async move {
-            let followed = follow(&hosted, &permits, &sender).await;
+            let followed = follow(&handle, &permits, &sender).await;
             // A follower that does not read does not block the others.
             drop(place);
             end(&sender, followed).await;
@@ -270,8 +270,8 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
-        let hosted = self.find(&request.into_inner().tournament_id)?;
-        let results = hosted.results(&self.result_permits).await;
+        let handle = self.find(&request.into_inner().tournament_id)?;
+        let results = handle.results(&self.result_permits).await;
         let results = results.map_err(compute_failed)?.message.clone();
         Ok(Response::new(results))
     }
@@ -281,7 +281,7 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::ListTournamentGamesRequest>,
     ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
         let request = request.into_inner();
-        let hosted = self.find(&request.tournament_id)?;
+        let handle = self.find(&request.tournament_id)?;
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
         let size = match request.page_size {
@@ -289,7 +289,7 @@ impl TournamentService for TournamentCalls {
             size => size.min(MAX_GAMES_PAGE),
         };
         let size = usize::try_from(size).unwrap_or(usize::MAX);
-        let mut games = hosted.games(from, size + 1);
+        let mut games = handle.games(from, size + 1);
         let more = games.len() > size;
         games.truncate(size);
         let next_page_token = match more {

@@ -540,7 +540,7 @@ impl Task {
     /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that
     /// agents reconnect and find the game as the restarted server finds it.
     fn fail(&mut self, error: &StoreError) {
-        error!(room = %self.core.header().room_id, %error, "the room stops");
+        error!(room = %self.core.header().room_id, %error, "the store failed; the room stops");
         self.releases.clear();
         self.end_streams(StreamEnd::StoreFailed);
     }

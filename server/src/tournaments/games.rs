@@ -27,7 +27,7 @@ impl Task {
     pub(super) fn place(&mut self, game: usize) {
         let (room_id, game_id) = (Id::random(), Id::random());
         if let Some(deal) = self.state.core.games()[game].deal {
-            self.rooms.withhold(self.hosted.series(deal), true);
+            self.rooms.withhold(self.handle.series(deal), true);
         }
         self.without_room.insert(game);
         self.seen.remove(&game);
@@ -72,7 +72,7 @@ impl Task {
     async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
         // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
-            (game.tournament()).is_some_and(|game| game.tournament == self.hosted.id())
+            (game.tournament()).is_some_and(|game| game.tournament == self.handle.id())
         };
         if let Some(stored) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
             let reading = tokio::task::spawn_blocking(move || {
@@ -138,7 +138,7 @@ impl Task {
                 }
                 // It gets new ids.
                 Err(CreateError::Store(StoreError::Taken(id))) => {
-                    warn!(tournament = %self.hosted.id(), %id, "the id of a game is taken");
+                    warn!(tournament = %self.handle.id(), %id, "the id of a game is taken");
                     self.place(game);
                 }
                 Err(CreateError::Store(error)) => return Err(error),
@@ -146,7 +146,7 @@ impl Task {
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
                 Err(error) => {
                     if self.retry.replace(retry()).is_none() {
-                        warn!(tournament = %self.hosted.id(), %error, "games of a tournament wait");
+                        warn!(tournament = %self.handle.id(), %error, "games of a tournament wait for rooms");
                     }
                 }
             }
@@ -175,7 +175,7 @@ impl Task {
     fn new_room(&self, number: usize) -> NewRoom {
         let state = &self.state;
         let game = &state.core.games()[number];
-        let plan = &self.hosted.plan;
+        let plan = &self.handle.plan;
         let entrants = state.core.participants();
         let (mut participants, mut called) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
@@ -206,7 +206,7 @@ impl Task {
         );
         let space = MAX_NAME_CHARS.saturating_sub(place.chars().count());
         let name: String = self
-            .hosted
+            .handle
             .header
             .settings
             .name
@@ -221,17 +221,17 @@ impl Task {
             called,
             recorded: BTreeMap::new(),
             start: GameStart::default(),
-            game_seed: self.hosted.game_seed(number, game.deal),
+            game_seed: self.handle.game_seed(number, game.deal),
             request: None,
             seating: Some(Seating {
                 game: TournamentGame {
-                    tournament: self.hosted.id(),
-                    series: game.deal.map(|deal| self.hosted.series(deal)),
+                    tournament: self.handle.id(),
+                    series: game.deal.map(|deal| self.handle.series(deal)),
                 },
                 room_id,
                 game_id,
                 participants,
-                server_seed: game.deal.map(|deal| self.hosted.server_seed(deal)),
+                server_seed: game.deal.map(|deal| self.handle.server_seed(deal)),
             }),
         }
     }

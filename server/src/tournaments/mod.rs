@@ -102,9 +102,9 @@ impl Tournaments {
         let reservation = loop {
             // A repetition of a request whose tournament is still being created waits for it.
             let created = self.created.notified();
-            if let Some(hosted) = self.get(owner.room) {
-                return match hosted.header.owner.matches(&owner.secret) {
-                    true => Ok((hosted, owner)),
+            if let Some(handle) = self.get(owner.room) {
+                return match handle.header.owner.matches(&owner.secret) {
+                    true => Ok((handle, owner)),
                     false => Err(CreateProblem::RequestIdUsed),
                 };
             }
@@ -174,10 +174,10 @@ impl Tournaments {
     /// Whether a tournament has announced a game with this id.
     pub fn has_announced(&self, game: Id) -> bool {
         let all: Vec<_> = (self.lock().earlier(None))
-            .map(|(_, hosted)| Arc::clone(hosted))
+            .map(|(_, handle)| Arc::clone(handle))
             .collect();
-        let announces = |hosted: &Arc<TournamentHandle>| {
-            (hosted.committed().placed.values()).any(|(_, announced)| *announced == game)
+        let announces = |handle: &Arc<TournamentHandle>| {
+            (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
         };
         all.iter().any(announces)
     }
@@ -190,14 +190,14 @@ impl Tournaments {
         state: Option<State>,
         count: usize,
     ) -> Vec<(u64, Arc<TournamentHandle>)> {
-        let is_wanted = |hosted: &TournamentHandle| {
-            state.is_none_or(|state| hosted.read(Tournament::state) == state)
+        let is_wanted = |handle: &TournamentHandle| {
+            state.is_none_or(|state| handle.read(Tournament::state) == state)
         };
         // Read after the table is unlocked: each may be busy for a moment.
         let earlier: Vec<_> = (self.lock().earlier(before))
-            .map(|(number, hosted)| (number, Arc::clone(hosted)))
+            .map(|(number, handle)| (number, Arc::clone(handle)))
             .collect();
-        let wanted = (earlier.into_iter()).filter(|(_, hosted)| is_wanted(hosted));
+        let wanted = (earlier.into_iter()).filter(|(_, handle)| is_wanted(handle));
         wanted.take(count).collect()
     }
 
@@ -210,7 +210,7 @@ impl Tournaments {
         state: TournamentState,
     ) -> Arc<TournamentHandle> {
         let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
-        let hosted = Arc::new(TournamentHandle {
+        let handle = Arc::new(TournamentHandle {
             header,
             plan,
             committed: Mutex::new(state),
@@ -219,17 +219,17 @@ impl Tournaments {
             follower_update: Shared::default(),
             results: Shared::default(),
         });
-        self.lock().enter(Arc::clone(&hosted));
+        self.lock().enter(Arc::clone(&handle));
         // Before any client can request a record.
-        let deals = hosted.committed().deals();
-        hosted.withhold(&deals, &self.rooms);
-        if hosted.is_over() {
-            hosted.close_rooms(&self.rooms);
-            return hosted;
+        let deals = handle.committed().deals();
+        handle.withhold(&deals, &self.rooms);
+        if handle.is_over() {
+            handle.close_rooms(&self.rooms);
+            return handle;
         }
-        let task = Task::new(Arc::clone(&hosted), Arc::clone(&self.rooms), rows);
+        let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows);
         self.tracker.spawn(task.run(inbox, self.stop.clone()));
-        hosted
+        handle
     }
 
     fn lock(&self) -> MutexGuard<'_, Table> {

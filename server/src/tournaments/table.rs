@@ -36,7 +36,7 @@ impl Table {
         before: Option<u64>,
     ) -> impl Iterator<Item = (u64, &Arc<TournamentHandle>)> + '_ {
         let earlier = self.by_number.range(..before.unwrap_or(u64::MAX)).rev();
-        earlier.map(|(number, hosted)| (*number, hosted))
+        earlier.map(|(number, handle)| (*number, handle))
     }
 
     /// Whether the tournament is being created.
@@ -46,7 +46,7 @@ impl Table {
 
     /// Reserves space for a tournament that will be created; `false` if the table is full.
     pub(super) fn reserve(&mut self, id: Id) -> bool {
-        let open = self.by_number.values().filter(|hosted| !hosted.is_over());
+        let open = self.by_number.values().filter(|handle| !handle.is_over());
         let has_space = open.count() + self.in_creation.len() < MAX_TOURNAMENTS;
         if has_space {
             self.in_creation.insert(id);
@@ -60,25 +60,25 @@ impl Table {
     }
 
     /// Adds a tournament. Tournaments that are over are removed when the space is needed.
-    pub(super) fn enter(&mut self, hosted: Arc<TournamentHandle>) {
+    pub(super) fn enter(&mut self, handle: Arc<TournamentHandle>) {
         while self.by_number.len() >= MAX_TOURNAMENTS
             && let Some(number) = (self.by_number.iter())
-                .find(|(_, hosted)| hosted.is_over())
+                .find(|(_, handle)| handle.is_over())
                 .map(|(number, _)| *number)
         {
             self.remove(number);
         }
         let number = self.next_number;
         self.next_number += 1;
-        self.numbers.insert(hosted.id(), number);
-        self.codes.insert(hosted.join_code().to_owned(), number);
-        self.by_number.insert(number, hosted);
+        self.numbers.insert(handle.id(), number);
+        self.codes.insert(handle.join_code().to_owned(), number);
+        self.by_number.insert(number, handle);
     }
 
     fn remove(&mut self, number: u64) {
-        if let Some(hosted) = self.by_number.remove(&number) {
-            self.numbers.remove(&hosted.id());
-            self.codes.remove(hosted.join_code());
+        if let Some(handle) = self.by_number.remove(&number) {
+            self.numbers.remove(&handle.id());
+            self.codes.remove(handle.join_code());
         }
     }
 }

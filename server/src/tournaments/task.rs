@@ -34,7 +34,7 @@ pub(super) struct Stop {
 
 /// Runs a tournament until the server ends.
 pub(super) struct Task {
-    pub(super) hosted: Arc<TournamentHandle>,
+    pub(super) handle: Arc<TournamentHandle>,
     pub(super) rooms: Arc<Rooms>,
     /// The state with pending changes; the handle's copy follows when they are committed.
     pub(super) state: TournamentState,
@@ -63,11 +63,11 @@ pub(super) struct Task {
 
 impl Task {
     /// Creates the task of a tournament with this number of committed rows.
-    pub(super) fn new(hosted: Arc<TournamentHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
-        let state = hosted.committed().clone();
+    pub(super) fn new(handle: Arc<TournamentHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
+        let state = handle.committed().clone();
         Self {
             state,
-            hosted,
+            handle,
             rooms,
             rows,
             pending: Vec::new(),
@@ -93,10 +93,10 @@ impl Task {
             // From here on no end of a game is missed.
             changed.as_mut().enable();
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
-                error!(tournament = %self.hosted.id(), %error, "the tournament stops");
+                error!(tournament = %self.handle.id(), %error, "the store failed; the tournament stops");
                 return;
             }
-            if self.hosted.is_over() {
+            if self.handle.is_over() {
                 self.conclude(inbox).await;
                 return;
             }
@@ -112,7 +112,7 @@ impl Task {
                     }
                     for message in messages.drain(..) {
                         if let Err(error) = self.receive(message).await {
-                            error!(tournament = %self.hosted.id(), %error, "the tournament stops");
+                            error!(tournament = %self.handle.id(), %error, "the store failed; the tournament stops");
                             return;
                         }
                     }
@@ -147,7 +147,7 @@ impl Task {
     /// Runs once the end of the tournament is committed: closes running rooms and notifies all
     /// participants. Later messages are answered from the committed state.
     async fn conclude(&mut self, mut inbox: mpsc::Receiver<Message>) {
-        self.hosted.close_rooms(&self.rooms);
+        self.handle.close_rooms(&self.rooms);
         for (_, connection) in std::mem::take(&mut self.connections).into_values() {
             connection.call(Call::Over);
         }
@@ -194,7 +194,7 @@ impl Task {
     }
 
     fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinRefusal> {
-        let token = self.hosted.ticket_of(&entry);
+        let token = self.handle.ticket_of(&entry);
         if let Some(answer) = self.state.joined_before(&entry, token) {
             return answer;
         }
@@ -222,7 +222,7 @@ impl Task {
         if let Some((_, older)) = self.connections.remove(&participant) {
             older.call(Call::Superseded);
         }
-        if self.hosted.is_over() {
+        if self.handle.is_over() {
             connection.call(Call::Over);
             return;
         }
@@ -238,7 +238,7 @@ impl Task {
 
     fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
         self.state.set_connection(participant, connection);
-        (self.hosted.committed()).set_connection(participant, connection);
+        (self.handle.committed()).set_connection(participant, connection);
         self.has_changed = true;
     }
 
@@ -305,37 +305,37 @@ impl Task {
         loop {
             if !no_more_games {
                 self.read_ended_games().await?;
-                self.follow().await?;
+                self.advance().await?;
             }
-            let moved = !self.pending.is_empty();
-            if moved {
+            let has_entries = !self.pending.is_empty();
+            if has_entries {
                 let entries = std::mem::take(&mut self.pending);
                 let store = self.rooms.store();
-                (store.append_tournament(self.hosted.id(), self.rows, entries.clone())).await?;
+                (store.append_tournament(self.handle.id(), self.rows, entries.clone())).await?;
                 self.rows += 1;
-                self.hosted.publish(&entries);
+                self.handle.publish(&entries);
             }
             for reply in self.replies.drain(..) {
                 reply();
             }
-            if moved {
+            if has_entries {
                 let deals = std::mem::take(&mut self.deals);
-                self.hosted.withhold(&deals, &self.rooms);
+                self.handle.withhold(&deals, &self.rooms);
             }
             if !no_more_games {
                 self.make_rooms().await?;
             }
-            if std::mem::take(&mut self.has_changed) || moved {
-                self.hosted.changes.send_modify(|count| *count += 1);
+            if std::mem::take(&mut self.has_changed) || has_entries {
+                self.handle.changes.send_modify(|count| *count += 1);
             }
-            if !moved && self.pending.is_empty() {
+            if !has_entries && self.pending.is_empty() {
                 return Ok(());
             }
         }
     }
 
     /// Computes what follows now. A draw of a round runs on another thread.
-    async fn follow(&mut self) -> Result<(), StoreError> {
+    async fn advance(&mut self) -> Result<(), StoreError> {
         let now_ms = self.now_ms();
         // If no game is running, a round may be due, which takes a while to draw.
         let core = &self.state.core;
@@ -377,7 +377,7 @@ impl Task {
 
 impl Drop for Task {
     fn drop(&mut self) {
-        let state = self.hosted.read(|core| core.state());
-        info!(tournament = %self.hosted.id(), ?state, "the tournament's task has ended");
+        let state = self.handle.read(|core| core.state());
+        info!(tournament = %self.handle.id(), ?state, "the tournament's task has ended");
     }
 }

@@ -31,14 +31,14 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
     tracker.wait().await;
 
     let made = tournaments.newest(None, None, 9);
-    let [(_, hosted)] = made.as_slice() else {
+    let [(_, handle)] = made.as_slice() else {
         panic!("not exactly one: {made:?}");
     };
-    let found = tournaments.get(hosted.id()).expect("found by its id");
-    assert_eq!(found.id(), hosted.id());
-    let code = hosted.join_code().to_lowercase();
+    let found = tournaments.get(handle.id()).expect("found by its id");
+    assert_eq!(found.id(), handle.id());
+    let code = handle.join_code().to_lowercase();
     let found = tournaments.by_code(&code).expect("found by its code");
-    assert_eq!(found.id(), hosted.id());
+    assert_eq!(found.id(), handle.id());
     let stored = store.tournaments(0).await.expect("readable");
     assert_eq!(stored.len(), 1);
     assert!(tournaments.get(Id::random()).is_none());
@@ -78,20 +78,20 @@ async fn readers_see_only_committed_changes() {
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
     let tournaments = Tournaments::new(rooms, TaskTracker::new());
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
+    let (handle, _) = tournaments.create("Coppa", plan, None).await.expect("made");
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
 
     let joining = tokio::spawn({
-        let hosted = Arc::clone(&hosted);
-        async move { hosted.join(entrant("Ada")).await }
+        let handle = Arc::clone(&handle);
+        async move { handle.join(entrant("Ada")).await }
     });
     // The task of the tournament has received the message and waits for the commit.
     for _ in 0..100 {
         tokio::task::yield_now().await;
     }
     assert!(!joining.is_finished());
-    let shown = hosted.describe().participants.len();
+    let shown = handle.describe().participants.len();
     assert_eq!(shown, 4, "uncommitted changes are not visible");
     commits.add_permits(1);
     joining
@@ -99,7 +99,7 @@ async fn readers_see_only_committed_changes() {
         .expect("no panic")
         .expect("the task runs")
         .expect("joined");
-    assert_eq!(hosted.describe().participants.len(), 5);
+    assert_eq!(handle.describe().participants.len(), 5);
 }
 
 #[tokio::test]
@@ -119,15 +119,15 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     // No room can be created: the game has its id, and waits.
     let tournaments = start(0);
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
-    let mut changes = hosted.changes();
-    hosted
+    let (handle, _) = tournaments.create("Coppa", plan, None).await.expect("made");
+    let mut changes = handle.changes();
+    handle
         .begin()
         .await
         .expect("the task runs")
         .expect("it can start");
     let forged = loop {
-        match hosted.games(0, 1).pop().map(|game| game.game_id) {
+        match handle.games(0, 1).pop().map(|game| game.game_id) {
             Some(game_id) if !game_id.is_empty() => break game_id,
             _ => changes.changed().await.expect("the tournament exists"),
         }
@@ -146,17 +146,17 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     let imported = store.import(game, summary, lines).await;
     assert_eq!(imported, Ok(true));
     assert!(tournaments.has_announced(game), "imports of it are refused");
-    let id = hosted.id();
+    let id = handle.id();
     tournaments.end();
 
     let tournaments = start(9);
     tournaments.restore().await.expect("readable");
-    let hosted = tournaments.get(id).expect("restored");
-    let mut changes = hosted.changes();
-    while !hosted.is_over() {
+    let handle = tournaments.get(id).expect("restored");
+    let mut changes = handle.changes();
+    while !handle.is_over() {
         changes.changed().await.expect("the tournament exists");
     }
-    let games = hosted.games(0, 9);
+    let games = handle.games(0, 9);
     assert!(
         store.failed().now_or_never().is_none(),
         "the store keeps working"
@@ -187,38 +187,38 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let tournaments = start();
     let create = || tournaments.create("Coppa", plan(), Some(request));
     let (first, second) = tokio::join!(create(), create());
-    let ((hosted, owner), (other, again)) = (first.expect("made"), second.expect("made"));
-    assert!(Arc::ptr_eq(&hosted, &other) && owner == again);
+    let ((handle, owner), (other, again)) = (first.expect("made"), second.expect("made"));
+    assert!(Arc::ptr_eq(&handle, &other) && owner == again);
     let other = RequestKey::new([1; 32], b"other content");
     let refused = tournaments.create("Coppa", plan(), Some(other)).await;
     assert!(matches!(refused, Err(CreateProblem::RequestIdUsed)));
 
-    let (first, second) = tokio::join!(hosted.join(ada()), hosted.join(ada()));
+    let (first, second) = tokio::join!(handle.join(ada()), handle.join(ada()));
     let joined = first.expect("the task runs").expect("joined");
     assert_eq!(second.expect("the task runs").expect("joined"), joined);
-    hosted
+    handle
         .begin()
         .await
         .expect("the task runs")
         .expect("it can start");
-    assert_eq!(hosted.join(ada()).await.expect("the task runs"), Ok(joined));
+    assert_eq!(handle.join(ada()).await.expect("the task runs"), Ok(joined));
     tournaments.end();
 
     let tournaments = start();
     tournaments.restore().await.expect("readable");
-    let (hosted, again) = tournaments
+    let (handle, again) = tournaments
         .create("Coppa", plan(), Some(request))
         .await
         .expect("there");
-    assert!(again == owner && hosted.is_owner(&owner.word()));
+    assert!(again == owner && handle.is_owner(&owner.word()));
     assert_eq!(tournaments.newest(None, None, 9).len(), 1);
-    assert_eq!(hosted.join(ada()).await.expect("the task runs"), Ok(joined));
-    assert_eq!(hosted.participant_of(&joined.1.secret), Some(joined.0));
+    assert_eq!(handle.join(ada()).await.expect("the task runs"), Ok(joined));
+    assert_eq!(handle.participant_of(&joined.1.secret), Some(joined.0));
     let bo = Entry {
         name: "Bo".into(),
         ..ada()
     };
-    let refused = hosted.join(bo).await.expect("the task runs");
+    let refused = handle.join(bo).await.expect("the task runs");
     assert_eq!(refused, Err(JoinRefusal::RequestIdUsed));
-    assert_eq!(hosted.describe().participants.len(), 5);
+    assert_eq!(handle.describe().participants.len(), 5);
 }

@@ -58,15 +58,15 @@ impl TournamentHandle {
         permits: &Arc<Semaphore>,
         work: fn(&Self) -> M,
     ) -> impl Future<Output = Result<AsOf<M>, ComputeError>> + Send + use<M> {
-        let (hosted, permits) = (Arc::clone(self), Arc::clone(permits));
+        let (handle, permits) = (Arc::clone(self), Arc::clone(permits));
         async move {
             // The semaphore is never closed; if it were, the work would merely not wait.
             let permit = permits.acquire_owned().await.ok();
             let working = tokio::task::spawn_blocking(move || {
                 let _permit = permit;
                 // The message may be newer than the mark, but not older.
-                let mark = hosted.mark();
-                let message = work(&hosted);
+                let mark = handle.mark();
+                let message = work(&handle);
                 AsOf { mark, message }
             });
             Ok(working.await?)

@@ -1,5 +1,5 @@
-//! Reads the requests of one stream of `PlayService` and carries them out: seats attach, act and leave. Participants of tournaments attach once and
-//! are then seated in each of their games.
+//! Reads the requests of one stream of `PlayService` and executes them: seats attach, act and leave.
+//! Participants of tournaments attach once and are then seated in each of their games.
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;

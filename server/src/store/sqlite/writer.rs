@@ -142,7 +142,7 @@ pub(super) async fn run(
                 .await
                 .map_err(|cause| {
                     let failure = StoreError::Failed(explain(&cause));
-                    error!(%failure, "the store fails");
+                    error!(%failure, "a commit failed; the store stops");
                     failed.send_replace(Some(failure.clone()));
                     failure
                 }),

@@ -122,33 +122,33 @@ fn test_permits() -> Arc<Semaphore> {
 
 #[tokio::test]
 async fn views_are_computed_once_for_each_change() {
-    let (hosted, permits) = (TournamentHandle::for_tests(8), test_permits());
-    let follower_update = hosted.follower_update(&permits).await.expect("computed");
-    let results = hosted.results(&permits).await.expect("computed");
-    let same = hosted.follower_update(&permits).await.expect("computed");
+    let (handle, permits) = (TournamentHandle::for_tests(8), test_permits());
+    let follower_update = handle.follower_update(&permits).await.expect("computed");
+    let results = handle.results(&permits).await.expect("computed");
+    let same = handle.follower_update(&permits).await.expect("computed");
     assert!(Arc::ptr_eq(&follower_update, &same));
-    let same = hosted.results(&permits).await.expect("computed");
+    let same = handle.results(&permits).await.expect("computed");
     assert!(Arc::ptr_eq(&results, &same));
-    hosted.changes.send_modify(|count| *count += 1);
-    let other = hosted.follower_update(&permits).await.expect("computed");
+    handle.changes.send_modify(|count| *count += 1);
+    let other = handle.follower_update(&permits).await.expect("computed");
     assert!(!Arc::ptr_eq(&follower_update, &other));
     // A client that learned of the start before the change was counted sees no earlier state.
-    let hosted = hosted.started();
-    let started = hosted.results(&permits).await.expect("computed");
+    let handle = handle.started();
+    let started = handle.results(&permits).await.expect("computed");
     let state = started.message.tournament.as_ref().map(|it| it.state());
     assert_eq!(state, Some(v1::TournamentState::Playing));
 }
 
 #[tokio::test]
 async fn computing_waits_for_a_permit_without_holding_a_lock() {
-    let (hosted, permits) = (TournamentHandle::for_tests(8), test_permits());
+    let (handle, permits) = (TournamentHandle::for_tests(8), test_permits());
     let taken = Arc::clone(&permits)
         .acquire_owned()
         .await
         .expect("it is open");
-    let mut asking = Box::pin(hosted.results(&permits));
+    let mut asking = Box::pin(handle.results(&permits));
     assert!(futures::poll!(&mut asking).is_pending());
-    assert_eq!(hosted.describe().participants.len(), 8);
+    assert_eq!(handle.describe().participants.len(), 8);
     drop(taken);
     let results = asking.await.expect("computed");
     assert_eq!(results.message.standings.len(), 8);
@@ -156,7 +156,7 @@ async fn computing_waits_for_a_permit_without_holding_a_lock() {
 
 #[test]
 fn followers_receive_the_running_games_and_the_last_ones() {
-    let hosted = TournamentHandle::with_settings(
+    let handle = TournamentHandle::with_settings(
         64,
         v1::TournamentSettings {
             format: v1::TournamentFormat::Swiss.into(),
@@ -166,8 +166,8 @@ fn followers_receive_the_running_games_and_the_last_ones() {
         },
     )
     .started();
-    hosted.call_games();
-    let first = hosted.compute_update().games;
+    handle.call_games();
+    let first = handle.compute_update().games;
     assert_eq!(first.len(), MAX_GAMES_FOLLOWED);
     let in_state = |games: &[v1::TournamentGame], state| {
         let numbers = games.iter().filter(|game| game.state() == state);
@@ -177,16 +177,16 @@ fn followers_receive_the_running_games_and_the_last_ones() {
     let due = MAX_GAMES_FOLLOWED - 64;
     assert_eq!(in_state(&first, v1::TournamentGameState::Due).len(), due);
     for _ in 0..10 {
-        hosted.end_games();
-        hosted.call_games();
+        handle.end_games();
+        handle.call_games();
     }
-    let follower_update = hosted.compute_update();
-    let playing: Vec<u32> = hosted.read(|core| core.playing().map(convert::number).collect());
+    let follower_update = handle.compute_update();
+    let playing: Vec<u32> = handle.read(|core| core.playing().map(convert::number).collect());
     assert_eq!(
         in_state(&follower_update.games, v1::TournamentGameState::Playing),
         playing
     );
-    let counted: Vec<u32> = hosted.read(|core| {
+    let counted: Vec<u32> = handle.read(|core| {
         let games = core.games().iter().enumerate();
         let counted = games.filter(|(_, game)| game.is_over());
         counted.map(|(number, _)| convert::number(number)).collect()
@@ -208,7 +208,7 @@ fn followers_receive_the_running_games_and_the_last_ones() {
 
 #[test]
 fn followers_of_a_round_robin_receive_the_running_games() {
-    let hosted = TournamentHandle::with_settings(
+    let handle = TournamentHandle::with_settings(
         8,
         v1::TournamentSettings {
             format: v1::TournamentFormat::RoundRobin.into(),
@@ -217,10 +217,10 @@ fn followers_of_a_round_robin_receive_the_running_games() {
         },
     )
     .started();
-    hosted.call_games();
-    hosted.end_games();
-    hosted.call_games();
-    let games = hosted.compute_update().games;
+    handle.call_games();
+    handle.end_games();
+    handle.call_games();
+    let games = handle.compute_update().games;
     assert_eq!(games.len(), 3);
     let playing = v1::TournamentGameState::Playing;
     assert!(games.iter().all(|game| game.state() == playing));
@@ -228,8 +228,8 @@ fn followers_of_a_round_robin_receive_the_running_games() {
 
 #[test]
 fn no_message_exceeds_the_default_limit_of_clients() {
-    let hosted = TournamentHandle::for_tests(MAX_PARTICIPANTS);
-    let mut results = hosted.compute_results();
+    let handle = TournamentHandle::for_tests(MAX_PARTICIPANTS);
+    let mut results = handle.compute_results();
     for standing in &mut results.standings {
         *standing = v1::TournamentStanding {
             place: u32::MAX,
@@ -297,7 +297,7 @@ fn no_message_exceeds_the_default_limit_of_clients() {
     let follower_update = v1::FollowTournamentResponse {
         games: vec![game; MAX_GAMES_FOLLOWED],
         standings: results.standings,
-        ..hosted.compute_update()
+        ..handle.compute_update()
     };
     let size = follower_update.encoded_len();
     assert!(size < DEFAULT_MESSAGE_LIMIT, "{size} bytes for a follower");
