@@ -1,11 +1,12 @@
-//! Generates the server side of the streaming services a second time, with responses that are encoded already (`wire`).
+//! Generates the server side of the streaming services again, with responses that are already
+//! encoded (`wire`).
 
 use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=../proto/chefshat");
-    // A release embeds the page for people as it was built last, and a new file there is no change of one that Cargo knows. Other builds
-    // read the page when it is asked for.
+    // A release embeds the built page. Cargo does not notice new files there by itself. Other builds read
+    // the page on each request.
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         println!("cargo::rerun-if-changed=../clients/web/dist");
     }

@@ -14,8 +14,8 @@ pub mod v1 {
     include!(concat!(env!("OUT_DIR"), "/chefshat.v1.serde.rs"));
 }
 
-/// A moment, as expressions carry it.
+/// A point in time, for expressions.
 pub use pbjson_types::Timestamp;
 
-/// The encoded `FileDescriptorSet` of the protocol, as the reflection service serves it.
+/// The encoded `FileDescriptorSet` of the protocol, for the reflection service.
 pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));
