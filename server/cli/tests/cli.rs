@@ -1,4 +1,5 @@
-//! The tests of the command line of `chefshat`, one binary: each runs the program as a person or a script would. A module for each command.
+//! The tests of the command line of `chefshat`, in one binary: each runs the program as a person or
+//! a script would. One module per command.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,5 @@
-//! `chefshat records`, and rooms that begin otherwise than with a deal, as the page `docs/branching.md` tells it.
+//! `chefshat records`, and rooms that branch, replay or start with given hands, as in
+//! `docs/branching.md`.
 
 use std::fs;
 use std::path::Path;
@@ -10,20 +11,20 @@ use super::server::{json, run, serve, serve_with};
 
 const DOCS: &str = include_str!("../../../../docs/branching.md");
 
-/// What a command that must succeed wrote.
-fn told(server: &str, arguments: &[&str]) -> String {
+/// The output of a command that must succeed.
+fn output_of(server: &str, arguments: &[&str]) -> String {
     let output = run(server, arguments);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {errors}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Makes a room that plays by itself, and waits for its end. Gives its game.
+/// Creates a room of built-in agents and waits for its end. Returns the id of its game.
 fn played(server: &str, arguments: &[&str]) -> String {
     let mut create = vec!["room", "create", "--json"];
     create.extend(arguments);
     let made = json(&run(server, &create));
-    told(
+    output_of(
         server,
         &["room", "watch", made["room"]["roomId"].as_str().unwrap()],
     );
@@ -56,8 +57,8 @@ fn lines(record: &str) -> Vec<Value> {
         .collect()
 }
 
-/// Who decided what in a record.
-fn course(record: &str) -> Vec<(u64, u64)> {
+/// The seat and action of each decision of a record.
+fn decisions(record: &str) -> Vec<(u64, u64)> {
     let number = |value: &Value| value.as_u64().unwrap_or(0);
     lines(record)
         .iter()
@@ -67,12 +68,12 @@ fn course(record: &str) -> Vec<(u64, u64)> {
 }
 
 #[test]
-fn a_recorded_game_is_branched_and_its_players_play_again() {
+fn a_recorded_game_is_branched_with_replayed_seats() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let first = original(&url);
-    let record = told(&url, &["records", "get", &first]);
-    assert!(course(&record).len() > 60);
+    let record = output_of(&url, &["records", "get", &first]);
+    assert!(decisions(&record).len() > 60);
 
     let point = format!("{first}@25");
     let seats: Vec<String> = (0..4)
@@ -89,17 +90,17 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
         flags.extend(["--seat", seat]);
     }
     let second = played(&url, &flags);
-    let again = told(&url, &["records", "get", &second]);
-    assert_eq!(course(&again), course(&record));
+    let again = output_of(&url, &["records", "get", &second]);
+    assert_eq!(decisions(&again), decisions(&record));
     let start = &lines(&again)[0]["header"]["start"];
     assert_eq!(start["branchedFrom"]["gameId"], first.as_str());
     assert_eq!(start["branchedFrom"]["sameDeals"], true);
 
-    // Listed, each by what it is.
+    // Listed with room and state.
     let listed = |flags: &[&str]| {
         let mut list = vec!["records", "list", "--json"];
         list.extend(flags);
-        let summaries = lines(&told(&url, &list)).into_iter();
+        let summaries = lines(&output_of(&url, &list)).into_iter();
         summaries
             .map(|summary| summary["gameId"].as_str().unwrap().to_owned())
             .collect::<Vec<_>>()
@@ -113,15 +114,15 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
     assert_eq!(listed(&["--room-name", "first"]), [first.as_str()]);
     assert_eq!(listed(&["--participant", "replay"]), [second.as_str()]);
     assert!(listed(&["--state", "aborted"]).is_empty());
-    let told_first = told(&url, &["records", "list", "--room-name", "first"]);
+    let told_first = output_of(&url, &["records", "list", "--room-name", "first"]);
     assert!(
         told_first.starts_with(&first) && told_first.contains("finished"),
         "{told_first}"
     );
-    let nothing = told(&url, &["records", "list", "--kind", "robot"]);
+    let nothing = output_of(&url, &["records", "list", "--kind", "robot"]);
     assert_eq!(nothing, "no records\n");
 
-    // A room that waits shows where it comes from, and who it waits for.
+    // A waiting room shows its parent game, and whom it waits for.
     let made = json(&run(
         &url,
         &[
@@ -130,7 +131,7 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
     ));
     let room_id = made["room"]["roomId"].as_str().unwrap();
     assert_eq!(made["room"]["seats"].as_array().unwrap().len(), 4);
-    let shown = told(&url, &["room", "show", room_id]);
+    let shown = output_of(&url, &["room", "show", room_id]);
     for words in [
         format!("as game {first} until after decision 25"),
         format!("imitates seat 1 of game {first}"),
@@ -138,17 +139,20 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
     ] {
         assert!(shown.contains(&words), "{words} is not in {shown}");
     }
-    assert!(told(&url, &["room", "list"]).contains("(branched)"));
+    assert!(output_of(&url, &["room", "list"]).contains("(branched)"));
 }
 
 #[test]
-fn a_recorded_player_plays_from_outside() {
+fn a_recorded_player_joins_as_a_remote_agent() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let first = original(&url);
     let file = folder.path().join("game.jsonl");
     let file = file.to_str().unwrap();
-    assert_eq!(told(&url, &["records", "get", &first, "--out", file]), "");
+    assert_eq!(
+        output_of(&url, &["records", "get", &first, "--out", file]),
+        ""
+    );
     let record = fs::read_to_string(file).unwrap();
 
     let point = format!("{first}@10");
@@ -185,11 +189,11 @@ fn a_recorded_player_plays_from_outside() {
         (result["event"].as_str(), result["seat"].as_u64()),
         (Some("result"), Some(2))
     );
-    let again = told(
+    let again = output_of(
         &url,
         &["records", "get", result["game_id"].as_str().unwrap()],
     );
-    assert_eq!(course(&again), course(&record));
+    assert_eq!(decisions(&again), decisions(&record));
 
     for (arguments, words) in [
         (vec!["agent", "replay", "--code", code], "--record"),
@@ -224,14 +228,14 @@ fn a_recorded_player_plays_from_outside() {
     }
 }
 
-/// The n-th example in JSON of the page.
+/// The JSON example number `n` of the page.
 fn example(n: usize) -> Value {
     let block = DOCS.split("```json\n").nth(n + 1).unwrap();
     serde_json::from_str(block.split("```").next().unwrap()).unwrap()
 }
 
 #[test]
-fn the_hands_of_the_page_begin_a_game() {
+fn the_hands_of_the_page_start_a_game() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let first_shift = example(0);
@@ -246,7 +250,7 @@ fn the_hands_of_the_page_begin_a_game() {
         let mut flags = vec!["--hands", file.to_str().unwrap()];
         flags.extend(["--seat", "greedy"].repeat(4));
         let game = played(&url, &flags);
-        let record = lines(&told(&url, &["records", "get", &game]));
+        let record = lines(&output_of(&url, &["records", "get", &game]));
         let dealt = record
             .iter()
             .find_map(|line| line["event"].get("shiftStarted"))
@@ -275,15 +279,15 @@ fn files_of(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn records_are_fetched_and_added_elsewhere() {
+fn records_are_downloaded_and_added_to_another_server() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let mut games = [original(&url), original(&url)];
     let out = folder.path().join("out");
     let stream = ["records", "stream", "--out-dir", out.to_str().unwrap()];
-    let said = told(&url, &stream);
+    let said = output_of(&url, &stream);
     assert!(said.starts_with("2 records in "), "{said}");
-    let all = told(&url, &["records", "stream", "--room-name", "first"]);
+    let all = output_of(&url, &["records", "stream", "--room-name", "first"]);
     let kept = games.iter().map(|game| {
         let file = out.join(format!("{game}.jsonl"));
         fs::read_to_string(file).unwrap()
@@ -298,7 +302,7 @@ fn records_are_fetched_and_added_elsewhere() {
     assert_eq!(missing.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&missing.stderr).contains("GAME_UNKNOWN"));
 
-    // Another server takes them in only if its host lets it.
+    // Another server accepts them only with --allow-import.
     let elsewhere = TempDir::new().unwrap();
     let (_closed, closed) = serve(elsewhere.path());
     let file = out.join(format!("{}.jsonl", games[0]));
@@ -309,9 +313,9 @@ fn records_are_fetched_and_added_elsewhere() {
     assert!(errors.contains("--allow-import"), "{errors}");
     let open = TempDir::new().unwrap();
     let (_open, open) = serve_with(open.path(), &["--allow-import"]);
-    let added = told(&open, &["records", "import", file]);
+    let added = output_of(&open, &["records", "import", file]);
     assert!(added.starts_with(&games[0]), "{added}");
-    let back = told(&open, &["records", "get", &games[0]]);
+    let back = output_of(&open, &["records", "get", &games[0]]);
     assert_eq!(back, fs::read_to_string(file).unwrap());
     let twice = run(&open, &["records", "import", file]);
     assert_eq!(twice.status.code(), Some(1));

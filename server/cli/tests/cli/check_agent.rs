@@ -1,5 +1,5 @@
-//! `chefshat check-agent`: its list of cases, the report, and commands that cannot be examined. What it finds in agents is a whole-system
-//! test.
+//! `chefshat check-agent`: the list of cases, the report, and commands that cannot be examined. The
+//! faults of agents are tested with the whole system.
 
 use serde_json::Value;
 
@@ -20,12 +20,12 @@ fn the_cases_are_listed() {
 }
 
 #[test]
-fn a_report_says_what_was_expected_what_came_and_what_to_do() {
+fn a_report_has_the_expectation_the_fault_and_the_advice() {
     let agent = ["sh", "-c", "echo $0 {address}; exit 3", "{code}"];
     let arguments = ["check-agent", "--only", "game", "--"];
     let ended = chefshat(&[&arguments[..], &agent[..]].concat());
     assert_eq!(ended.code, Some(1), "{}", ended.stderr);
-    // Sentences, as long as they are, and no colours where there is no terminal.
+    // Long sentences are not wrapped, and there are no colours outside a terminal.
     assert!(ended.stdout.lines().count() > 6, "{}", ended.stdout);
     assert!(!ended.stdout.contains('\x1b'), "{}", ended.stdout);
     for part in [

@@ -1,10 +1,11 @@
-//! `chefshat compare`: the same output for the same seed, a table that fits, networks by their files, errors that name what is at fault.
+//! `chefshat compare`: the same output for the same seed, a table that fits, network files, and
+//! errors that name the cause.
 
 use serde_json::Value;
 
 use super::run::{Ended, typed};
 
-/// Networks of chance weights.
+/// Networks with random weights.
 const TABLE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../tests/fixtures/network/table-actions.safetensors"
@@ -53,7 +54,7 @@ fn lines_keep_within_100_columns() {
 }
 
 #[test]
-fn json_holds_what_was_played_and_what_came_out() {
+fn json_has_settings_and_results() {
     let result = json(
         "random",
         "greedy",
@@ -70,7 +71,7 @@ fn json_holds_what_was_played_and_what_came_out() {
     assert_eq!(counts, [10, 4, 40, 80]);
     let points = &result["points_per_shift"];
     let number = |field: &str| points[field].as_f64().unwrap();
-    // Three times as many seats of B; 3 + 2 + 1 + 0 points a Shift.
+    // Three times as many seats of B; 3 + 2 + 1 + 0 points per Shift.
     assert!(
         (number("a") + 3.0 * number("b") - 6.0).abs() < 1e-9,
         "{points}"

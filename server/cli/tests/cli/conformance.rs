@@ -1,5 +1,5 @@
-//! `chefshat conformance`: the vectors agree; damage and foreign files are named, with exit code 1. What kinds of damage are found is
-//! tested in `chefshat-arena`.
+//! `chefshat conformance`: the vectors agree; damaged and foreign files are reported with exit code
+//! 1. The kinds of damage are tested in `chefshat-simulation`.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ fn vectors(file: &str) -> PathBuf {
         .join(file)
 }
 
-/// A copy of the first lines of a file of vectors, the last of them changed.
+/// Copies the first lines of a file of vectors and changes the last one.
 fn damaged(folder: &TempDir, file: &str, lines: usize, damage: impl FnOnce(&mut Value)) -> PathBuf {
     let text = std::fs::read_to_string(vectors(file)).unwrap();
     let mut lines: Vec<String> = text.lines().take(lines).map(str::to_owned).collect();
@@ -74,7 +74,7 @@ fn the_vectors_agree() {
 }
 
 #[test]
-fn the_first_vector_that_does_not_agree_is_named() {
+fn the_first_wrong_vector_is_reported() {
     let folder = TempDir::new().unwrap();
     let path = damaged(&folder, "games.jsonl", 3, |game| {
         game["steps"][5][2] = json!([1, 199])
@@ -121,7 +121,7 @@ fn the_first_vector_that_does_not_agree_is_named() {
 }
 
 #[test]
-fn what_is_no_file_of_vectors_is_refused() {
+fn other_files_are_refused() {
     let folder = TempDir::new().unwrap();
     let write = |name: &str, text: &[u8]| {
         let path = folder.path().join(name);

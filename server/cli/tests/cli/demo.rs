@@ -1,4 +1,4 @@
-//! `chefshat demo`: it ends by itself, what it prints agrees with the record it leaves, and a seed repeats it.
+//! `chefshat demo`: ends by itself, prints what its record contains, and is repeatable with a seed.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ fn record(path: &Path) -> Vec<Value> {
         .collect()
 }
 
-/// Seat and points of the standings at the end of a record, best first.
+/// Seat and points of the final standings of a record, best first.
 fn standings(record: &[Value]) -> Vec<(u64, u64)> {
     let ended = record
         .iter()
@@ -31,7 +31,7 @@ fn standings(record: &[Value]) -> Vec<(u64, u64)> {
     lines
         .iter()
         .map(|line| {
-            // In canonical JSON a seat 0 is left out, and 64-bit numbers are strings.
+            // Canonical JSON omits seat 0 and writes 64-bit numbers as strings.
             let seat = line["seat"].as_u64().unwrap_or(0);
             let points = line["points"]
                 .as_str()
@@ -53,7 +53,7 @@ fn only_record(folder: &Path) -> PathBuf {
     file.clone()
 }
 
-/// The lines of a heading's section.
+/// The lines below a heading.
 fn section<'a>(text: &'a str, heading: &str) -> Vec<&'a str> {
     text.lines()
         .skip_while(|line| !line.starts_with(&format!("━━ {heading} ")))
@@ -63,7 +63,7 @@ fn section<'a>(text: &'a str, heading: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_game_is_told_to_its_end() {
+fn a_game_is_narrated_to_its_end() {
     let folder = TempDir::new().unwrap();
     let ended = demo(folder.path(), &["--seed", "3"]);
     assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
@@ -103,7 +103,7 @@ fn a_game_is_told_to_its_end() {
 }
 
 #[test]
-fn colours_can_be_asked_for() {
+fn colours_can_be_forced() {
     let folder = TempDir::new().unwrap();
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_chefshat"))
         .args(["demo", "--target-shifts", "1", "--data-dir"])
@@ -192,7 +192,7 @@ fn a_seed_repeats_the_game() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_in_words() {
+fn invalid_options_are_explained() {
     let folder = TempDir::new().unwrap();
     for (flags, words) in [
         (

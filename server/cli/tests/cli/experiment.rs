@@ -1,4 +1,5 @@
-//! `chefshat experiment`: a table next to the paper's that is the same for the same seed, and JSON that agrees with it.
+//! `chefshat experiment`: a table beside the paper's, repeatable with a seed, and JSON that agrees
+//! with it.
 
 use serde_json::Value;
 
@@ -9,7 +10,7 @@ fn mechanics(flags: &str) -> Ended {
 }
 
 #[test]
-fn the_table_stands_next_to_the_paper_s() {
+fn the_table_is_beside_the_papers() {
     let ended = mechanics("").well();
     assert_eq!(ended.stderr, "", "no progress where there is no terminal");
     assert_eq!(ended.stdout, include_str!("mechanics.txt"));
@@ -19,7 +20,7 @@ fn the_table_stands_next_to_the_paper_s() {
 
 #[test]
 fn large_adds_a_column_that_fits() {
-    // Not the hundred thousand of --large, which would take long: as many digits.
+    // Fewer Shifts than --large, which would take long, but as many digits.
     let ended = mechanics("--shifts 1234 --preset paper").well();
     assert!(ended.stdout.contains("1,234 Shifts"), "{}", ended.stdout);
     ended.assert_table_fits(8);
@@ -29,7 +30,7 @@ fn large_adds_a_column_that_fits() {
 }
 
 #[test]
-fn json_says_the_same_with_the_rules() {
+fn json_has_the_same_and_the_rules() {
     let result = mechanics("--json --preset original2020").well().json();
     assert_eq!(
         (&result["seed"], &result["shifts_per_game"]),

@@ -1,5 +1,5 @@
-//! `chefshat export`, and the records of `chefshat simulate` that it is tried on: what is printed, what lies there afterwards, and errors
-//! that say what to do. What stands in the files is tested with the tables, in `chefshat-records` and in Python.
+//! `chefshat export` on records of `chefshat simulate`: output, files, and errors with advice. The
+//! contents of the files are tested in `chefshat-dataset` and in Python.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use super::run::{Ended, chefshat};
 
-/// A folder with a data folder in it, whose records are simulated.
+/// A folder that contains a data folder with simulated records.
 struct Stage {
     folder: TempDir,
 }
@@ -97,7 +97,7 @@ fn simulated_games_have_records_that_verify() {
     }
     let verified = chefshat(&["verify", text(&records)]);
     assert_eq!(verified.code, Some(0), "{verified:?}");
-    // The same batch has the same records, and prints the same with and without them.
+    // The same batch writes the same records and prints the same.
     let again = simulate(4, &stage.path("again"));
     assert_eq!(contents(&stage.path("again")), first);
     assert_eq!(simulate(4, &stage.path("more")), again);
@@ -114,7 +114,7 @@ fn simulated_games_have_records_that_verify() {
 }
 
 #[test]
-fn a_dataset_is_made_of_the_data_folder() {
+fn a_dataset_is_exported_from_the_data_folder() {
     let stage = Stage::new(2);
     let ended = stage.export("");
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
@@ -152,7 +152,7 @@ fn a_dataset_is_made_of_the_data_folder() {
 }
 
 #[test]
-fn the_other_layout_has_a_file_for_each_game() {
+fn the_chefshatgym_layout_has_a_file_for_each_game() {
     let stage = Stage::new(2);
     let ended = stage.export("--layout chefshatgym");
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
@@ -170,7 +170,7 @@ fn the_other_layout_has_a_file_for_each_game() {
 }
 
 #[test]
-fn damaged_records_are_named_or_left_out() {
+fn damaged_records_are_reported_or_skipped() {
     let stage = Stage::new(2);
     let records = stage.path("data/records");
     let (name, content) = contents(&records).swap_remove(0);
@@ -221,7 +221,7 @@ fn only_a_dataset_is_replaced() {
 }
 
 #[test]
-fn a_folder_that_is_named_like_a_record_is_none() {
+fn a_folder_named_like_a_record_is_ignored() {
     let stage = Stage::new(1);
     std::fs::create_dir(stage.path("data/records/old.jsonl")).unwrap();
     let ended = stage.export("");

@@ -1,5 +1,5 @@
-//! `chefshat import`: transcripts and records of other servers come to lie among the records of a data folder, once. What a transcript may
-//! say, and what is refused, is tested in `chefshat-records`.
+//! `chefshat import`: adds transcripts and records of other servers to a data folder, each once.
+//! The contents of transcripts are tested in `chefshat-record`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use super::run::{Ended, chefshat};
 
-/// A game of two players that was watched to its end.
+/// A complete transcript of a game of two players.
 pub(super) const TRANSCRIPT: &str = "\
 shift,seat,what,value
 ,,rules,paper players=2 faces=4 jokers=0 target_shifts=1
@@ -42,7 +42,7 @@ fn import(file: &Path, flags: &[&str]) -> Ended {
 }
 
 #[test]
-fn a_transcript_becomes_a_record_that_fits() {
+fn a_transcript_becomes_a_record_that_verifies() {
     let folder = tempfile::tempdir().unwrap();
     let file = transcript(&folder, TRANSCRIPT);
     let data_dir = folder.path().join("data");
@@ -82,7 +82,7 @@ fn a_transcript_becomes_a_record_that_fits() {
 }
 
 #[test]
-fn a_row_that_cannot_be_is_named_and_nothing_written() {
+fn an_impossible_row_is_reported_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let file = transcript(&folder, &TRANSCRIPT.replace("1,0,plays,3 3", "1,0,plays,3"));
     let out = folder.path().join("out");
@@ -97,7 +97,7 @@ fn a_row_that_cannot_be_is_named_and_nothing_written() {
 }
 
 #[test]
-fn a_record_of_another_server_is_verified_and_placed() {
+fn a_record_of_another_server_is_verified_and_added() {
     let folder = tempfile::tempdir().unwrap();
     let data_dir = folder.path().join("data");
     let flags = ["--data-dir", data_dir.to_str().unwrap()];

@@ -1,5 +1,5 @@
-//! `chefshat participant` over the data folder of a server that was played on: what is given out, what is left after a deletion, what is
-//! refused.
+//! `chefshat participant` on the data folder of a server: exports, what remains after a deletion,
+//! and refusals.
 
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use super::import::TRANSCRIPT;
 use super::run::{Ended, chefshat};
 use super::server::{run, serve, serve_with};
 
-/// Who is given out and deleted. Letters beyond ASCII, so that nobody gets by with bytes alone.
+/// The participant. Letters beyond ASCII test that names are compared as text.
 const NAME: &str = "Rosa Müßig";
 const OTHER: &str = "Bruno";
 
-/// Plays anyhow, and says something about each decision.
+/// Takes the first legal action and annotates each decision.
 struct Talker(RandomAgent, String);
 
 impl Agent for Talker {
@@ -53,7 +53,8 @@ fn expression(label: &str, record_only: bool) -> v1::Expression {
     }
 }
 
-/// A game of two participants, in which both express themselves, and two built-in agents; gives its id.
+/// Plays a game of two participants, which both send expressions, and two built-in agents. Returns
+/// its id.
 async fn play_game(client: &Client) -> String {
     let built_in = || v1::SeatConfig {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
@@ -123,7 +124,7 @@ fn verify(data_dir: &Path) -> Ended {
     chefshat(&["verify", "--data-dir", data_dir.to_str().unwrap()]).well()
 }
 
-/// Asserts that the letters of a text stand in no file of a folder.
+/// Asserts that no file in a folder contains a text.
 fn assert_nowhere(folder: &Path, text: &str) -> usize {
     let mut files = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -149,7 +150,7 @@ fn values(text: &str) -> Vec<Value> {
 }
 
 #[test]
-fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
+fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().join("data");
     let (server, url) = serve(&data_dir);
@@ -159,7 +160,7 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
         play_tournament(&client).await;
         game_id
     });
-    // A server that has the folder keeps it.
+    // A running server locks the folder.
     let refused = participant(&["delete", NAME, "--yes"], &data_dir);
     refused.assert_refused("another chefshat server uses");
     drop(server);
@@ -185,11 +186,11 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
     );
     assert_eq!(
         (&deleted["expressions"], &deleted["annotations"]),
-        (&json!(2), &told_annotations(&out))
+        (&json!(2), &exported_annotations(&out))
     );
     assert!(assert_nowhere(&data_dir, NAME) > 2);
     verify(&data_dir);
-    check_left(&data_dir, &game_id, pseudonym);
+    check_remaining(&data_dir, &game_id, pseudonym);
 
     let again = participant(&["delete", NAME, "--yes"], &data_dir);
     assert_eq!(again.code, Some(1));
@@ -200,7 +201,7 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
     );
 }
 
-/// What was given out: the participant's own, all of it, and nothing of the other.
+/// The export has all data of the participant and none of the other.
 fn check_export(text: &str, game_id: &str, told: &Value) {
     let lines = values(text);
     assert_eq!(lines[0]["participant"]["name"], NAME);
@@ -221,14 +222,14 @@ fn check_export(text: &str, game_id: &str, told: &Value) {
     assert!(!text.contains(OTHER));
 }
 
-fn told_annotations(out: &Path) -> Value {
+fn exported_annotations(out: &Path) -> Value {
     let lines = values(&std::fs::read_to_string(out).unwrap());
     let annotated = |line: &&Value| !line["decision"]["annotations"].is_null();
     json!(lines.iter().filter(annotated).count())
 }
 
-/// What is left: the other's part as it was, and a file that says what the server's database says.
-fn check_left(data_dir: &Path, game_id: &str, pseudonym: &str) {
+/// The data of the other participant remain, and the file agrees with the server's database.
+fn check_remaining(data_dir: &Path, game_id: &str, pseudonym: &str) {
     let path = data_dir.join("records").join(format!("{game_id}.jsonl"));
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.contains(&format!("as {OTHER}")));
@@ -256,7 +257,7 @@ fn check_left(data_dir: &Path, game_id: &str, pseudonym: &str) {
 }
 
 #[test]
-fn nobody_is_deleted_from_what_is_not_over() {
+fn unfinished_games_and_tournaments_prevent_a_deletion() {
     let folder = TempDir::new().unwrap();
     let (server, url) = serve(folder.path());
     let room_id = in_runtime(async {
@@ -284,7 +285,7 @@ fn nobody_is_deleted_from_what_is_not_over() {
     let refused = participant(&["delete", OTHER, "--yes"], folder.path());
     refused.assert_refused("a tournament that is not over");
 
-    // Everything is as it was.
+    // Nothing has changed.
     let (_server, url) = serve(folder.path());
     let (room, tournaments) = in_runtime(async {
         let client = Client::connect(&url).await.unwrap();
@@ -300,7 +301,8 @@ fn nobody_is_deleted_from_what_is_not_over() {
     assert_eq!(tournaments.participants[0].name, OTHER);
 }
 
-/// The record of a real table with Ana in a data folder, as a file alone: the file, and the id of the game.
+/// Writes the record of a real table with Ana to a data folder. Returns the file and the id of the
+/// game.
 fn real_table(data_dir: &Path) -> (String, String) {
     let folder = TempDir::new().unwrap();
     let transcript = folder.path().join("table.csv");
@@ -313,12 +315,12 @@ fn real_table(data_dir: &Path) -> (String, String) {
 }
 
 #[test]
-fn a_damaged_file_stops_nothing_and_is_named_where_the_name_stands_in_it() {
+fn a_damaged_file_is_reported_if_it_contains_the_name() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().join("data");
     let (file, _) = real_table(&data_dir);
     let records = data_dir.join("records");
-    // Nobody knows whose this is: names may be written by the numbers of their letters.
+    // A damaged record may contain the name in escaped form.
     std::fs::write(records.join("0-foreign.jsonl"), "{\"broken\": \"\\u0041").unwrap();
     let out = folder.path().join("ana.jsonl");
     let export = ["export", "Ana", "--out", out.to_str().unwrap(), "--force"];
@@ -360,7 +362,7 @@ fn a_damaged_file_stops_nothing_and_is_named_where_the_name_stands_in_it() {
 }
 
 #[test]
-fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_given_it() {
+fn a_player_of_a_real_table_is_deleted_from_the_file_and_the_database() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().join("data");
     let (file, game_id) = real_table(&data_dir);
@@ -386,7 +388,8 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_
     let rewritten = std::fs::read_to_string(&file).unwrap();
     assert_eq!(names(&rewritten), expected);
 
-    // As a run leaves it that ends between the database and the files: the next one takes the pseudonym that the database has.
+    // As after a run that was interrupted between the database and the files: the next run uses the
+    // pseudonym from the database.
     std::fs::write(&file, before).unwrap();
     let again = participant(&["delete", "Ana", "--yes", "--json"], &data_dir);
     let again = again.well().json();
@@ -398,12 +401,12 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_
 }
 
 #[test]
-fn a_folder_that_is_not_there_is_not_made() {
+fn a_missing_folder_is_not_created() {
     let folder = TempDir::new().unwrap();
     let missing = folder.path().join("missing");
     participant(&["delete", NAME, "--yes"], &missing).assert_refused("there is no data directory");
     assert!(!missing.exists());
-    // Seats that nobody has taken have this name.
+    // Empty seats have this name.
     participant(&["delete", "", "--yes"], folder.path()).assert_refused("a value is required");
     chefshat(&["participant", "delete", "--help"]).assert_helps("chefshat participant delete P07");
     chefshat(&["participant", "export", "--help"]).assert_helps("chefshat participant export P07");

@@ -1,4 +1,4 @@
-//! `chefshat ratings`: a leaderboard of the games that a server dealt and that all played themselves, of each once.
+//! `chefshat ratings`: a leaderboard from records, each game counted once.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -15,7 +15,8 @@ fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records")
 }
 
-/// A data folder with the records of so many games that the server played with its own agents, and the server's own leaderboard.
+/// Plays a number of games of built-in agents on a server. Returns its data folder and its
+/// leaderboard.
 fn played(games: usize) -> (TempDir, Value) {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
@@ -47,7 +48,7 @@ fn a_leaderboard_is_recomputed_from_the_records() {
     let fixtures = fixtures();
     let records = folder.path().join("records");
     let (records, fixtures) = (records.to_str().unwrap(), fixtures.to_str().unwrap());
-    // The folder of twice the same records holds each game once.
+    // A folder with each record twice counts each game once.
     let copies = folder.path().join("copies");
     std::fs::create_dir(&copies).unwrap();
     for file in std::fs::read_dir(records).unwrap() {
@@ -62,7 +63,7 @@ fn a_leaderboard_is_recomputed_from_the_records() {
     assert_eq!(told["records"], 14);
     assert_eq!(told["rated_games"], 12);
     assert_eq!(told["not_rated"], json!({"substituted": 1, "not_dealt": 1}));
-    // Whoever has the records comes to the same numbers as the server.
+    // The numbers equal the server's.
     assert_eq!(board["rated_games"], told["rated_games"]);
     assert_eq!(board["leaderboard"], told["leaderboard"]);
     let lines = told["leaderboard"].as_array().unwrap();
@@ -100,7 +101,7 @@ fn a_leaderboard_is_recomputed_from_the_records() {
 }
 
 #[test]
-fn damaged_records_are_named_and_left_out_on_request() {
+fn damaged_records_are_reported_and_skipped_on_request() {
     let folder = TempDir::new().unwrap();
     let damaged = folder.path().join("damaged.jsonl");
     let whole = std::fs::read_to_string(fixtures().join("fixed.jsonl")).unwrap();
@@ -117,7 +118,7 @@ fn damaged_records_are_named_and_left_out_on_request() {
 }
 
 #[test]
-fn what_is_missing_is_said() {
+fn missing_records_are_reported() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().to_str().unwrap();
     chefshat(&["ratings", "--data-dir", data_dir]).assert_refused("--data-dir");

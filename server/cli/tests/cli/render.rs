@@ -1,5 +1,5 @@
-//! `chefshat render`: each kind of file comes out whole, of the size asked for; what cannot be drawn is said with what to do, and leaves
-//! nothing behind. What the pictures show is tested in `chefshat-records`.
+//! `chefshat render`: complete files of the requested size; errors give advice and leave no file.
+//! The contents of pictures are tested in `chefshat-render`.
 
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ fn png_size(bytes: &[u8]) -> (u32, u32) {
 }
 
 #[test]
-fn pictures_are_of_the_size_asked_for() {
+fn pictures_have_the_requested_size() {
     let folder = TempDir::new().unwrap();
     for (name, flags, height) in [
         ("end.png", &[][..], 200),
@@ -59,7 +59,7 @@ fn pictures_are_of_the_size_asked_for() {
         assert_eq!(ended.stdout, told);
     }
 
-    // The same moment seen with other eyes is another picture, and the same one is the same.
+    // Another perspective gives another picture; the same one gives the same.
     let (one, other) = (folder.path().join("seat.png"), folder.path().join("b.png"));
     render(&other, &["--at", "57", "--seat", "2"]);
     assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
@@ -90,7 +90,7 @@ fn pictures_are_of_the_size_asked_for() {
 }
 
 #[test]
-fn letters_that_the_font_lacks_are_no_reason_to_complain() {
+fn missing_letters_cause_no_warning() {
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (transcript, record) = (path("table.csv"), path("table.jsonl"));
@@ -128,7 +128,7 @@ fn letters_that_the_font_lacks_are_no_reason_to_complain() {
 }
 
 #[test]
-fn what_only_another_seat_knows_of_is_not_drawn() {
+fn secrets_of_other_seats_are_not_drawn() {
     let folder = TempDir::new().unwrap();
     let draw = |name: &str, flags: &[&str]| {
         let out = folder.path().join(name);
@@ -140,7 +140,8 @@ fn what_only_another_seat_knows_of_is_not_drawn() {
         );
         std::fs::read(&out).unwrap()
     };
-    // Seat 1 alone knows of decision 59, whether to declare. To others it is the end of the Shift before.
+    // Only seat 1 knows about decision 59, a special action. Others see the end of the previous
+    // Shift.
     for eyes in [&["--seat", "2"][..], &["--spectator"]] {
         let with = |flags: &[&'static str]| [eyes, flags].concat();
         let shift = draw("a.png", &with(&["--shift", "1"]));
@@ -154,10 +155,10 @@ fn what_only_another_seat_knows_of_is_not_drawn() {
 }
 
 #[test]
-fn a_film_lasts_as_long_as_its_decisions() {
+fn the_length_of_a_film_is_that_of_its_decisions() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("film.gif");
-    // Decisions 94 to 96, the end of the Shift, the end of the game. Built-in agents take no time of their own.
+    // Decisions 94 to 96, the end of the Shift, the end of the game. Built-in agents take no time.
     for (flags, seconds) in [
         (
             &["--seconds-per-decision", "0.5"][..],
@@ -181,9 +182,9 @@ fn a_film_lasts_as_long_as_its_decisions() {
     assert_eq!(files_in(&folder), ["film.gif"]);
 }
 
-/// A program that takes the place of ffmpeg: it writes down what it was asked for and how much it was given.
+/// A replacement for ffmpeg that logs its arguments and the size of its input.
 #[cfg(unix)]
-fn stand_in(folder: &Path, script: &str) -> String {
+fn fake_ffmpeg(folder: &Path, script: &str) -> String {
     use std::os::unix::fs::PermissionsExt as _;
     let program = folder.join("stand-in");
     std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
@@ -193,10 +194,10 @@ fn stand_in(folder: &Path, script: &str) -> String {
 
 #[cfg(unix)]
 #[test]
-fn ffmpeg_is_given_every_picture() {
+fn ffmpeg_receives_every_frame() {
     let (folder, tools) = (TempDir::new().unwrap(), TempDir::new().unwrap());
     let out = folder.path().join("film.mp4");
-    let program = stand_in(
+    let program = fake_ffmpeg(
         tools.path(),
         "for last; do :; done; { echo \"$@\"; wc -c; } > \"$last\"",
     );
@@ -208,13 +209,13 @@ fn ffmpeg_is_given_every_picture() {
         written.contains("-video_size 320x200 -framerate 10"),
         "{written}"
     );
-    // Three decisions, two pictures each, four bytes a pixel.
+    // Three decisions, two frames each, four bytes per pixel.
     let given = written.lines().last().unwrap().trim();
     assert_eq!(given, (3 * 2 * 320 * 200 * 4).to_string());
     assert_eq!(files_in(&folder), ["film.mp4"]);
 
-    // A failure is told in its words and leaves the file as it was.
-    let program = stand_in(tools.path(), "echo no such codec >&2; exit 3");
+    // A failure is reported with its message and leaves the file unchanged.
+    let program = fake_ffmpeg(tools.path(), "echo no such codec >&2; exit 3");
     let ended = render(&out, &[&flags[..], &["--ffmpeg", &program]].concat());
     assert_eq!(ended.code, Some(1));
     assert!(ended.stderr.contains("no such codec"), "{}", ended.stderr);
@@ -224,9 +225,9 @@ fn ffmpeg_is_given_every_picture() {
 
 #[cfg(unix)]
 #[test]
-fn what_the_page_says_can_be_done() {
+fn the_samples_of_the_page_work() {
     let (folder, tools) = (TempDir::new().unwrap(), TempDir::new().unwrap());
-    let program = stand_in(tools.path(), "for last; do :; done; cat > \"$last\"");
+    let program = fake_ffmpeg(tools.path(), "for last; do :; done; cat > \"$last\"");
     let record = fixture("committed.jsonl");
     let samples: Vec<&str> = DOCS
         .lines()
@@ -252,7 +253,7 @@ fn what_the_page_says_can_be_done() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_said() {
+fn impossible_pictures_are_explained() {
     let folder = TempDir::new().unwrap();
     for (name, flags, code, words) in [
         (

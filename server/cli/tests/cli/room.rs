@@ -1,5 +1,5 @@
-//! `chefshat serve`, `room` and `agent` as processes of their own: a room is made, four agents join it with the code from a file, a
-//! spectator watches, and everybody agrees how it ended.
+//! `chefshat serve`, `room` and `agent` as processes: a room is created, four agents join with the
+//! code from a file, a spectator watches, and all report the same result.
 
 use std::io::{BufRead as _, BufReader};
 
@@ -15,7 +15,7 @@ fn four_processes_play_a_game_that_a_fifth_watches() {
     let code_file = folder.path().join("code");
     let code_file = code_file.to_str().unwrap();
 
-    // The agents may be there before the code is.
+    // The agents may start before the code exists.
     let agents: Vec<Running> = ["greedy", "random", "random_unmasked", "greedy"]
         .iter()
         .zip(["Ada", "Ben", "Cleo", "Dan"])
@@ -130,7 +130,7 @@ fn rooms_are_listed_shown_and_closed() {
 }
 
 #[test]
-fn an_aborted_game_is_told_to_its_agent() {
+fn an_agent_reports_an_aborted_game() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let made = json(&run(&url, &["room", "create", "--json"]));
@@ -146,7 +146,7 @@ fn an_aborted_game_is_told_to_its_agent() {
             .spawn()
             .unwrap(),
     );
-    // It says so when it has its seat.
+    // Printed once it has its seat.
     let mut line = String::new();
     let mut stderr = BufReader::new(agent.0.stderr.take().unwrap());
     stderr.read_line(&mut line).unwrap();
@@ -174,7 +174,7 @@ fn an_aborted_game_is_told_to_its_agent() {
 }
 
 #[test]
-fn what_a_room_cannot_have_is_said_in_flags_before_there_is_one() {
+fn invalid_room_options_are_reported_by_flag_before_a_room_is_created() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let nowhere = folder.path().join("nowhere").join("code");
@@ -206,7 +206,7 @@ fn what_a_room_cannot_have_is_said_in_flags_before_there_is_one() {
 }
 
 #[test]
-fn what_a_server_cannot_be_is_said_at_the_start() {
+fn invalid_server_options_are_reported_at_the_start() {
     for (flags, words) in [
         (["--listen", "localhost"], "use IP:PORT"),
         (["--max-rooms", "0"], "--max-rooms"),
@@ -220,8 +220,8 @@ fn what_a_server_cannot_be_is_said_at_the_start() {
 }
 
 #[test]
-fn a_missing_server_is_named() {
-    // A port that was free a moment ago; nothing that listens there speaks this protocol.
+fn a_missing_server_is_reported() {
+    // A port that was free a moment ago, without a server.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     drop(listener);

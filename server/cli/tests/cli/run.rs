@@ -1,5 +1,5 @@
-//! Running the program to its end, and what is expected of every command alike: tables that fit, errors that are explained. Which
-//! arguments, and what is expected beyond it, is in the modules of the commands.
+//! Runs the program to its end, with expectations common to all commands: tables that fit,
+//! explained errors.
 
 use std::process::Command;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 /// Widest line of a table.
 const COLUMNS: usize = 100;
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Ended {
     pub(super) code: Option<i32>,
@@ -17,18 +17,19 @@ pub(super) struct Ended {
 }
 
 impl Ended {
-    /// The same, if the program did what it was asked to.
+    /// Asserts that the program succeeded.
     pub(super) fn well(self) -> Self {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
         self
     }
 
-    /// What was printed, as JSON.
+    /// The output as JSON.
     pub(super) fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap()
     }
 
-    /// Asserts that a table of more than so many lines was printed, which fits on a page and has no colours.
+    /// Asserts that the output is a table of more than `more_than` lines that fits a page and has no
+    /// colours.
     pub(super) fn assert_table_fits(&self, more_than: usize) {
         assert!(self.stdout.lines().count() > more_than, "{}", self.stdout);
         for line in self.stdout.lines() {
@@ -40,21 +41,21 @@ impl Ended {
         }
     }
 
-    /// Asserts that the program refused what it was asked, printed nothing and said why.
+    /// Asserts that the program failed with an explanation and no output.
     pub(super) fn assert_refused(&self, expected: &str) {
         assert!(matches!(self.code, Some(1 | 2)), "{self:?}");
         assert!(self.stderr.contains(expected), "{}", self.stderr);
         assert_eq!(self.stdout, "", "{expected}");
     }
 
-    /// Asserts that this is a help with an example.
+    /// Asserts that the output is a help text with an example.
     pub(super) fn assert_helps(&self, example: &str) {
         assert_eq!(self.code, Some(0));
         assert!(self.stdout.contains(example), "{}", self.stdout);
     }
 }
 
-/// Runs a command of `chefshat` with flags as they would be typed.
+/// Runs a command of `chefshat` with flags as typed.
 pub(super) fn typed(command: &[&str], flags: &str) -> Ended {
     let arguments: Vec<&str> = command
         .iter()
@@ -64,7 +65,7 @@ pub(super) fn typed(command: &[&str], flags: &str) -> Ended {
     chefshat(&arguments)
 }
 
-/// Runs `chefshat` with arguments, without the environment's settings of it.
+/// Runs `chefshat` with arguments and without its environment variables.
 pub(super) fn chefshat(arguments: &[&str]) -> Ended {
     let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
     for (name, _) in std::env::vars_os() {

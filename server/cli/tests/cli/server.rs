@@ -1,4 +1,4 @@
-//! A server as a process of its own, and the program run against it. What is asked of it is in the modules of the commands.
+//! A server as a process, and commands run against it.
 
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 
-/// Runs with the program, and not longer than the test.
+/// A running program, killed at the end of the test.
 pub(super) struct Running(pub(super) Child);
 
 impl Drop for Running {
@@ -17,7 +17,7 @@ impl Drop for Running {
     }
 }
 
-/// The program, without the environment's settings of it.
+/// The program without its environment variables.
 pub(super) fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
     for (name, _) in std::env::vars_os() {
@@ -29,17 +29,17 @@ pub(super) fn program() -> Command {
     command
 }
 
-/// A server, and its address.
+/// Starts a server. Returns it and its address.
 pub(super) fn serve(data_dir: &Path) -> (Running, String) {
     serve_with(data_dir, &[])
 }
 
-/// A server with more flags, and its address.
+/// Starts a server with further flags. Returns it and its address.
 pub(super) fn serve_with(data_dir: &Path, flags: &[&str]) -> (Running, String) {
     let mut command = program();
     command.arg("serve").args(flags);
     command.args(["--listen", "127.0.0.1:0", "--json", "--data-dir"]);
-    // Both say no, so that the records are written.
+    // Both values turn the setting off, so that records are written.
     command.env("CHEFSHAT_NO_RECORDS", "0");
     command.env("CHEFSHAT_LOG_JSON", "");
     let mut child = command
@@ -57,7 +57,7 @@ pub(super) fn serve_with(data_dir: &Path, flags: &[&str]) -> (Running, String) {
     (Running(child), url)
 }
 
-/// What the program wrote, one line of JSON.
+/// The output of the program, one line of JSON.
 pub(super) fn json(output: &Output) -> Value {
     let text = std::str::from_utf8(&output.stdout).unwrap();
     serde_json::from_str(text).unwrap_or_else(|error| {

@@ -1,4 +1,5 @@
-//! `chefshat simulate`: the same output for the same seed, a table that fits and adds up, errors that name the flag.
+//! `chefshat simulate`: the same output for the same seed, a table that fits and adds up, errors
+//! that name the flag.
 
 use serde_json::Value;
 
@@ -55,7 +56,7 @@ fn lines_keep_within_100_columns() {
 }
 
 #[test]
-fn json_holds_everything_and_adds_up() {
+fn json_is_complete_and_adds_up() {
     let result = json(
         "--games 100 --seed 3 --players 3 --agents greedy,random,random_unmasked --reward validity --no-exchange",
     );
@@ -92,7 +93,7 @@ fn json_holds_everything_and_adds_up() {
 }
 
 #[test]
-fn greedy_sits_on_seat_0_unless_told_otherwise() {
+fn greedy_has_seat_0_by_default() {
     let agents = |flags: &str| -> Vec<String> {
         let result = json(flags);
         let seats = result["seats"].as_array().unwrap();
@@ -134,7 +135,7 @@ fn mistakes_are_explained() {
             "--preset rulebook --players 3 --points 3,2,1,0",
             "--points: 4 numbers of points for 3 players",
         ),
-        ("--target-shifts 0", "--target-shifts: a game of 0 Shifts"),
+        ("--target-shifts 0", "--target-shifts: a target of 0 Shifts"),
         ("--target-shifts 3 --target-points 9", "cannot be used with"),
         ("--no-exchange --exchange on", "cannot be used with"),
         ("--games 0", "--games"),

@@ -1,11 +1,12 @@
-//! `chefshat play` and `chefshat watch` where there is no terminal. In one they are tested with the whole system.
+//! `chefshat play` and `chefshat watch` without a terminal. With one they are tested with the whole
+//! system.
 
 use std::process::Stdio;
 
 use super::server::program;
 
 #[test]
-fn without_a_terminal_it_says_so() {
+fn a_missing_terminal_is_reported() {
     for arguments in [&["play", "--local"][..], &["watch", "room"]] {
         let ended = program()
             .args(arguments)

@@ -1,5 +1,5 @@
-//! `chefshat tournament` and `chefshat leaderboard` against a server of its own: a tournament from its making to its results, what only its
-//! owner may do, what is refused.
+//! `chefshat tournament` and `chefshat leaderboard` on a server: a tournament from creation to
+//! results, the owner's rights, refusals.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use super::server::{Running, json, program, run, serve};
 
-/// Waits for the end of a program; gives its exit code and the lines it wrote.
+/// Waits for the end of a program. Returns its exit code and output lines.
 fn ended(mut program: Running) -> (Option<i32>, Vec<String>) {
     let stdout = program.0.stdout.take().unwrap();
     let lines = BufReader::new(stdout).lines().map(Result::unwrap).collect();
@@ -28,13 +28,13 @@ fn path(folder: &Path, name: &str) -> String {
 }
 
 #[test]
-fn a_tournament_is_played_followed_and_told() {
+fn a_tournament_is_played_followed_and_reported() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let none = run(&url, &["tournament", "list"]);
     assert_eq!(String::from_utf8(none.stdout).unwrap(), "no tournaments\n");
 
-    // The agents may be there before the code is; one of them plays two games at a time.
+    // The agents may start before the code exists; one of them plays two games at a time.
     let code_file = path(folder.path(), "code");
     let agents: Vec<Running> = [("greedy", "Ada", "2"), ("random", "Ben", "1")]
         .into_iter()
@@ -187,7 +187,7 @@ fn check_games(url: &str, id: &str, data_dir: &Path) {
     let names: BTreeSet<&str> = (board["leaderboard"].as_array().unwrap().iter())
         .map(|line| line["name"].as_str().unwrap())
         .collect();
-    // A game with both greedy agents says nothing of greedy.
+    // A game with two greedy agents is not rated.
     assert!(rated <= 3 && (rated == 0) == names.is_empty(), "{board}");
     let people = run(url, &["leaderboard", "--kind", "human"]);
     let people = String::from_utf8(people.stdout).unwrap();
@@ -195,7 +195,7 @@ fn check_games(url: &str, id: &str, data_dir: &Path) {
 }
 
 #[test]
-fn an_agent_that_ended_goes_on_with_its_ticket() {
+fn an_agent_that_ended_resumes_with_its_ticket() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let create = "--name final --format knockout --built-in greedy*3 --target-shifts 1 --json";
@@ -233,7 +233,7 @@ fn an_agent_that_ended_goes_on_with_its_ticket() {
 }
 
 #[test]
-fn only_its_owner_begins_and_closes_a_tournament() {
+fn only_its_owner_starts_and_closes_a_tournament() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let owner = path(folder.path(), "owner");
@@ -321,7 +321,7 @@ fn only_its_owner_begins_and_closes_a_tournament() {
 }
 
 #[test]
-fn what_a_tournament_cannot_be_is_said_in_flags() {
+fn invalid_tournament_options_are_reported_by_flag() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let nowhere = path(folder.path(), "nowhere/code");

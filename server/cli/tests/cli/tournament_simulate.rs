@@ -1,4 +1,5 @@
-//! `chefshat tournament simulate`: the same output for the same seed, tables that fit, every format and way of dealing, errors by flag.
+//! `chefshat tournament simulate`: the same output for the same seed, tables that fit, every format
+//! and kind of deals, errors that name the flag.
 
 use serde_json::Value;
 
@@ -22,7 +23,7 @@ fn json(flags: &str) -> Value {
 /// Names in the order of the standings.
 fn order(result: &Value) -> Vec<String> {
     let standings = result["standings"].as_array().unwrap();
-    // A number of 0 is left out.
+    // Canonical JSON omits 0.
     let number = |line: &Value| line["participant"].as_u64().unwrap_or(0) as usize;
     standings
         .iter()
@@ -72,7 +73,7 @@ fn the_same_seed_gives_the_same_standings_on_any_number_of_threads() {
 }
 
 #[test]
-fn every_format_and_way_of_dealing_is_played_to_its_end() {
+fn every_format_and_kind_of_deals_is_played_to_its_end() {
     for (format, rounds, pairings) in [("knockout", 2, 3), ("round_robin", 7, 14), ("swiss", 3, 6)]
     {
         for (deals, games) in [("independent", 2), ("same", 2), ("rotated", 8)] {
@@ -103,7 +104,7 @@ fn every_format_and_way_of_dealing_is_played_to_its_end() {
 }
 
 #[test]
-fn participants_are_named_by_what_they_are() {
+fn participants_are_named_after_their_agents() {
     let result = json("--format knockout --agents greedy,random*4");
     let mut names = order(&result);
     names.sort_unstable();

@@ -1,5 +1,5 @@
-//! `chefshat verify`: whole records are said to fit, a damaged one is named with file, line and problem. What kinds of damage are found is
-//! tested in `chefshat-records`.
+//! `chefshat verify`: accepts valid records, and reports file, line and problem of a damaged one.
+//! The kinds of damage are tested in `chefshat-record`.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ fn data_dir() -> tempfile::TempDir {
 }
 
 #[test]
-fn whole_records_fit() {
+fn valid_records_verify() {
     let (committed, fixed) = (fixture("committed.jsonl"), fixture("fixed.jsonl"));
     let ended = chefshat(&[
         "verify",
@@ -60,7 +60,7 @@ fn whole_records_fit() {
 }
 
 #[test]
-fn a_damaged_record_is_named() {
+fn a_damaged_record_is_reported() {
     let folder = data_dir();
     let data_dir = folder.path().to_str().unwrap();
     let ended = chefshat(&["verify", "--data-dir", data_dir]);
@@ -107,7 +107,7 @@ fn a_damaged_record_is_named() {
 }
 
 #[test]
-fn where_there_is_no_record_is_said() {
+fn missing_records_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let nowhere = folder.path().join("nowhere");
     for (path, words) in [
@@ -118,7 +118,7 @@ fn where_there_is_no_record_is_said() {
         assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
         assert!(ended.stderr.contains(words), "{}", ended.stderr);
     }
-    // Named twice it is still one.
+    // A record given twice counts once.
     let fixed = fixture("fixed.jsonl");
     let fixed = fixed.to_str().unwrap();
     let ended = chefshat(&["verify", fixed, fixed]);
