@@ -15,6 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let descriptors = protox::compile(files, ["../proto"])?;
     tonic_prost_build::configure()
         .build_client(false)
+        .codec_path("crate::wire::SmallBuffers")
         .extern_path(".chefshat.v1", "::chefshat_proto::v1")
         .extern_path(".chefshat.v1.PlayResponse", "crate::wire::Updates")
         .extern_path(

@@ -1,5 +1,5 @@
 //! Accepts connections: disables Nagle's delay, limits their number, and drops those that send
-//! nothing at the start.
+//! nothing at the start or whose peer has vanished.
 
 use std::io;
 use std::pin::Pin;
@@ -8,6 +8,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use futures::{Stream, stream};
+use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -17,6 +18,17 @@ use tracing::debug;
 
 /// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Idle time before the kernel probes the peer. Unlike HTTP/2 pings, probes cost nothing per message,
+/// and they work for HTTP/1.1 as well.
+const KEEPALIVE_IDLE: Duration = Duration::from_secs(20);
+/// Time between probes.
+const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
+/// Unanswered probes before the connection is dropped.
+const KEEPALIVE_RETRIES: u32 = 2;
+/// How long sent data may stay unacknowledged before the connection is dropped.
+#[cfg(target_os = "linux")]
+const UNACKNOWLEDGED_LIMIT: Duration = Duration::from_secs(30);
 
 /// Limits of connections.
 #[derive(Debug, Clone, Copy)]
@@ -44,8 +56,9 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
                 }
             }
         };
-        // If this fails, the connection is slower but still works.
-        let _ = stream.set_nodelay(true);
+        if let Err(error) = set_options(&stream) {
+            debug!(%error, "could not set the options of a connection");
+        }
         let connection = Connection {
             stream,
             silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
@@ -53,6 +66,19 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
         };
         Some((Ok(connection), (listener, places)))
     })
+}
+
+fn set_options(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    let keepalive = TcpKeepalive::new()
+        .with_time(KEEPALIVE_IDLE)
+        .with_interval(KEEPALIVE_INTERVAL)
+        .with_retries(KEEPALIVE_RETRIES);
+    let socket = SockRef::from(stream);
+    socket.set_tcp_keepalive(&keepalive)?;
+    #[cfg(target_os = "linux")]
+    socket.set_tcp_user_timeout(Some(UNACKNOWLEDGED_LIMIT))?;
+    Ok(())
 }
 
 /// A connection that is dropped unless it sends its first bytes in time.
@@ -117,5 +143,32 @@ impl AsyncWrite for Connection {
 
     fn is_write_vectored(&self) -> bool {
         self.stream.is_write_vectored()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::StreamExt as _;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_accepted_connection_is_probed_by_the_kernel() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let limits = Limits {
+            max_connections: 1,
+            first_byte_timeout: Duration::from_secs(60),
+        };
+        let mut connections = std::pin::pin!(accept(listener, limits));
+        let _client = TcpStream::connect(address).await.expect("it listens");
+        let connection = connections.next().await.expect("endless").expect("one");
+        let socket = SockRef::from(&connection.stream);
+        assert!(socket.keepalive().expect("an option"));
+        assert_eq!(
+            socket.tcp_keepalive_time().expect("an option"),
+            KEEPALIVE_IDLE
+        );
+        assert!(socket.tcp_nodelay().expect("an option"));
     }
 }

@@ -9,6 +9,7 @@ use std::task::{Context, Poll};
 
 use futures::Stream;
 use futures::task::AtomicWaker;
+use smallvec::SmallVec;
 use tokio::sync::Notify;
 use tokio::time::Instant;
 
@@ -97,7 +98,7 @@ pub struct Outbox {
 struct Waiting {
     updates: Updates,
     weight: usize,
-    stamps: Vec<Arc<HandStamp>>,
+    stamps: SmallVec<[Arc<HandStamp>; 1]>,
     wanting_space: Vec<Arc<dyn OnSpace>>,
     /// The end of the stream, taken once.
     end: Option<StreamEnd>,
@@ -112,7 +113,7 @@ impl Outbox {
             waiting: Mutex::new(Waiting {
                 updates: Updates::default(),
                 weight: 0,
-                stamps: Vec::new(),
+                stamps: SmallVec::new(),
                 wanting_space: Vec::new(),
                 end: None,
                 ended: false,
@@ -286,7 +287,7 @@ impl Drop for OutboxStream {
         waiting.abandoned = true;
         waiting.updates = Updates::default();
         waiting.weight = 0;
-        waiting.stamps = Vec::new();
+        waiting.stamps = SmallVec::new();
         waiting.wanting_space = Vec::new();
         drop(waiting);
         self.outbox.stop_reading();

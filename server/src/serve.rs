@@ -29,8 +29,6 @@ use crate::store::{Store, StoreError};
 use crate::tournaments::Tournaments;
 use crate::web::PageLayer;
 
-const KEEPALIVE_INTERVAL: std::time::Duration = std::time::Duration::from_secs(20);
-const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
 /// Largest request headers, bytes.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
 
@@ -157,8 +155,6 @@ impl Server {
         let serving = transport::Server::builder()
             .accept_http1(true)
             .tcp_nodelay(true)
-            .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
-            .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
             .http2_max_header_list_size(MAX_HEADER_BYTES)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
             .layer(cors(&config.allowed_origins)?)

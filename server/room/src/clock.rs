@@ -39,6 +39,14 @@ impl Core {
         }
     }
 
+    /// Whether only answers of participants advance the game now: no built-in agent or substitute
+    /// plays, and no decisions of a record are left to replay.
+    pub fn awaits_participants_only(&self) -> bool {
+        self.state == State::Playing
+            && self.next_taken_over().is_none()
+            && !self.all_seats().any(|seat| self.is_automatic(seat))
+    }
+
     /// Does what is due at `now`. `handed`: when the transport received the request for the open
     /// decision.
     pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {

@@ -29,7 +29,7 @@ impl Core {
             State::Playing => return Err(JoinError::GameStarted),
             State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
         }
-        let log = self.log.since(0).iter();
+        let log = self.log.since(0);
         let seatings = log.filter(|it| matches!(it.event, RoomEvent::Seated(..)));
         if seatings.count() >= MAX_SEATINGS {
             return Err(JoinError::TooManySeatings);

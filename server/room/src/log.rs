@@ -77,19 +77,29 @@ impl RoomEvent {
     }
 }
 
-/// The events of a room.
+/// Events in one chunk of a log.
+const CHUNK: usize = 64;
+
+/// The events of a room, in chunks of a fixed size, so that a growing log is never copied.
 #[derive(Debug, Default)]
 pub struct Log {
-    entries: Vec<LogEntry>,
+    /// All full but the last.
+    chunks: Vec<Vec<LogEntry>>,
+    length: usize,
 }
 
 impl Log {
     /// Appends an event.
     pub(super) fn push(&mut self, at: Duration, event: RoomEvent) {
-        self.entries.push(LogEntry {
+        if self.length.is_multiple_of(CHUNK) {
+            self.chunks.push(Vec::with_capacity(CHUNK));
+        }
+        let last = self.chunks.last_mut().expect("one has space");
+        last.push(LogEntry {
             at_ms: u32::try_from(at.as_millis()).unwrap_or(u32::MAX),
             event,
         });
+        self.length += 1;
     }
 
     /// Replaces the hands that were dealt, for tests of redaction.
@@ -98,7 +108,7 @@ impl Log {
         &mut self,
         hands: &chefshat_engine::BySeat<chefshat_engine::Cards>,
     ) {
-        for entry in &mut self.entries {
+        for entry in self.chunks.iter_mut().flatten() {
             if let RoomEvent::Game(game) = &mut entry.event
                 && let Event::ShiftStarted { hands: dealt, .. } = &mut game.event
             {
@@ -109,22 +119,23 @@ impl Log {
 
     /// Number of events.
     pub fn len(&self) -> usize {
-        self.entries.len()
+        self.length
     }
 
     /// Whether there is no event yet.
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.length == 0
     }
 
     /// The event at a position, from 0.
     pub fn get(&self, position: usize) -> Option<&LogEntry> {
-        self.entries.get(position)
+        self.chunks.get(position / CHUNK)?.get(position % CHUNK)
     }
 
     /// The events from a position on.
-    pub fn since(&self, position: usize) -> &[LogEntry] {
-        self.entries.get(position..).unwrap_or_default()
+    pub fn since(&self, position: usize) -> impl Iterator<Item = &LogEntry> + Clone {
+        let chunks = self.chunks.get(position / CHUNK..).unwrap_or_default();
+        chunks.iter().flatten().skip(position % CHUNK)
     }
 }
 
@@ -135,5 +146,32 @@ mod tests {
     #[test]
     fn an_entry_fits_one_cache_line() {
         assert!(size_of::<LogEntry>() <= 64, "{}", size_of::<LogEntry>());
+    }
+
+    #[test]
+    fn events_are_found_across_chunks() {
+        let mut log = Log::default();
+        for number in 0..3 * CHUNK + 1 {
+            let at = Duration::from_millis(u64::try_from(number).expect("small"));
+            log.push(at, RoomEvent::GameStarted);
+        }
+        assert_eq!(log.len(), 3 * CHUNK + 1);
+        for from in [
+            0,
+            1,
+            CHUNK - 1,
+            CHUNK,
+            2 * CHUNK + 5,
+            3 * CHUNK,
+            3 * CHUNK + 1,
+            9 * CHUNK,
+        ] {
+            let times = log.since(from).map(|entry| entry.at_ms as usize);
+            assert!(times.eq(from..log.len().max(from)), "{from}");
+            assert_eq!(
+                log.get(from).map(|entry| entry.at_ms as usize),
+                (from < log.len()).then_some(from)
+            );
+        }
     }
 }

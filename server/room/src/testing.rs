@@ -186,7 +186,6 @@ impl Table {
         self.core
             .log()
             .since(0)
-            .iter()
             .filter(|entry| wanted(&entry.event))
             .count()
     }

@@ -6,7 +6,7 @@ use chefshat_record::convert::{FieldProblem, check_expression};
 use prost::Message as _;
 
 use chefshat_room::journal::Source;
-use chefshat_room::{Answered, ExpressError, Verdict};
+use chefshat_room::{Answer, Answered, ExpressError, Verdict};
 
 /// Encodes a mask.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
@@ -55,13 +55,13 @@ pub fn answer_result(decision_id: u64, action: u32, answered: Answered) -> v1::A
 
 /// Annotations contain a number that is not finite, which records cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NotFinite;
+struct NotFinite;
 
 /// Encodes annotations for storage.
 ///
 /// # Errors
 /// An annotation is not a finite number.
-pub fn annotations_from_proto(
+fn annotations_from_proto(
     annotations: Option<v1::Annotations>,
 ) -> Result<Option<Box<[u8]>>, NotFinite> {
     let Some(annotations) = annotations else {
@@ -76,6 +76,17 @@ pub fn annotations_from_proto(
     }
     let bytes = annotations.encode_to_vec().into_boxed_slice();
     Ok(Some(bytes).filter(|bytes| !bytes.is_empty()))
+}
+
+/// Converts an answer and encodes its annotations for storage.
+pub fn answer_from_proto(answer: v1::Answer) -> Answer {
+    let annotations = annotations_from_proto(answer.annotations);
+    Answer {
+        decision_id: answer.decision_id,
+        action: answer.action,
+        annotations_refused: annotations.is_err(),
+        annotations: annotations.unwrap_or_default(),
+    }
 }
 
 /// Checks an expression and encodes it for storage.

@@ -15,7 +15,7 @@ mod start;
 mod tournament;
 mod vector;
 
-pub use decision::{annotations_from_proto, answer_result, express_refused, expression_from_proto};
+pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
 pub use name::checked_name;

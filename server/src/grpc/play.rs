@@ -16,6 +16,7 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
+use crate::convert;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
@@ -23,7 +24,7 @@ use crate::tournaments::Tournaments;
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
 use chefshat_room::ids::Token;
-use reader::{Reader, answer_action, express_action};
+use reader::{Reader, express_action};
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -124,7 +125,9 @@ impl PlayService for Play {
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
         let room = self.rooms.get(token.room).ok_or_else(ticket_unknown)?;
         let action = match request.command {
-            Some(act_request::Command::Answer(answer)) => answer_action(answer),
+            Some(act_request::Command::Answer(answer)) => {
+                SeatAction::Answer(convert::answer_from_proto(answer))
+            }
             Some(act_request::Command::Express(expression)) => express_action(&expression)
                 .map_err(|problem| field("EXPRESSION_REFUSED", &problem))?,
             Some(act_request::Command::Resume(_)) => SeatAction::Resume,

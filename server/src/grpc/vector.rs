@@ -1,6 +1,6 @@
 //! `VectorService`: games of a client, stepped in batches on their own thread pool so that rooms
-//! stay responsive. `chefshat_simulation::vector` plays the games; this file reads and writes the
-//! streams and splits records into messages.
+//! stay responsive; small batches are stepped without it. `chefshat_simulation::vector` plays the
+//! games; this file reads and writes the streams and splits records into messages.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
@@ -40,6 +40,10 @@ use chefshat_room::ids::random_bytes;
 
 /// Messages queued for a slow client. At most one is a batch; the others are parts of records.
 const SEND_AHEAD: usize = 4;
+/// Most games that are stepped without the thread pool if the client plays all seats.
+const MAX_GAMES_IN_PLACE: u32 = 16;
+/// Most games that are stepped without the thread pool if built-in agents without a network play.
+const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
 /// Size from which a part of a record is sent, bytes.
 const RECORD_PART_BYTES: usize = 512 * 1024;
 
@@ -158,6 +162,7 @@ impl Runner {
         let _seats = self.reserve(&setup)?;
         self.send(ResponseKind::Started(convert::started_to_proto(&setup)))
             .await?;
+        let in_place = steps_in_place(&setup);
         let begun = self.run_on_pool(move || VectorGames::new(setup)).await?;
         let (mut games, mut batch) = begun;
         loop {
@@ -177,10 +182,12 @@ impl Runner {
             let Some(command) = self.next_command(requests).await? else {
                 return Err(End::Gone);
             };
+            let step = move || (execute(&mut games, command), games);
             let stepped;
-            (stepped, games) = self
-                .run_on_pool(move || (execute(&mut games, command), games))
-                .await?;
+            (stepped, games) = match in_place {
+                true => caught(step).ok_or_else(internal)?,
+                false => self.run_on_pool(step).await?,
+            };
             batch = stepped.map_err(|error| step_refused(&error))?;
         }
     }
@@ -304,19 +311,39 @@ impl Runner {
     }
 }
 
-/// Runs work on a pool's threads. A panic ends only this work, because rooms share the process.
+/// Whether a step of these games takes less time than waking a thread of the pool.
+fn steps_in_place(setup: &VectorSetup) -> bool {
+    let built_in: Vec<_> = setup.agents().values().flatten().collect();
+    let most = if built_in.is_empty() {
+        MAX_GAMES_IN_PLACE
+    } else if built_in.contains(&&AgentKind::Trained) {
+        0
+    } else {
+        MAX_GAMES_IN_PLACE_WITH_BUILT_IN
+    };
+    setup.games() <= most
+}
+
+/// Runs work; `None` if it panics, which ends only this work because rooms share the process.
+fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
+    // The state of the work is dropped, so it is never seen half done.
+    let done = std::panic::catch_unwind(AssertUnwindSafe(work));
+    if done.is_err() {
+        tracing::error!("the games of a client were given up: stepping them panicked");
+    }
+    done.ok()
+}
+
+/// Runs work on a pool's threads.
 async fn on_pool<T: Send + 'static>(
     pool: &ThreadPool,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Status> {
     let (done, result) = oneshot::channel();
     pool.spawn(move || {
-        // The state of the work is dropped, so it is never seen half done.
-        match std::panic::catch_unwind(AssertUnwindSafe(work)) {
-            Ok(value) => drop(done.send(value)),
-            Err(_) => {
-                tracing::error!("the games of a client were lost: stepping them panicked")
-            }
+        if let Some(value) = caught(work) {
+            // It fails only if the client has gone.
+            let _ = done.send(value);
         }
     });
     result.await.map_err(|_| internal())

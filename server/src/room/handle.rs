@@ -9,6 +9,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
 use super::subscriber::DeliveryOptions;
+use super::task::Resting;
 use crate::outbox::{OnSpace, Outbox};
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind};
@@ -134,7 +135,8 @@ pub(super) enum Message {
     ),
     Abort(AbortReason),
     Suspend,
-    Space,
+    /// Delivers and sets the timer again: a stream has space, or an answer was handled in place.
+    Wake,
 }
 
 /// A handle to a room.
@@ -142,6 +144,7 @@ pub(super) enum Message {
 pub struct Handle {
     pub(super) id: Id,
     pub(super) mailbox: mpsc::Sender<Message>,
+    pub(super) resting: Arc<Resting>,
 }
 
 impl std::fmt::Debug for Handle {
@@ -189,6 +192,45 @@ impl Handle {
             .mailbox
             .send(Message::Lost(seat, connection, reason))
             .await;
+    }
+
+    /// Handles an answer in the calling task if the room is resting; the result is sent on the stream
+    /// of its seat. Otherwise returns the answer.
+    pub fn answer_in_place(
+        &self,
+        seat: Seat,
+        connection: ConnectionId,
+        answer: Answer,
+        arrived: Instant,
+    ) -> Result<(), Answer> {
+        let mailbox = &self.mailbox;
+        let needs_task = (self.resting).answer(mailbox, (seat, connection), answer, arrived)?;
+        if needs_task {
+            // If the mailbox is full, the task will run anyway.
+            let _ = self.mailbox.try_send(Message::Wake);
+        }
+        Ok(())
+    }
+
+    /// Sends an answer to the mailbox; the result is sent on the stream of its seat. Returns the answer
+    /// if the mailbox is full or the room is gone.
+    pub fn send_answer(
+        &self,
+        seat: Seat,
+        connection: ConnectionId,
+        answer: Answer,
+        arrived: Instant,
+    ) -> Result<(), Answer> {
+        let Ok(slot) = self.mailbox.try_reserve() else {
+            return Err(answer);
+        };
+        slot.send(Message::Do(
+            seat,
+            connection,
+            SeatAction::Answer(answer),
+            arrived,
+        ));
+        Ok(())
     }
 
     /// Executes a command of a seat; the result is sent on its stream.
@@ -299,7 +341,7 @@ impl OnSpace for NotifySpace {
     fn space(&self) {
         if let Some(mailbox) = self.0.upgrade() {
             // If the mailbox is full, the room will deliver anyway.
-            let _ = mailbox.try_send(Message::Space);
+            let _ = mailbox.try_send(Message::Wake);
         }
     }
 }

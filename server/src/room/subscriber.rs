@@ -173,6 +173,16 @@ impl Subscriber {
         }
     }
 
+    /// Whether updates may be due even without a decision, an urgent event or a full backlog.
+    pub fn must_always_be_visited(&self) -> bool {
+        self.stalled || (self.connection()).is_none_or(|connection| connection.options.at_once)
+    }
+
+    /// Length of the log at which the backlog is due.
+    pub fn backlog_due_at(&self) -> usize {
+        self.position + MAX_PENDING_EVENTS
+    }
+
     /// When a decision request was handed to the transport; `None` if it was not yet.
     pub fn handed(&self, decision_id: u64) -> Option<Duration> {
         let connection = self.connection()?;
@@ -225,7 +235,7 @@ impl Subscriber {
             && result.decision_id > connection.acknowledged;
         connection.acknowledged = connection.acknowledged.max(result.decision_id);
         let handle = connection.handle;
-        self.pending.add(handle, Update::Result(result));
+        self.pending.add_result(handle, &result);
         if !may_wait {
             self.flush();
         }

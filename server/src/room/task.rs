@@ -1,16 +1,19 @@
 //! The task of a room: receives from a bounded mailbox, sets one timer, and for every batch of
-//! inputs lets the core apply them, commits the changes and only then publishes them. The core
-//! makes all decisions.
+//! inputs lets the core apply them, commits the changes and only then publishes them. While the task
+//! waits, the reader of a stream may handle an answer in the same way. The core makes all decisions.
 
-use std::sync::Arc;
+use std::future::{Future as _, poll_fn};
+use std::pin::Pin;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::Poll;
 use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, SeatedParticipant};
-use chefshat_room::{ConnectionId, Core, JoinError, LeaveError, State};
+use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, State};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
@@ -20,7 +23,9 @@ use super::handle::{
     Acted, AttachRequest, Handle, JoinRequest, Joined, Message, NotifySpace, SeatAction,
     SpectateError, SpectateRequest,
 };
-use super::subscriber::{MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent};
+use super::subscriber::{
+    MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
+};
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert;
@@ -66,12 +71,14 @@ pub fn spawn_room(
     context: TaskContext,
 ) -> Handle {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
+    let resting = Arc::new(Resting::default());
     let handle = Handle {
         id: core.header().room_id,
         mailbox: mailbox.clone(),
+        resting: Arc::clone(&resting),
     };
     let seats = core.header().fills.len();
-    let task = Task {
+    let room = Box::new(Room {
         core,
         journal,
         now: clock.now(),
@@ -82,11 +89,15 @@ pub fn spawn_room(
         releases: Vec::new(),
         public: PublicEvents::default(),
         delivered: 0,
+        always_visit: vec![false; seats],
+        backlog_due_at: 0,
         over_since,
         suspended: false,
+        timer_at: None,
+        answers_in_place: false,
         context: context.clone(),
-    };
-    context.tracker.spawn(task.run(inbox));
+    });
+    context.tracker.spawn(run(room, resting, inbox));
     handle
 }
 
@@ -117,7 +128,8 @@ enum Release {
     ),
 }
 
-struct Task {
+/// The state of a room: its core, journal and subscribers.
+pub(super) struct Room {
     core: Core,
     journal: Box<dyn Journal>,
     clock: RoomClock,
@@ -130,59 +142,133 @@ struct Task {
     public: PublicEvents,
     /// Length of the log at the last delivery.
     delivered: usize,
+    /// By seat, whether every delivery must visit its connection.
+    always_visit: Vec<bool>,
+    /// Length of the log at which the backlog of a connection may first be due.
+    backlog_due_at: usize,
     over_since: Option<Duration>,
     /// Whether the room ends while its game is unfinished; the game resumes when the server is
     /// restarted.
     suspended: bool,
+    /// When the timer of the task fires.
+    timer_at: Option<Duration>,
+    answers_in_place: bool,
     context: TaskContext,
 }
 
-impl Task {
-    async fn run(mut self, mut inbox: mpsc::Receiver<Message>) {
-        self.core.begin_if_all_built_in(self.now);
-        let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
-        let alarm = tokio::time::sleep_until(self.clock.instant(self.now));
-        tokio::pin!(alarm);
-        let mut armed = true;
-        loop {
-            if !self.commit_and_publish().await {
-                break;
-            }
-            if self.suspended && self.over_since.is_none() {
-                self.end_streams(StreamEnd::ShuttingDown);
-                break;
-            }
-            armed = self.arm(alarm.as_mut(), armed);
-            tokio::select! {
-                biased;
-                received = inbox.recv_many(&mut messages, INPUTS_PER_COMMIT) => {
-                    if received == 0 {
-                        break;
-                    }
-                    self.now = self.clock.now();
-                    for message in messages.drain(..) {
-                        self.receive(message);
-                    }
-                    // A busy mailbox must not delay deadlines.
-                    let due = armed && self.clock.at(alarm.deadline()) <= self.now;
-                    if due && !self.ring(&mut armed) {
-                        break;
-                    }
-                }
-                () = alarm.as_mut(), if armed => {
-                    self.now = self.clock.now();
-                    if !self.ring(&mut armed) {
-                        break;
-                    }
-                }
-            }
+/// Holds the state of a room while its task waits. Meanwhile the reader of a stream may handle an
+/// answer in place, which saves a message and waking the task: a large part of the cost of a
+/// decision.
+#[derive(Default)]
+pub(super) struct Resting(Mutex<Option<Box<Room>>>);
+
+impl Resting {
+    fn lock(&self) -> MutexGuard<'_, Option<Box<Room>>> {
+        // A holder of the lock that panicked had taken the room out.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Handles an answer in place and returns whether the task must be woken. Returns the answer if
+    /// the task is running, if the room does not handle answers in place, or if messages wait in
+    /// `mailbox`, which come first.
+    pub(super) fn answer(
+        &self,
+        mailbox: &mpsc::Sender<Message>,
+        (seat, connection): (Seat, ConnectionId),
+        answer: Answer,
+        arrived: Instant,
+    ) -> Result<bool, Answer> {
+        let Ok(mut resting) = self.0.try_lock() else {
+            return Err(answer);
+        };
+        let is_first = mailbox.capacity() == mailbox.max_capacity();
+        let Some(mut room) = resting.take_if(|room| is_first && room.answers_in_place) else {
+            return Err(answer);
+        };
+        let needs_task = room.answer_in_place(seat, connection, answer, arrived);
+        *resting = Some(room);
+        Ok(needs_task)
+    }
+}
+
+/// Runs a room until it is gone.
+async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiver<Message>) {
+    let id = room.core.header().room_id;
+    room.core.begin_if_all_built_in(room.now);
+    let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
+    let timer = tokio::time::sleep_until(room.clock.instant(room.now));
+    tokio::pin!(timer);
+    while room.commit_and_publish().await {
+        if room.suspended && room.over_since.is_none() {
+            room.end_streams(StreamEnd::ShuttingDown);
+            break;
         }
-        debug!(room = %self.core.header().room_id, "the room is gone");
+        room.set_timer(timer.as_mut());
+        room.answers_in_place = room.core.awaits_participants_only();
+        let armed = room.timer_at.is_some();
+        *resting.lock() = Some(room);
+        let (room_or_none, received) = poll_fn(|context| {
+            // Under the lock, so that no answer in place overtakes a message.
+            let mut resting = resting.lock();
+            let received = inbox.poll_recv_many(context, &mut messages, INPUTS_PER_COMMIT);
+            if let Poll::Ready(count) = received {
+                return Poll::Ready((resting.take(), Some(count)));
+            }
+            let fired = armed && timer.as_mut().poll(context).is_ready();
+            if fired {
+                Poll::Ready((resting.take(), None))
+            } else {
+                Poll::Pending
+            }
+        })
+        .await;
+        // There is no room any more if it panicked while it handled an answer in place.
+        let Some(state) = room_or_none.filter(|_| received != Some(0)) else {
+            break;
+        };
+        room = state;
+        room.now = room.clock.now();
+        for message in messages.drain(..) {
+            room.receive(message);
+        }
+        // A busy mailbox must not delay deadlines.
+        let due = received.is_none() || room.timer_at.is_some_and(|at| at <= room.now);
+        if due && !room.fire() {
+            break;
+        }
+    }
+    debug!(room = %id, "the room is gone");
+}
+
+impl Room {
+    /// Handles an answer while the task waits, and publishes the changes. Returns whether the task
+    /// must run: to commit to a store that takes time, to conclude the game, or to set its timer.
+    fn answer_in_place(
+        &mut self,
+        seat: Seat,
+        connection: ConnectionId,
+        answer: Answer,
+        arrived: Instant,
+    ) -> bool {
+        self.now = self.clock.now();
+        self.receive(Message::Do(
+            seat,
+            connection,
+            SeatAction::Answer(answer),
+            arrived,
+        ));
+        let stored = self.core.pending().is_empty() || self.journal.append_now(self.core.pending());
+        if !stored || self.core.state().is_over() {
+            return true;
+        }
+        self.publish();
+        let deadline = self.core.deadline();
+        deadline.is_some_and(|deadline| self.timer_at.is_none_or(|at| at > deadline))
     }
 
     /// Handles the timer. Returns `false` when the room need not be listed any longer.
-    fn ring(&mut self, armed: &mut bool) -> bool {
-        *armed = false;
+    fn fire(&mut self) -> bool {
+        self.timer_at = None;
         if self.is_expired() {
             return false;
         }
@@ -193,19 +279,19 @@ impl Task {
 
     /// Sets the timer to the next deadline. A timer that fires too early finds nothing to do and is
     /// set again, so that moving a deadline back costs nothing.
-    fn arm(&self, alarm: std::pin::Pin<&mut Sleep>, armed: bool) -> bool {
+    fn set_timer(&mut self, timer: Pin<&mut Sleep>) {
         let deadline = match self.over_since {
             Some(since) => Some(since + self.context.retention),
             None => self.core.deadline(),
         };
-        let Some(deadline) = deadline else {
-            return false;
-        };
-        let deadline = self.clock.instant(deadline);
-        if !armed || alarm.deadline() > deadline {
-            alarm.reset(deadline);
+        let is_early = |at: Duration| deadline.is_none_or(|deadline| at <= deadline);
+        if self.timer_at.is_some_and(is_early) {
+            return;
         }
-        true
+        if let Some(deadline) = deadline {
+            timer.reset(self.clock.instant(deadline));
+        }
+        self.timer_at = deadline;
     }
 
     fn is_expired(&self) -> bool {
@@ -280,7 +366,7 @@ impl Task {
             },
             Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::Suspend => self.suspended = true,
-            Message::Space => {}
+            Message::Wake => {}
         }
     }
 
@@ -414,7 +500,8 @@ impl Task {
     /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
     /// must stop.
     async fn commit_and_publish(&mut self) -> bool {
-        if !self.core.pending().is_empty() {
+        let stored = self.core.pending().is_empty() || self.journal.append_now(self.core.pending());
+        if !stored {
             if let Err(error) = self.journal.append(self.core.pending()).await {
                 self.fail(&error);
                 return false;
@@ -422,11 +509,22 @@ impl Task {
             // The time of the commit does not count as thinking time.
             self.now = self.clock.now();
         }
-        self.core.released(self.now);
         let ends = self.core.state().is_over() && self.over_since.is_none();
         if ends && !self.conclude().await {
             return false;
         }
+        self.publish();
+        if ends {
+            // A shutdown that waits for games to end may close streams at once: everything has been
+            // queued.
+            self.context.watcher.game_over(self.core.header().room_id);
+        }
+        true
+    }
+
+    /// Sends committed changes to subscribers and results to callers.
+    fn publish(&mut self) {
+        self.core.released(self.now);
         self.public.follow(&self.core);
         let mut releases = std::mem::take(&mut self.releases);
         for release in releases.drain(..) {
@@ -434,12 +532,6 @@ impl Task {
         }
         self.releases = releases;
         self.deliver();
-        if ends {
-            // A shutdown that waits for games to end may close streams at once: everything has been
-            // queued.
-            self.context.watcher.game_over(self.core.header().room_id);
-        }
-        true
     }
 
     fn release(&mut self, release: Release) {
@@ -451,11 +543,13 @@ impl Task {
             Release::Result(seat, connection, result) => {
                 if let Some(subscriber) = self.current(seat, connection) {
                     subscriber.send_result(result);
+                    self.always_visit[seat.index()] = true;
                 }
             }
             Release::Refuse(seat, connection, refused) => {
                 if let Some(subscriber) = self.current(seat, connection) {
                     subscriber.refuse(refused);
+                    self.always_visit[seat.index()] = true;
                 }
             }
             Release::Acted(reply, acted) => answer(reply, Some(acted)),
@@ -490,6 +584,7 @@ impl Task {
         if let Some(mut older) = self.connections[seat.index()].replace(subscriber) {
             older.detach(v1::DetachReason::Superseded);
         }
+        self.always_visit[seat.index()] = true;
         answer(reply, Some((seat, connection)));
     }
 
@@ -499,15 +594,29 @@ impl Task {
             .filter(|subscriber| is_connection(subscriber, connection))
     }
 
+    /// Sends updates that are due. Visits only connections for which some may be: with many rooms,
+    /// each visit costs several cache misses.
     fn deliver(&mut self) {
         let news = self.core.log().since(self.delivered);
+        let length = self.core.log().len();
+        let awaited = self.core.awaited().map(|open| open.decision.seat);
+        let all = length >= self.backlog_due_at || self.core.state().is_over();
         for seat in self.core.all_seats() {
-            if let Some(subscriber) = &mut self.connections[seat.index()] {
-                let urgent = news.iter().any(|entry| is_urgent(&entry.event, seat));
+            let urgent = news.clone().any(|entry| is_urgent(&entry.event, seat));
+            let always_visit = &mut self.always_visit[seat.index()];
+            if (all || urgent || *always_visit || awaited == Some(seat))
+                && let Some(subscriber) = &mut self.connections[seat.index()]
+            {
                 subscriber.deliver(&self.core, &self.public, self.now, urgent);
+                *always_visit = subscriber.must_always_be_visited();
             }
         }
-        self.delivered = self.core.log().len();
+        if all {
+            let connected = self.connections.iter().flatten();
+            let due_at = connected.map(Subscriber::backlog_due_at).min();
+            self.backlog_due_at = due_at.unwrap_or(length + MAX_PENDING_EVENTS);
+        }
+        self.delivered = length;
         let (core, public, now) = (&self.core, &self.public, self.now);
         self.spectators
             .retain_mut(|spectator| spectator.deliver(core, public, now, false));
@@ -554,8 +663,8 @@ impl Task {
     }
 }
 
-/// Streams end even if the task panics, so that no client waits for a room that is gone.
-impl Drop for Task {
+/// Streams end even if the room panics, so that no client waits for a room that is gone.
+impl Drop for Room {
     fn drop(&mut self) {
         self.end_streams(StreamEnd::RoomGone);
         self.context.watcher.gone(self.core.header().room_id);

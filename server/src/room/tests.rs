@@ -8,6 +8,7 @@ use std::time::Duration;
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
+use futures::FutureExt as _;
 use futures::StreamExt as _;
 use futures::future::BoxFuture;
 use prost::Message as _;
@@ -304,15 +305,34 @@ async fn a_full_outbox_has_space_for_the_last_update() {
 /// A journal that panics after a number of appends.
 struct PanicsAfter {
     appends: usize,
+    /// Whether it stores at once, so that answers are handled in place.
+    at_once: bool,
     journal: Box<dyn Journal>,
 }
 
+impl PanicsAfter {
+    fn count(&mut self) {
+        self.appends = self
+            .appends
+            .checked_sub(1)
+            .expect("the journal is asked to panic");
+    }
+}
+
 impl Journal for PanicsAfter {
+    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
+        if self.at_once {
+            self.count();
+            self.journal.append_now(entries);
+        }
+        self.at_once
+    }
+
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.appends = self.appends.checked_sub(1).expect("a panic on purpose");
+        self.count();
         self.journal.append(entries)
     }
 
@@ -325,11 +345,18 @@ impl Journal for PanicsAfter {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_panic_of_a_room_ends_its_streams() {
+async fn the_streams_of_a_room_that_panics_end() {
+    for at_once in [false, true] {
+        check_streams_end_after_panic(at_once).await;
+    }
+}
+
+async fn check_streams_end_after_panic(at_once: bool) {
     // Four seats are taken and attached, then the first answer panics.
     let room = room_with(Policy::default(), 1, |journal| {
         Box::new(PanicsAfter {
             appends: 5,
+            at_once,
             journal,
         })
     })
@@ -348,11 +375,20 @@ async fn a_panic_of_a_room_ends_its_streams() {
     .expect("the room exists")
     .expect("spectators are admitted");
     for seat in &seats {
-        let answers = (0..u32::from(u8::MAX)).map(|action| Answer::new(1, action));
-        for answer in answers {
-            let action = SeatAction::Answer(answer);
-            // A room that is gone accepts no messages.
-            let _ = (room.perform(seat.seat, seat.connection, action, Instant::now())).await;
+        for action in 0..u32::from(u8::MAX) {
+            let answer = Answer::new(1, action);
+            if at_once {
+                // In a task that ends with the panic, as readers are.
+                let (room, seat, connection) = (room.clone(), seat.seat, seat.connection);
+                let reader = tokio::spawn(async move {
+                    room.answer_in_place(seat, connection, answer, Instant::now())
+                });
+                let _ = reader.await;
+            } else {
+                let action = SeatAction::Answer(answer);
+                // A room that is gone accepts no messages.
+                let _ = (room.perform(seat.seat, seat.connection, action, Instant::now())).await;
+            }
         }
     }
     for stream in seats
@@ -367,4 +403,60 @@ async fn a_panic_of_a_room_ends_its_streams() {
         assert_eq!(end, Some(StreamEnd::RoomGone));
     }
     assert!(room.describe().await.is_err());
+}
+
+#[tokio::test(start_paused = true)]
+async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_empty() {
+    let room = room(Policy::default(), 1).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let (mut in_place, mut through_mailbox) = (0, 0);
+    loop {
+        // The task of the room runs and then waits.
+        tokio::task::yield_now().await;
+        let mut decisions = Vec::new();
+        let mut is_over = false;
+        for seat in &mut seats {
+            while let Some(Some(updates)) = seat.updates.next().now_or_never() {
+                let written = updates.expect("no error").encode_to_vec();
+                let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
+                for update in response.updates {
+                    match update.update.expect("an update") {
+                        Update::Decision(decision) => {
+                            decisions.push((seat.seat, seat.connection, decision));
+                        }
+                        Update::Detached(_) => is_over = true,
+                        _ => {}
+                    }
+                }
+            }
+        }
+        if is_over {
+            break;
+        }
+        for (seat, connection, decision) in decisions {
+            let answer = Answer::new(decision.decision_id, first_legal(&decision));
+            let again = Answer::new(decision.decision_id, answer.action);
+            // Messages in the mailbox come first.
+            let sent = room.perform(seat, connection, SeatAction::Answer(answer), Instant::now());
+            if decision.decision_id % 2 == 0 {
+                sent.await.expect("the room is there");
+                assert!((room.answer_in_place(seat, connection, again, Instant::now())).is_err());
+                through_mailbox += 1;
+            } else {
+                drop(sent);
+                let taken = room.answer_in_place(seat, connection, again, Instant::now());
+                taken.expect("the task waits");
+                in_place += 1;
+            }
+        }
+    }
+    assert!(
+        in_place > 20 && through_mailbox > 20,
+        "{in_place}, {through_mailbox}"
+    );
+    let record = room.describe().await.expect("the room is shown");
+    assert_eq!(record.state(), v1::RoomState::Finished);
 }

@@ -185,11 +185,16 @@ struct MemoryJournal {
 }
 
 impl Journal for MemoryJournal {
+    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
+        self.entries.append(entries);
+        true
+    }
+
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.entries.append(entries);
+        self.append_now(entries);
         ready(Ok(())).boxed()
     }
 

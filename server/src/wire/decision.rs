@@ -148,15 +148,27 @@ fn put_observation(out: &mut Vec<u8>, observation: &Observation) {
 
 /// Writes a number, omitted when it is zero.
 fn put_number(out: &mut Vec<u8>, field: u32, number: u64) {
-    if number != 0 {
-        encode_key(field, WireType::Varint, out);
-        encode_varint(number, out);
+    match u8::try_from(number) {
+        Ok(0) => {}
+        // The usual case: one byte for the key and one for the number.
+        Ok(small @ 1..0x80) if field < 16 => {
+            let key = u8::try_from(field << 3).expect("below 128");
+            out.extend_from_slice(&[key, small]);
+        }
+        _ => {
+            encode_key(field, WireType::Varint, out);
+            encode_varint(number, out);
+        }
     }
 }
 
 /// Writes the first `length` of some bytes.
 fn put_bytes(out: &mut Vec<u8>, field: u32, length: usize, bytes: impl Iterator<Item = u8>) {
     encode_key(field, WireType::LengthDelimited, out);
-    encode_varint(u64::try_from(length).expect("lengths fit u64"), out);
-    out.extend(bytes.take(length));
+    encode_varint(u64::try_from(length).expect("memory holds it"), out);
+    let start = out.len();
+    out.resize(start + length, 0);
+    for (place, byte) in out[start..].iter_mut().zip(bytes) {
+        *place = byte;
+    }
 }

@@ -7,12 +7,17 @@ mod decision;
 #[cfg(test)]
 mod hidden_tests;
 
+use std::marker::PhantomData;
+
 use chefshat_proto::v1::{self, seat_update::Update};
 use prost::Message;
 use prost::bytes::{Buf, BufMut};
 use prost::encoding::{
     DecodeContext, WireType, encode_key, encode_varint, encoded_len_varint, key_len, skip_field,
 };
+use smallvec::SmallVec;
+use tonic::codec::{BufferSettings, Codec};
+use tonic_prost::{ProstCodec, ProstDecoder, ProstEncoder};
 
 pub use decision::encode_decision;
 
@@ -26,6 +31,12 @@ pub mod service {
 const RESPONSE_UPDATES: u32 = 1;
 /// Typical size of a response: a few events and a decision request, bytes.
 const USUAL_LENGTH: usize = 384;
+/// Initial size of the buffers of a stream, bytes: two usual messages.
+const BUFFER_SIZE: usize = 1_024;
+/// Encoded bytes after which messages are written out before the next one is encoded.
+const YIELD_THRESHOLD: usize = 32 * 1_024;
+/// Usual number of updates sent together: a result, events, a decision request.
+const USUAL_PARTS: usize = 4;
 /// Fields of `SpectatorServiceWatchResponse`; its events have the field number [`BATCH_EVENTS`].
 const SPECTATOR_ROOM: u32 = 2;
 const SPECTATOR_SNAPSHOT: u32 = 3;
@@ -33,15 +44,46 @@ const SPECTATOR_SNAPSHOT: u32 = 3;
 const UPDATE_HANDLE: u32 = 1;
 const UPDATE_EVENTS: u32 = 3;
 const UPDATE_DECISION: u32 = 4;
+const UPDATE_RESULT: u32 = 5;
 /// Field of the events in an `EventBatch`.
 const BATCH_EVENTS: u32 = 1;
+
+/// A codec with small buffers, for streams of small messages. Successive messages fill a buffer from
+/// end to end: with many streams, the default of 8 KiB each does not fit the caches.
+#[derive(Debug)]
+pub struct SmallBuffers<T, U>(PhantomData<(T, U)>);
+
+impl<T, U> Default for SmallBuffers<T, U> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<T, U> Codec for SmallBuffers<T, U>
+where
+    T: Message + Send + 'static,
+    U: Message + Default + Send + 'static,
+{
+    type Encode = T;
+    type Decode = U;
+    type Encoder = ProstEncoder<T>;
+    type Decoder = ProstDecoder<U>;
+
+    fn encoder(&mut self) -> Self::Encoder {
+        ProstCodec::<T, U>::raw_encoder(BufferSettings::new(BUFFER_SIZE, YIELD_THRESHOLD))
+    }
+
+    fn decoder(&mut self) -> Self::Decoder {
+        ProstCodec::<T, U>::raw_decoder(BufferSettings::new(BUFFER_SIZE, YIELD_THRESHOLD))
+    }
+}
 
 /// Encoded updates, in order: the body of a streamed response.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Updates {
     bytes: Vec<u8>,
     /// The end and weight of each update.
-    parts: Vec<Part>,
+    parts: SmallVec<[Part; USUAL_PARTS]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +105,12 @@ impl Updates {
         };
         prost::encoding::message::encode(RESPONSE_UPDATES, &update, &mut self.bytes);
         self.end_part(weight);
+    }
+
+    /// Adds the result of an answer.
+    pub fn add_result(&mut self, handle: u32, result: &v1::AnswerResult) {
+        self.add_encoded(handle, UPDATE_RESULT, &result.encode_to_vec());
+        self.end_part(1);
     }
 
     /// Adds a batch of `count` events, encoded by [`Events`].
@@ -160,16 +208,16 @@ impl Updates {
             .count()
             .max(1)
             .min(self.parts.len());
-        let mut rest = self.parts.split_off(count);
-        let end = self.parts.last().map_or(0, |part| part.end);
-        for part in &mut rest {
+        let taken: SmallVec<[Part; USUAL_PARTS]> = self.parts.drain(..count).collect();
+        let end = taken.last().map_or(0, |part| part.end);
+        for part in &mut self.parts {
             part.end -= end;
         }
-        let rest = Self {
-            bytes: self.bytes.split_off(end),
-            parts: rest,
-        };
-        std::mem::replace(self, rest)
+        let rest = self.bytes.split_off(end);
+        Self {
+            bytes: std::mem::replace(&mut self.bytes, rest),
+            parts: taken,
+        }
     }
 }
 

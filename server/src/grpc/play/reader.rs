@@ -41,6 +41,21 @@ impl BoundSeat {
     pub(super) fn is_detached(&self) -> bool {
         self.detached.load(Ordering::Relaxed)
     }
+
+    /// Passes an answer to the room, `in_place` or through its mailbox. Returns the answer if the room
+    /// cannot accept it now.
+    fn answer_now(&self, answer: Answer, arrived: Instant, in_place: bool) -> Result<(), Answer> {
+        let answer = match in_place {
+            true => {
+                match (self.room).answer_in_place(self.seat, self.connection, answer, arrived) {
+                    Ok(()) => return Ok(()),
+                    Err(answer) => answer,
+                }
+            }
+            false => answer,
+        };
+        (self.room).send_answer(self.seat, self.connection, answer, arrived)
+    }
 }
 
 /// Reads the requests of one stream, and attaches seats that participants of tournaments are called to.
@@ -101,8 +116,11 @@ impl Reader {
                 if outbox.poll_reading_stopped(context) {
                     return Poll::Ready(Next::Message(None));
                 }
-                // The reader has a sender itself, so the channel never closes.
-                if let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context) {
+                // Only participants are called. The reader has a sender itself, so the channel
+                // never closes.
+                if !self.participants.is_empty()
+                    && let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context)
+                {
                     return Poll::Ready(Next::Call(handle, call));
                 }
                 requests.poll_next_unpin(context).map(Next::Message)
@@ -110,7 +128,7 @@ impl Reader {
             let message = match next.await {
                 Next::Message(message) => message.transpose(),
                 Next::Call(handle, call) => {
-                    self.follow_call(handle, call).await;
+                    Box::pin(self.follow_call(handle, call)).await;
                     continue;
                 }
             };
@@ -125,15 +143,27 @@ impl Reader {
                     ));
                 }
                 Ok(Some(request)) => {
-                    for command in request.commands {
-                        self.execute(command, arrived).await;
+                    // The rooms of a message for several seats work in parallel instead.
+                    let in_place = request.commands.len() == 1;
+                    for v1::SeatCommand { handle, command } in request.commands {
+                        match (command, self.seats.get(&handle)) {
+                            (Some(Command::Answer(answer)), Some(bound)) => {
+                                let answer = convert::answer_from_proto(answer);
+                                if let Err(answer) = bound.answer_now(answer, arrived, in_place) {
+                                    let action = SeatAction::Answer(answer);
+                                    Box::pin(self.perform(handle, action, arrived)).await;
+                                }
+                            }
+                            // Boxed because it is rare: the future of a stream stays small.
+                            (command, _) => Box::pin(self.obey(handle, command, arrived)).await,
+                        }
                     }
                 }
                 Ok(None) => break Ok(()),
                 Err(status) => break Err(status),
             }
         };
-        self.leave_all().await;
+        Box::pin(self.leave_all()).await;
         self.outbox.end(match end {
             Ok(()) => StreamEnd::Complete,
             Err(status) => {
@@ -143,12 +173,11 @@ impl Reader {
         });
     }
 
-    async fn execute(&mut self, command: v1::SeatCommand, arrived: Instant) {
-        let handle = command.handle;
-        let action = match command.command {
+    async fn obey(&mut self, handle: u32, command: Option<Command>, arrived: Instant) {
+        let action = match command {
             Some(Command::Attach(attach)) => return self.attach(attach).await,
             Some(Command::Detach(_)) => return self.detach(handle).await,
-            Some(Command::Answer(answer)) => answer_action(answer),
+            Some(Command::Answer(answer)) => SeatAction::Answer(convert::answer_from_proto(answer)),
             Some(Command::Express(expression)) => match express_action(&expression) {
                 Ok(action) => action,
                 Err(problem) => {
@@ -161,6 +190,11 @@ impl Reader {
                 return self.refuse_field(handle, 0, "COMMAND_MISSING", &problem);
             }
         };
+        self.perform(handle, action, arrived).await;
+    }
+
+    /// Sends an action to the room of a seat and waits for space in its mailbox.
+    async fn perform(&mut self, handle: u32, action: SeatAction, arrived: Instant) {
         let Some(bound) = self.seats.get(&handle) else {
             let problem = FieldProblem::new(
                 "handle",
@@ -431,17 +465,6 @@ impl Reader {
             self.outbox.push_last(&mut last);
         }
     }
-}
-
-/// The action for an answer.
-pub(super) fn answer_action(answer: v1::Answer) -> SeatAction {
-    let annotations = convert::annotations_from_proto(answer.annotations);
-    SeatAction::Answer(Answer {
-        decision_id: answer.decision_id,
-        action: answer.action,
-        annotations_refused: annotations.is_err(),
-        annotations: annotations.unwrap_or_default(),
-    })
 }
 
 /// The action for an expression.

@@ -123,11 +123,16 @@ pub(super) struct EphemeralJournal {
 }
 
 impl Journal for EphemeralJournal {
+    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
+        self.entries.append(entries);
+        true
+    }
+
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.entries.append(entries);
+        self.append_now(entries);
         ready(Ok(())).boxed()
     }
 
