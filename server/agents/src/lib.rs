@@ -4,6 +4,7 @@
 mod built_in;
 mod greedy;
 mod network;
+mod participant;
 mod play;
 mod recorded;
 mod seeds;
@@ -12,6 +13,7 @@ pub use built_in::{AgentKind, BuiltInAgent};
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
 };
+pub use participant::ParticipantKind;
 pub use play::{Answer, Listener, ask, is_wrong_action, play};
 pub use recorded::{MAX_MODELS, RecordedPlayer};
 pub use seeds::{agent_seed, game_seed, seating_agent_seed};

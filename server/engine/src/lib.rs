@@ -54,7 +54,7 @@ pub use game::{
 };
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
-pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
+pub use metrics::{MetricsRecorder, SeatMetrics, SeatStatistics, ShiftMetrics};
 pub use observation::Observation;
 pub use order::{SeatOrder, Standings};
 pub use played::{PlayedDecision, RecordedDecision, TakenOver};

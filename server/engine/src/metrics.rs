@@ -35,6 +35,30 @@ impl SeatMetrics {
     }
 }
 
+/// The result of one seat in a game, and statistics of how it played.
+#[derive(Copy, Clone, PartialEq, Debug, Default)]
+pub struct SeatStatistics {
+    /// Place in the game, from 1.
+    pub place: usize,
+    /// Points in the game.
+    pub points: u64,
+    /// Whether a substitute ever played for the seat.
+    pub substituted: bool,
+    /// Decisions of the participant, including timeouts and invalid attempts; excludes those of a
+    /// substitute or taken over from another record.
+    pub decisions: u64,
+    /// Invalid attempts at those decisions.
+    pub wrong_actions: u64,
+    /// Those decisions that timed out, connected or not.
+    pub timeouts: u64,
+    /// Total measured time of the participant's own decisions, microseconds.
+    pub decision_time_us: u64,
+    /// Number of measured decisions; those of built-in agents are not measured.
+    pub timed_decisions: u64,
+    /// Performance score: the mean over the game's Shifts of 10 * points / pizzas.
+    pub performance_score: f64,
+}
+
 /// Metrics of one Shift.
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct ShiftMetrics {

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use chefshat_engine::SeatStatistics;
 use chefshat_proto::v1::{
     self, DecisionSource, GameOrigin, ParticipantKind, RoomState, game_event::Kind,
     record_line::Line,
@@ -38,7 +39,8 @@ impl Outcome {
     /// The players with their places, for a rating.
     pub fn places(&self) -> Vec<(Identity, u32)> {
         let seats = self.seats.iter();
-        seats.map(|seat| (seat.identity(), seat.place)).collect()
+        let place = |seat: &SeatOutcome| u32::try_from(seat.statistics.place).unwrap_or(u32::MAX);
+        seats.map(|seat| (seat.identity(), place(seat))).collect()
     }
 }
 
@@ -51,25 +53,8 @@ pub struct SeatOutcome {
     pub kind: ParticipantKind,
     /// Name of the built-in agent; `None` for other participants.
     pub built_in: Option<String>,
-    /// Place in the game, from 1.
-    pub place: u32,
-    /// Points in the game.
-    pub points: u64,
-    /// Whether a substitute ever played for the seat.
-    pub substituted: bool,
-    /// Decisions of the participant, including timeouts and invalid attempts; excludes those of a
-    /// substitute or taken over from another record.
-    pub decisions: u64,
-    /// Invalid attempts at those decisions.
-    pub wrong_actions: u64,
-    /// Those decisions that timed out, connected or not.
-    pub timeouts: u64,
-    /// Total measured time of the participant's own decisions, microseconds.
-    pub decision_time_us: u64,
-    /// The number of decisions measured; those of built-in agents are not.
-    pub timed_decisions: u64,
-    /// Performance score: the mean over Shifts of 10 × points / pizzas.
-    pub performance_score: f64,
+    /// Result and statistics.
+    pub statistics: SeatStatistics,
 }
 
 /// The identity a rating belongs to. Built-in agents are identified by the agent's name, not the
@@ -190,7 +175,7 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     place(&mut seats, standings).ok_or(OutcomeError::Standings)?;
     for seat in &mut seats {
         // The sum until now.
-        seat.performance_score /= f64::from(gathered.shifts.max(1));
+        seat.statistics.performance_score /= f64::from(gathered.shifts.max(1));
     }
     Ok(Outcome {
         game_id: header.game_id.clone(),
@@ -210,15 +195,10 @@ impl SeatOutcome {
             name: participant.name.clone(),
             kind: participant.kind(),
             built_in: (!built_in.is_empty()).then(|| built_in.clone()),
-            place: 0,
-            points: 0,
-            substituted: participant.substituted,
-            decisions: 0,
-            wrong_actions: 0,
-            timeouts: 0,
-            decision_time_us: 0,
-            timed_decisions: 0,
-            performance_score: 0.0,
+            statistics: SeatStatistics {
+                substituted: participant.substituted,
+                ..SeatStatistics::default()
+            },
         }
     }
 }
@@ -240,7 +220,7 @@ impl<'a> Gathered<'a> {
                 self.elapsed_ms = event.elapsed_ms;
                 match &event.kind {
                     Some(Kind::Substituted(substituted)) => {
-                        self.seat(substituted.seat)?.substituted = true;
+                        self.seat(substituted.seat)?.statistics.substituted = true;
                     }
                     Some(Kind::ShiftEnded(shift)) => self.shift(shift)?,
                     Some(Kind::GameEnded(ended)) => self.standings = Some(&ended.standings),
@@ -253,7 +233,7 @@ impl<'a> Gathered<'a> {
     }
 
     fn decision(&mut self, decision: &v1::DecisionRecord) -> Option<()> {
-        let seat = self.seat(decision.seat)?;
+        let seat = &mut self.seat(decision.seat)?.statistics;
         let source = decision.source();
         match source {
             DecisionSource::Substitute => seat.substituted = true,
@@ -283,7 +263,7 @@ impl<'a> Gathered<'a> {
         }
         let pizzas = f64::from(shift.pizzas.max(1));
         for (seat, points) in self.seats.iter_mut().zip(&shift.shift_points) {
-            seat.performance_score += 10.0 * f64::from(*points) / pizzas;
+            seat.statistics.performance_score += 10.0 * f64::from(*points) / pizzas;
         }
         Some(())
     }
@@ -297,13 +277,13 @@ impl<'a> Gathered<'a> {
 fn place(seats: &mut [SeatOutcome], standings: &[v1::Standing]) -> Option<()> {
     let mut places = BTreeSet::new();
     for line in standings {
-        let seat = seats.get_mut(usize::try_from(line.seat).ok()?)?;
+        let seat = &mut seats.get_mut(usize::try_from(line.seat).ok()?)?.statistics;
         let place = usize::try_from(line.place).ok()?;
         let fits = seat.place == 0 && place >= 1 && places.insert(place);
         if !fits {
             return None;
         }
-        (seat.place, seat.points) = (line.place, line.points);
+        (seat.place, seat.points) = (place, line.points);
     }
     let complete = places.len() == seats.len() && places.last() == Some(&seats.len());
     complete.then_some(())
@@ -313,7 +293,7 @@ fn unrated(origin: GameOrigin, seats: &[SeatOutcome]) -> Option<Unrated> {
     let known: BTreeSet<Identity> = seats.iter().map(SeatOutcome::identity).collect();
     if origin != GameOrigin::Dealt {
         Some(Unrated::NotDealt)
-    } else if seats.iter().any(|seat| seat.substituted) {
+    } else if seats.iter().any(|seat| seat.statistics.substituted) {
         Some(Unrated::Substituted)
     } else if seats
         .iter()

@@ -11,8 +11,8 @@ pub use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, RuleSet, Script, Seat};
 
 use crate::ids::{Id, SecretHash};
-pub use crate::participant::ParticipantKind;
 use crate::policy::Policy;
+pub use chefshat_agents::ParticipantKind;
 
 /// What fills a seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,7 +14,6 @@ mod inputs;
 pub mod journal;
 mod limits;
 pub mod log;
-mod participant;
 pub mod policy;
 mod revive;
 #[cfg(any(test, feature = "testing"))]

@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, ParticipantKind};
 use chefshat_engine::RewardScheme;
-
-use crate::participant::ParticipantKind;
 
 /// When a game is aborted because participants are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

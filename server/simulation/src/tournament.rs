@@ -10,7 +10,7 @@ use thiserror::Error;
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, game_seed, play};
-use chefshat_tournament::{Change, Ended, Game, SeatPlayed};
+use chefshat_tournament::{Change, Ended, Game, SeatStatistics};
 use chefshat_tournament::{State, Tournament};
 
 /// Why a tournament cannot be played offline.
@@ -97,7 +97,7 @@ fn play_game(game: &Game, index: usize, kinds: &[AgentKind], rules: RuleSet, see
     });
     let mut listener = Witness {
         recorder: MetricsRecorder::new(rules, None),
-        seats: vec![SeatPlayed::default(); game.seats.len()],
+        seats: vec![SeatStatistics::default(); game.seats.len()],
         last_shift: None,
     };
     let standings = play(
@@ -129,7 +129,7 @@ fn agent_seed(dealt_by: Seed, index: usize, seat: usize) -> [u8; 32] {
 /// Counts what happens on the seats of a game.
 struct Witness {
     recorder: MetricsRecorder,
-    seats: Vec<SeatPlayed>,
+    seats: Vec<SeatStatistics>,
     last_shift: Option<ShiftMetrics>,
 }
 

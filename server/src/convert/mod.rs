@@ -30,8 +30,8 @@ pub use room::{
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use tournament::{
-    TournamentPlan, entrant_kind, is_rated, participant_kind, settings_to_proto, tournament_game,
-    tournament_participants, tournament_plan, tournament_state, tournament_state_from_proto,
+    TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,
+    tournament_plan, tournament_state, tournament_state_from_proto,
 };
 pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,

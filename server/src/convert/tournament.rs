@@ -5,14 +5,13 @@ use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
 use chefshat_tournament::{
-    Deals, EntrantKind, Format, Game, GameState, MAX_PARTICIPANTS, Settings, State, Tournament,
+    Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
 };
 
 use super::kind::{kind_from_proto, kind_to_proto, unknown};
 use super::number;
 use super::policy::{agent, policy_from_proto, policy_to_proto};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Policy};
 
 /// Defaults of fields that a request leaves unset.
@@ -207,24 +206,6 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
     }
 }
 
-/// Converts a kind of participant to that of the tournament's core.
-pub fn entrant_kind(kind: ParticipantKind) -> EntrantKind {
-    match kind {
-        ParticipantKind::Agent => EntrantKind::Agent,
-        ParticipantKind::Human => EntrantKind::Human,
-        ParticipantKind::Robot => EntrantKind::Robot,
-    }
-}
-
-/// Converts a kind of participant from that of the tournament's core.
-pub fn participant_kind(kind: EntrantKind) -> ParticipantKind {
-    match kind {
-        EntrantKind::Agent => ParticipantKind::Agent,
-        EntrantKind::Human => ParticipantKind::Human,
-        EntrantKind::Robot => ParticipantKind::Robot,
-    }
-}
-
 /// The state of a tournament as a message.
 pub fn tournament_state(state: State) -> v1::TournamentState {
     match state {
@@ -260,7 +241,7 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
         .map(|(index, entrant)| v1::TournamentParticipant {
             participant: number(index),
             name: entrant.name.clone(),
-            kind: kind_to_proto(Some(participant_kind(entrant.kind))),
+            kind: kind_to_proto(Some(entrant.kind)),
             built_in_agent: (entrant.built_in)
                 .map_or_else(String::new, |kind| kind.name().to_owned()),
             filler: entrant.filler,
@@ -284,16 +265,16 @@ pub fn tournament_game(
             .map(|seat| v1::TournamentGameSeat {
                 participant: number(seat.participant),
                 forfeited: seat.forfeited,
-                substituted: seat.did.substituted,
-                place: number(seat.did.place),
+                substituted: seat.statistics.substituted,
+                place: number(seat.statistics.place),
                 score: seat.score,
-                points: seat.did.points,
-                decisions: seat.did.decisions,
-                wrong_actions: seat.did.wrong_actions,
-                timeouts: seat.did.timeouts,
-                decision_time_us: seat.did.decision_time_us,
-                timed_decisions: seat.did.timed_decisions,
-                performance_score: seat.did.performance_score,
+                points: seat.statistics.points,
+                decisions: seat.statistics.decisions,
+                wrong_actions: seat.statistics.wrong_actions,
+                timeouts: seat.statistics.timeouts,
+                decision_time_us: seat.statistics.decision_time_us,
+                timed_decisions: seat.statistics.timed_decisions,
+                performance_score: seat.statistics.performance_score,
             })
             .collect(),
         _ => (game.seats.iter())

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use chefshat_proto::v1;
 use chefshat_record::outcome;
-use chefshat_tournament::{Ended, SeatPlayed};
+use chefshat_tournament::Ended;
 use futures::future::join_all;
 use tokio::time::Instant;
 use tracing::warn;
@@ -85,7 +85,7 @@ impl Task {
             return Ok(match (outcome, reason) {
                 (Ok(outcome), _) => Some(Ended::Played {
                     shifts: outcome.shifts,
-                    seats: outcome.seats.iter().map(seat_played).collect(),
+                    seats: outcome.seats.iter().map(|seat| seat.statistics).collect(),
                 }),
                 (Err(_), Some(v1::AbortReason::Shutdown)) => None,
                 (Err(problem), _) => {
@@ -189,7 +189,7 @@ impl Task {
                     called.insert(seat, entrant.name.clone());
                     return Fill::BuiltIn(kind);
                 }
-                let kind = convert::participant_kind(entrant.kind);
+                let kind = entrant.kind;
                 if let Some(ticket) = state.tickets.get(participant) {
                     let (name, ticket) = (entrant.name.clone(), *ticket);
                     participants.insert(seat, SeatedParticipant { name, kind, ticket });
@@ -239,20 +239,6 @@ impl Task {
 
 fn retry() -> Instant {
     Instant::now() + TOURNAMENT_RETRY
-}
-
-fn seat_played(seat: &outcome::SeatOutcome) -> SeatPlayed {
-    SeatPlayed {
-        place: usize::try_from(seat.place).unwrap_or(usize::MAX),
-        points: seat.points,
-        substituted: seat.substituted,
-        decisions: seat.decisions,
-        wrong_actions: seat.wrong_actions,
-        timeouts: seat.timeouts,
-        decision_time_us: seat.decision_time_us,
-        timed_decisions: seat.timed_decisions,
-        performance_score: seat.performance_score,
-    }
 }
 
 /// Why the game of a record was aborted, if it was.

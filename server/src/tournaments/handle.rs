@@ -69,7 +69,7 @@ impl Entry {
     pub(super) fn entrant(&self) -> Entrant {
         Entrant {
             name: self.name.clone(),
-            kind: convert::entrant_kind(self.kind),
+            kind: self.kind,
             built_in: None,
             filler: false,
             stateless: self.stateless,

@@ -14,7 +14,7 @@ mod views;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_record::convert::FieldProblem;
-use chefshat_tournament::{Change, Entrant, EntrantKind, SettingsProblem, State, Tournament};
+use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
 use tokio::sync::{Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
@@ -306,7 +306,7 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
                 true => format!("{} {}", kind.name(), before + 1),
                 false => kind.name().to_owned(),
             },
-            kind: EntrantKind::Agent,
+            kind: ParticipantKind::Agent,
             built_in: Some(*kind),
             filler: false,
             stateless: true,

@@ -13,9 +13,10 @@
 mod tests;
 
 use super::Tournament;
-use super::change::{Change, Ended, Game, GameResult, GameState, SeatPlayed, SeatResult};
+use super::change::{Change, Ended, Game, GameResult, GameState, SeatResult};
 use super::scheduler::Scheduler;
 use super::state::{State, TournamentState};
+use chefshat_engine::SeatStatistics;
 
 /// Whether a due game can be called.
 enum Readiness {
@@ -171,7 +172,12 @@ fn called(index: usize, game: &Game, forfeited: Vec<usize>) -> Change {
 }
 
 /// Places participants who forfeited behind the others, by seat, and scores each place.
-fn result(state: &TournamentState, game: &Game, shifts: u32, played: &[SeatPlayed]) -> GameResult {
+fn result(
+    state: &TournamentState,
+    game: &Game,
+    shifts: u32,
+    played: &[SeatStatistics],
+) -> GameResult {
     let has_forfeited = |seat: usize| game.forfeited.contains(&game.seats[seat]);
     let mut order: Vec<usize> = (0..played.len()).collect();
     order.sort_by_key(|&seat| match has_forfeited(seat) {
@@ -191,11 +197,11 @@ fn result(state: &TournamentState, game: &Game, shifts: u32, played: &[SeatPlaye
                 let points = state.settings.points.get(behind);
                 points.copied().unwrap_or_default()
             },
-            did: SeatPlayed {
+            statistics: SeatStatistics {
                 place: behind + 1,
                 // What the filler did on this seat is not attributed to the participant.
                 ..if forfeited {
-                    SeatPlayed::default()
+                    SeatStatistics::default()
                 } else {
                     played[seat]
                 }

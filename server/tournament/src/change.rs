@@ -1,18 +1,8 @@
 //! The changes of a tournament and the values in them. `state` applies them; `calls` decides when
 //! they follow.
 
-use chefshat_agents::AgentKind;
-
-/// The kind of a participant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum EntrantKind {
-    /// A program.
-    Agent,
-    /// A person.
-    Human,
-    /// A robot.
-    Robot,
-}
+use chefshat_agents::{AgentKind, ParticipantKind};
+use chefshat_engine::SeatStatistics;
 
 /// A participant, or a candidate for joining.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,7 +10,7 @@ pub struct Entrant {
     /// Display name, unique in the tournament.
     pub name: String,
     /// The kind.
-    pub kind: EntrantKind,
+    pub kind: ParticipantKind,
     /// The built-in agent that plays. It is always present and plays any number of games at a time.
     pub built_in: Option<AgentKind>,
     /// Whether it only fills tables up.
@@ -100,31 +90,8 @@ pub struct SeatResult {
     pub forfeited: bool,
     /// Tournament score of the game; 0 if it forfeited.
     pub score: u32,
-    /// What it did. After a forfeit all zero, with a place behind those who played.
-    pub did: SeatPlayed,
-}
-
-/// What happened on one seat of a game.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SeatPlayed {
-    /// Place in the game, from 1.
-    pub place: usize,
-    /// Points in the game.
-    pub points: u64,
-    /// Whether a substitute took decisions.
-    pub substituted: bool,
-    /// Decisions taken by the participant itself or lost to the clock.
-    pub decisions: u64,
-    /// Invalid actions.
-    pub wrong_actions: u64,
-    /// Decisions lost to the clock.
-    pub timeouts: u64,
-    /// Total measured decision time, in microseconds.
-    pub decision_time_us: u64,
-    /// Number of measured decisions.
-    pub timed_decisions: u64,
-    /// Mean over the game's Shifts of 10 * points / pizzas.
-    pub performance_score: f64,
+    /// Its statistics. After a forfeit all zero, with a place behind those who played.
+    pub statistics: SeatStatistics,
 }
 
 /// How a called game ended.
@@ -134,8 +101,8 @@ pub enum Ended {
     Played {
         /// Shifts played.
         shifts: u32,
-        /// What happened, by seat.
-        seats: Vec<SeatPlayed>,
+        /// Statistics by seat.
+        seats: Vec<SeatStatistics>,
     },
     /// The game never started.
     NeverStarted {
@@ -210,7 +177,7 @@ impl Game {
     pub fn is_rated(&self) -> bool {
         self.result().is_some_and(|result| {
             let mut seats = result.seats.iter();
-            seats.all(|seat| !seat.forfeited && !seat.did.substituted)
+            seats.all(|seat| !seat.forfeited && !seat.statistics.substituted)
         })
     }
 }

@@ -3,7 +3,9 @@
 use thiserror::Error;
 
 use super::Tournament;
-use super::change::{Change, Entrant, EntrantKind};
+use chefshat_agents::ParticipantKind;
+
+use super::change::{Change, Entrant};
 use super::settings::{Deals, MAX_GAMES_AT_A_TIME, MIN_PARTICIPANTS};
 use super::state::State;
 
@@ -123,7 +125,7 @@ impl Tournament {
             .expect("there are more numbers than participants");
         Entrant {
             name,
-            kind: EntrantKind::Agent,
+            kind: ParticipantKind::Agent,
             built_in: Some(self.state.settings.filler),
             filler: true,
             stateless: true,

@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use chefshat_agents::AgentKind;
-//! use chefshat_tournament::{Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament};
+//! use chefshat_tournament::{Change, Deals, Ended, Entrant, ParticipantKind, Format, SeatStatistics, Settings, State, Tournament};
 //!
 //! let mut tournament = Tournament::new(Settings {
 //!     format: Format::Swiss,
@@ -24,7 +24,7 @@
 //! })?;
 //! for name in ["Ada", "Bo", "Cem", "Dia", "Eve"] {
 //!     let kind = Some(AgentKind::Greedy);
-//!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: EntrantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1 })?;
+//!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1 })?;
 //!     tournament.fold(&joined);
 //! }
 //! for change in tournament.begin()? {
@@ -35,7 +35,7 @@
 //!     tournament.fold(&change);
 //!     if let Change::Called { game, .. } = change {
 //!         // Here a game would be played.
-//!         let seats = (1..=4).map(|place| SeatPlayed { place, ..SeatPlayed::default() }).collect();
+//!         let seats = (1..=4).map(|place| SeatStatistics { place, ..SeatStatistics::default() }).collect();
 //!         let counted = tournament.ended(game, Ended::Played { shifts: 3, seats }).expect("it is being played");
 //!         tournament.fold(&counted);
 //!     }
@@ -65,9 +65,9 @@ mod swiss;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use change::{
-    Change, Ended, Entrant, EntrantKind, Game, GameResult, GameState, SeatPlayed, SeatResult,
-};
+pub use change::{Change, Ended, Entrant, Game, GameResult, GameState, SeatResult};
+pub use chefshat_agents::ParticipantKind;
+pub use chefshat_engine::SeatStatistics;
 pub use confidence::{Neighbours, OrderConfidence, SURE, Scored, order_confidence};
 pub use entry::{BeginProblem, JoinProblem};
 pub use settings::{

@@ -101,7 +101,7 @@ impl Tournament {
                 .map(|seat| {
                     (
                         seat.participant,
-                        u32::try_from(seat.did.place).unwrap_or(u32::MAX),
+                        u32::try_from(seat.statistics.place).unwrap_or(u32::MAX),
                     )
                 })
                 .collect();
@@ -165,8 +165,8 @@ pub(super) fn order_of_pairing(state: &TournamentState, pairing: &Pairing) -> Ve
         for seat in results.flat_map(|result| &result.seats) {
             if seat.participant == *who {
                 score += u64::from(seat.score);
-                points += seat.did.points;
-                places += seat.did.place;
+                points += seat.statistics.points;
+                places += seat.statistics.place;
             }
         }
         let tie_break = Chance::tie_break(state.settings.draw_seed, *who);
@@ -209,11 +209,12 @@ fn balances(state: &TournamentState, group: &[usize]) -> Vec<i64> {
         for one in &result.seats {
             for other in &result.seats {
                 if group[one.participant] == group[other.participant] {
-                    balance[one.participant] += match one.did.place.cmp(&other.did.place) {
-                        Ordering::Less => 1,
-                        Ordering::Equal => 0,
-                        Ordering::Greater => -1,
-                    };
+                    balance[one.participant] +=
+                        match one.statistics.place.cmp(&other.statistics.place) {
+                            Ordering::Less => 1,
+                            Ordering::Equal => 0,
+                            Ordering::Greater => -1,
+                        };
                 }
             }
         }

@@ -285,7 +285,7 @@ impl TournamentState {
             let sums = &mut self.sums[seat.participant];
             sums.games += 1;
             sums.score += u64::from(seat.score);
-            let did = &seat.did;
+            let did = &seat.statistics;
             sums.points += did.points;
             if let Some(times) = sums.places.get_mut(did.place.wrapping_sub(1)) {
                 *times += 1;

@@ -7,7 +7,7 @@
 
 use chefshat_agents::AgentKind;
 
-use crate::{Deals, Entrant, EntrantKind, Format, Settings, Tournament};
+use crate::{Deals, Entrant, Format, ParticipantKind, Settings, Tournament};
 
 /// Settings of a tournament of up to 64 participants in games of four.
 pub fn settings(format: Format) -> Settings {
@@ -32,7 +32,7 @@ pub fn settings(format: Format) -> Settings {
 pub fn entrant(name: &str) -> Entrant {
     Entrant {
         name: name.to_owned(),
-        kind: EntrantKind::Agent,
+        kind: ParticipantKind::Agent,
         built_in: None,
         filler: false,
         stateless: true,

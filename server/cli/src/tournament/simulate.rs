@@ -11,7 +11,7 @@ use chefshat_proto::v1;
 use chefshat_simulation::RulesForm;
 use chefshat_simulation::tournament::play_offline;
 use chefshat_tournament::{
-    Deals, Entrant, EntrantKind, Format, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, Settings,
+    Deals, Entrant, Format, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, ParticipantKind, Settings,
     SettingsProblem, Tournament,
 };
 use clap::Args;
@@ -158,7 +158,7 @@ impl Simulate {
                 1 => kind.name().to_owned(),
                 _ => format!("{} {}", kind.name(), of_kind(&kinds[..=index], kind)),
             },
-            kind: EntrantKind::Agent,
+            kind: ParticipantKind::Agent,
             built_in: Some(kind),
             filler: false,
             stateless: true,

@@ -49,11 +49,11 @@ fn standings(lines: &mut [v1::RecordLine]) -> &mut Vec<v1::Standing> {
 /// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, their time, performance
 /// score in hundredths.
 fn figures(outcome: &Outcome) -> Vec<[u64; 8]> {
-    let seats = outcome.seats.iter();
+    let seats = outcome.seats.iter().map(|seat| seat.statistics);
     seats
         .map(|seat| {
             [
-                u64::from(seat.place),
+                seat.place as u64,
                 seat.points,
                 seat.decisions,
                 seat.wrong_actions,
@@ -82,7 +82,11 @@ fn outcomes_agree_with_a_count_of_the_file() {
     assert_eq!(played.shifts, 3);
     assert_eq!(played.game_id, "22b73f3bba773c1120e1858de68cd801");
     assert_eq!(played.ended_at_ms, 1_795_160_537_402 + 207);
-    let substituted: Vec<bool> = played.seats.iter().map(|seat| seat.substituted).collect();
+    let substituted: Vec<bool> = played
+        .seats
+        .iter()
+        .map(|seat| seat.statistics.substituted)
+        .collect();
     assert_eq!(substituted, [false, false, true, false]);
     assert_eq!(played.unrated, Some(Unrated::Substituted));
     let identities = played.places();
@@ -136,7 +140,10 @@ fn the_performance_score_equals_the_engines() {
     let outcome = outcome(&lines).unwrap();
     assert_eq!(scores.len(), 4);
     for (seat, score) in outcome.seats.iter().zip(&scores) {
-        assert!((seat.performance_score - score).abs() < 1e-12, "{scores:?}");
+        assert!(
+            (seat.statistics.performance_score - score).abs() < 1e-12,
+            "{scores:?}"
+        );
     }
 }
 
@@ -144,7 +151,11 @@ fn the_performance_score_equals_the_engines() {
 fn a_game_in_which_all_decided_themselves_is_rated() {
     let played = outcome(&dealt()).unwrap();
     assert!(played.is_rated());
-    let decisions: u64 = played.seats.iter().map(|seat| seat.decisions).sum();
+    let decisions: u64 = played
+        .seats
+        .iter()
+        .map(|seat| seat.statistics.decisions)
+        .sum();
     let lines = dealt();
     let stated = lines
         .iter()

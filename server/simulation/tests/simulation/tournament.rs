@@ -85,7 +85,7 @@ fn duplicate_deals_are_the_same_cards() {
         let result = tournament.games()[game].result().unwrap();
         let seats = result.seats.iter();
         seats
-            .map(|seat| (seat.did.place, seat.did.points))
+            .map(|seat| (seat.statistics.place, seat.statistics.points))
             .collect::<Vec<_>>()
     };
     for game in 1..4 {

@@ -6,8 +6,8 @@ use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_simulation::tournament::play_offline;
 use chefshat_tournament::testing::{begun, settings};
 use chefshat_tournament::{
-    Change, Deals, Format, GameResult, SURE, Scored, SeatPlayed, SeatResult, Settings, Tournament,
-    order_confidence,
+    Change, Deals, Format, GameResult, SURE, Scored, SeatResult, SeatStatistics, Settings,
+    Tournament, order_confidence,
 };
 
 const POINTS: [f64; 4] = [5.0, 3.0, 1.0, 0.0];
@@ -189,10 +189,10 @@ fn games_with_forfeits_or_substitutes_are_not_rated() {
             participant,
             forfeited: forfeited && participant == 3,
             score: [5, 3, 1, 0][participant],
-            did: SeatPlayed {
+            statistics: SeatStatistics {
                 place: participant + 1,
                 substituted: substituted && participant == 2,
-                ..SeatPlayed::default()
+                ..SeatStatistics::default()
             },
         };
         (0..4).map(seat).collect()

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use chefshat_agents::AgentKind;
 use chefshat_engine::MAX_SEATS;
 use chefshat_tournament::{
-    Change, Ended, Entrant, EntrantKind, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, SeatPlayed,
+    Change, Ended, Entrant, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, ParticipantKind, SeatStatistics,
 };
 use prost::Message as _;
 use tokio::sync::{mpsc, watch};
@@ -45,7 +45,7 @@ impl TournamentHandle {
             let long = "🍕".repeat(MAX_NAME_CHARS - digits.len());
             core.fold(&Change::Joined(Entrant {
                 name: digits + &long,
-                kind: EntrantKind::Agent,
+                kind: ParticipantKind::Agent,
                 built_in: Some(AgentKind::Random),
                 filler: false,
                 stateless: true,
@@ -101,10 +101,10 @@ impl TournamentHandle {
         let playing: Vec<usize> = state.core.playing().collect();
         for game in playing {
             let seats = state.core.games()[game].seats.len();
-            let seats = (1..=seats).map(|place| SeatPlayed {
+            let seats = (1..=seats).map(|place| SeatStatistics {
                 place,
                 points: 3,
-                ..SeatPlayed::default()
+                ..SeatStatistics::default()
             });
             let ended = Ended::Played {
                 shifts: 1,

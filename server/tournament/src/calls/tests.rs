@@ -32,9 +32,9 @@ fn end_one(tournament: &mut Tournament, game: usize, ended: Ended) {
 }
 
 fn played() -> Ended {
-    let seats = (1..=4).map(|place| SeatPlayed {
+    let seats = (1..=4).map(|place| SeatStatistics {
         place,
-        ..SeatPlayed::default()
+        ..SeatStatistics::default()
     });
     Ended::Played {
         shifts: 3,

@@ -96,13 +96,17 @@ fn absent_participants_are_waited_for_then_called_again_then_forfeit() {
     // The filler in the forfeited seat wins; the others move up.
     end(&mut tournament, 0, played(&[2, 3, 1, 4]));
     let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result.seats.iter().map(|seat| seat.did.place).collect();
+    let places: Vec<usize> = result
+        .seats
+        .iter()
+        .map(|seat| seat.statistics.place)
+        .collect();
     let scores: Vec<u32> = result.seats.iter().map(|seat| seat.score).collect();
     assert_eq!((places, scores), (vec![1, 2, 4, 3], vec![5, 3, 0, 1]));
     let forfeit = result.seats[2];
     assert!(forfeit.forfeited);
     assert_eq!(
-        (forfeit.did.points, forfeit.did.decisions),
+        (forfeit.statistics.points, forfeit.statistics.decisions),
         (0, 0),
         "the filler's play is not the participant's"
     );
@@ -192,7 +196,11 @@ fn missing_the_last_call_forfeits_even_when_connected() {
     assert_eq!(follow(&mut tournament, 0), [forfeited(0, &both)]);
     end(&mut tournament, 0, played(&[4, 1, 2, 3]));
     let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result.seats.iter().map(|seat| seat.did.place).collect();
+    let places: Vec<usize> = result
+        .seats
+        .iter()
+        .map(|seat| seat.statistics.place)
+        .collect();
     assert_eq!(
         places,
         [2, 3, 1, 4],

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use chefshat_agents::AgentKind;
 use chefshat_tournament::{
-    Change, Deals, Ended, Entrant, EntrantKind, Format, GameState, Settings, State, Tournament,
+    Change, Deals, Ended, Entrant, Format, GameState, ParticipantKind, Settings, State, Tournament,
 };
 use proptest::prelude::*;
 
@@ -30,7 +30,7 @@ fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
             let numbered = kinds.into_iter().enumerate();
             let entrant = |(number, (max_games, is_built_in)): (usize, (usize, bool))| Entrant {
                 name: format!("entrant {number}"),
-                kind: EntrantKind::Robot,
+                kind: ParticipantKind::Robot,
                 built_in: is_built_in.then_some(AgentKind::Greedy),
                 filler: false,
                 stateless: true,
@@ -289,7 +289,7 @@ fn it_resumes_after_any_interruption() {
             entrants: (0..9)
                 .map(|number| Entrant {
                     name: format!("entrant {number}"),
-                    kind: EntrantKind::Human,
+                    kind: ParticipantKind::Human,
                     built_in: Some(AgentKind::Random),
                     filler: false,
                     stateless: false,

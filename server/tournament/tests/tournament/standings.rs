@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use chefshat_tournament::{Ended, Format, SeatPlayed, Tournament};
+use chefshat_tournament::{Ended, Format, SeatStatistics, Tournament};
 
 use super::support::{begun, end, follow, played, settings};
 
@@ -23,10 +23,10 @@ fn drawn_by(seed: u8, games: &Script) -> Tournament {
     for (game, (places, points)) in games.iter().enumerate() {
         follow(&mut tournament, 0);
         let seats = tournament.games()[game].seats.clone();
-        let seats = seats.into_iter().map(|who| SeatPlayed {
+        let seats = seats.into_iter().map(|who| SeatStatistics {
             place: places[who],
             points: points[who],
-            ..SeatPlayed::default()
+            ..SeatStatistics::default()
         });
         let seats = seats.collect();
         end(&mut tournament, game, Ended::Played { shifts: 3, seats });
@@ -85,7 +85,7 @@ fn a_standing_adds_up_the_games() {
     let mut first = None;
     for game in 0..2 {
         follow(&mut tournament, 0);
-        let seats = (0..4).map(|seat| SeatPlayed {
+        let seats = (0..4).map(|seat| SeatStatistics {
             place: seat + 1,
             points: 20 - seat as u64,
             substituted: seat == 0,

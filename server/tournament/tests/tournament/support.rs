@@ -3,7 +3,7 @@
 use std::iter::repeat_n;
 
 pub(crate) use chefshat_tournament::testing::{entrant, settings};
-use chefshat_tournament::{Change, Ended, SeatPlayed, Settings, State, Tournament, testing};
+use chefshat_tournament::{Change, Ended, SeatStatistics, Settings, State, Tournament, testing};
 
 /// A tournament with this number of participants, all present.
 pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
@@ -17,11 +17,11 @@ pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
 
 /// A result with these places by seat, and 10 points minus the place.
 pub(crate) fn played(places: &[usize]) -> Ended {
-    let seats = places.iter().map(|&place| SeatPlayed {
+    let seats = places.iter().map(|&place| SeatStatistics {
         place,
         points: 10 - place as u64,
         decisions: 20,
-        ..SeatPlayed::default()
+        ..SeatStatistics::default()
     });
     Ended::Played {
         shifts: 3,

@@ -100,7 +100,7 @@ struct ExpressedForm {
 }
 
 /// The numbers of kinds, sources and reasons. A released number never changes.
-const KINDS: [(u32, ParticipantKind); 3] = [
+pub(super) const KINDS: [(u32, ParticipantKind); 3] = [
     (1, ParticipantKind::Agent),
     (2, ParticipantKind::Human),
     (3, ParticipantKind::Robot),
@@ -121,13 +121,17 @@ const REASONS: [(u32, AbortReason); 5] = [
     (5, AbortReason::TooLong),
 ];
 
-fn number_of<T: PartialEq>(table: &[(u32, T)], value: &T) -> u32 {
+pub(super) fn number_of<T: PartialEq>(table: &[(u32, T)], value: &T) -> u32 {
     (table.iter().find(|(_, known)| known == value))
         .map(|(number, _)| *number)
         .expect("every value has a number")
 }
 
-fn value_of<T: Copy>(table: &[(u32, T)], number: u32, what: &str) -> Result<T, Unreadable> {
+pub(super) fn value_of<T: Copy>(
+    table: &[(u32, T)],
+    number: u32,
+    what: &str,
+) -> Result<T, Unreadable> {
     (table.iter().find(|(known, _)| *known == number))
         .map(|(_, value)| *value)
         .ok_or_else(|| Unreadable::new(format!("{number} is not a known {what}")))

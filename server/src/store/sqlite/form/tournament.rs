@@ -2,9 +2,10 @@
 
 use chefshat_agents::AgentKind;
 use chefshat_proto::v1;
-use chefshat_tournament::{Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult};
+use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistics};
 use prost::Message;
 
+use super::entry::{KINDS, number_of, value_of};
 use super::{Unreadable, array};
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash};
@@ -306,11 +307,7 @@ fn entry_of(kind: KindForm) -> Result<TournamentEntry, Unreadable> {
 fn entrant_to_form(entrant: &Entrant) -> EntrantForm {
     EntrantForm {
         name: entrant.name.clone(),
-        kind: match entrant.kind {
-            EntrantKind::Agent => 1,
-            EntrantKind::Human => 2,
-            EntrantKind::Robot => 3,
-        },
+        kind: number_of(&KINDS, &entrant.kind),
         built_in: (entrant.built_in).map_or_else(String::new, |kind| kind.name().into()),
         filler: entrant.filler,
         stateless: entrant.stateless,
@@ -320,16 +317,7 @@ fn entrant_to_form(entrant: &Entrant) -> EntrantForm {
 
 fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
     Ok(Entrant {
-        kind: match form.kind {
-            1 => EntrantKind::Agent,
-            2 => EntrantKind::Human,
-            3 => EntrantKind::Robot,
-            kind => {
-                return Err(Unreadable::new(format!(
-                    "{kind} is not a kind of participant"
-                )));
-            }
-        },
+        kind: value_of(&KINDS, form.kind, "kind of participant")?,
         built_in: match form.built_in.as_str() {
             "" => None,
             name => Some(
@@ -348,16 +336,16 @@ fn seat_to_form(seat: &SeatResult) -> SeatForm {
     SeatForm {
         participant: wide(seat.participant),
         forfeited: seat.forfeited,
-        substituted: seat.did.substituted,
-        place: wide(seat.did.place),
+        substituted: seat.statistics.substituted,
+        place: wide(seat.statistics.place),
         score: seat.score,
-        points: seat.did.points,
-        decisions: seat.did.decisions,
-        wrong_actions: seat.did.wrong_actions,
-        timeouts: seat.did.timeouts,
-        decision_time_us: seat.did.decision_time_us,
-        timed_decisions: seat.did.timed_decisions,
-        performance_score: seat.did.performance_score,
+        points: seat.statistics.points,
+        decisions: seat.statistics.decisions,
+        wrong_actions: seat.statistics.wrong_actions,
+        timeouts: seat.statistics.timeouts,
+        decision_time_us: seat.statistics.decision_time_us,
+        timed_decisions: seat.statistics.timed_decisions,
+        performance_score: seat.statistics.performance_score,
     }
 }
 
@@ -366,7 +354,7 @@ fn seat_from_form(form: SeatForm) -> Result<SeatResult, Unreadable> {
         participant: narrow(form.participant)?,
         forfeited: form.forfeited,
         score: form.score,
-        did: SeatPlayed {
+        statistics: SeatStatistics {
             place: narrow(form.place)?,
             points: form.points,
             substituted: form.substituted,

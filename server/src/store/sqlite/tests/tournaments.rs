@@ -1,6 +1,8 @@
 //! Stored tournaments are read back, and their encoding stays readable.
 
-use chefshat_tournament::{Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult};
+use chefshat_tournament::{
+    Change, Entrant, GameResult, ParticipantKind, SeatResult, SeatStatistics,
+};
 
 use super::*;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
@@ -26,7 +28,7 @@ fn cup(number: u8) -> TournamentHeader {
 fn every_entry() -> Vec<TournamentEntry> {
     let entrant = Entrant {
         name: "Bruna".into(),
-        kind: EntrantKind::Robot,
+        kind: ParticipantKind::Robot,
         built_in: None,
         filler: false,
         stateless: true,
@@ -34,7 +36,7 @@ fn every_entry() -> Vec<TournamentEntry> {
     };
     let filler = Entrant {
         name: "random 1".into(),
-        kind: EntrantKind::Agent,
+        kind: ParticipantKind::Agent,
         built_in: Some(AgentKind::Random),
         filler: true,
         stateless: false,
@@ -44,7 +46,7 @@ fn every_entry() -> Vec<TournamentEntry> {
         participant: 4,
         forfeited: false,
         score: 3,
-        did: SeatPlayed {
+        statistics: SeatStatistics {
             place: 2,
             points: u64::MAX,
             substituted: true,
@@ -60,9 +62,9 @@ fn every_entry() -> Vec<TournamentEntry> {
         participant: 0,
         forfeited: true,
         score: 3,
-        did: SeatPlayed {
+        statistics: SeatStatistics {
             substituted: false,
-            ..seat.did
+            ..seat.statistics
         },
     };
     let change = TournamentEntry::Change;
