@@ -1,6 +1,7 @@
-//! Kinds of participants: as an argument of the command line and as a word of its output.
+//! Kinds of participants as an argument of the command line.
 
 use chefshat_client::v1::ParticipantKind;
+pub(super) use chefshat_record::convert::kind_name;
 
 /// What a participant is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -26,13 +27,4 @@ impl From<KindArg> for ParticipantKind {
 /// The kind to filter by, of all kinds by default.
 pub(super) fn kind_filter(kind: Option<KindArg>) -> ParticipantKind {
     kind.map_or(ParticipantKind::Unspecified, ParticipantKind::from)
-}
-
-/// Name of a kind of participant.
-pub(super) fn kind_name(kind: ParticipantKind) -> &'static str {
-    match kind {
-        ParticipantKind::Human => "human",
-        ParticipantKind::Robot => "robot",
-        ParticipantKind::Agent | ParticipantKind::Unspecified => "agent",
-    }
 }

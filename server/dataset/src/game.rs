@@ -5,7 +5,7 @@ use std::sync::Arc;
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, record_line::Line};
 
-use chefshat_record::convert::rules_from_proto;
+use chefshat_record::convert::{kind_name, rules_from_proto};
 use chefshat_record::replay::{ReplayError, replay};
 
 /// The origin of games of real tables.
@@ -45,12 +45,7 @@ impl SeatInfo {
         let built_in = Some(built_in).filter(|name| !name.is_empty());
         Self {
             name: name.to_owned(),
-            kind: match (built_in, kind) {
-                (Some(_), _) => "built_in",
-                (None, v1::ParticipantKind::Human) => "human",
-                (None, v1::ParticipantKind::Robot) => "robot",
-                (None, v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified) => "agent",
-            },
+            kind: built_in.map_or_else(|| kind_name(kind), |_| "built_in"),
             built_in: built_in.map(str::to_owned),
         }
     }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use chefshat_agents::AgentKind;
 use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
 use chefshat_engine::RuleSet;
+use chefshat_record::convert::kind_from_name;
 use clap::Args;
 
 use super::super::connect::{ServerArg, free_seats};
@@ -168,20 +169,18 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
         return recorded_player(player).map(FilledBy::Replay);
     }
     let reserved = match word {
-        "open" => v1::ParticipantKind::Unspecified,
-        "agent" => v1::ParticipantKind::Agent,
-        "human" => v1::ParticipantKind::Human,
-        "robot" => v1::ParticipantKind::Robot,
-        _ => {
-            return AgentKind::from_name(word)
-                .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
-                .ok_or_else(|| {
-                    let known = AgentKind::ALL.map(AgentKind::name).join(", ");
-                    format!("use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot")
-                });
-        }
+        "open" => Some(v1::ParticipantKind::Unspecified),
+        _ => kind_from_name(word),
     };
-    Ok(FilledBy::ReservedFor(reserved.into()))
+    if let Some(kind) = reserved {
+        return Ok(FilledBy::ReservedFor(kind.into()));
+    }
+    AgentKind::from_name(word)
+        .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
+        .ok_or_else(|| {
+            let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+            format!("use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot")
+        })
 }
 
 fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {

@@ -10,7 +10,7 @@ use chefshat_proto::v1;
 
 use super::notation::{cards, kinds, play, rules};
 use crate::convert::{
-    check_expression, reward_scheme_to_proto, rules_from_proto, seat_from_number,
+    check_expression, kind_from_name, reward_scheme_to_proto, rules_from_proto, seat_from_number,
 };
 
 /// Largest transcript, bytes.
@@ -179,21 +179,17 @@ impl Settings {
                 self.scheme = reward_scheme_to_proto(Some(scheme));
             }
             "began" => self.began_ms = time_ms(value()?).map_err(|problem| cells.wrong(problem))?,
-            kind @ ("agent" | "human" | "robot") => {
-                let seat: u32 = cells.number("seat")?;
-                let player = Player {
-                    name: value()?.to_owned(),
-                    kind: match kind {
-                        "agent" => v1::ParticipantKind::Agent,
-                        "human" => v1::ParticipantKind::Human,
-                        _ => v1::ParticipantKind::Robot,
-                    },
+            name => {
+                let Some(kind) = kind_from_name(name) else {
+                    return Ok(false);
                 };
+                let seat: u32 = cells.number("seat")?;
+                let name = value()?.to_owned();
+                let player = Player { name, kind };
                 if self.players.insert(seat, player).is_some() {
                     return Err(cells.wrong(format!("seat {seat} is taken already")));
                 }
             }
-            _ => return Ok(false),
         }
         if cells.cells.contains_key("shift") {
             return Err(cells.wrong("this row precedes the first Shift: leave `shift` empty"));

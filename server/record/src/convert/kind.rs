@@ -1,0 +1,22 @@
+//! Names of the kinds of participants, as in transcripts, datasets and on the command line.
+
+use chefshat_proto::v1::ParticipantKind;
+
+/// The name of a kind. An unspecified kind is an agent.
+pub fn kind_name(kind: ParticipantKind) -> &'static str {
+    match kind {
+        ParticipantKind::Human => "human",
+        ParticipantKind::Robot => "robot",
+        ParticipantKind::Agent | ParticipantKind::Unspecified => "agent",
+    }
+}
+
+/// The kind with this name.
+pub fn kind_from_name(name: &str) -> Option<ParticipantKind> {
+    let kinds = [
+        ParticipantKind::Agent,
+        ParticipantKind::Human,
+        ParticipantKind::Robot,
+    ];
+    kinds.into_iter().find(|kind| kind_name(*kind) == name)
+}
