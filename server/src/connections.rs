@@ -41,9 +41,9 @@ pub struct Limits {
 
 /// The connections of a listening socket.
 pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::Result<Connection>> {
-    let places = Arc::new(Semaphore::new(limits.max_connections));
-    stream::unfold((listener, places), move |(listener, places)| async move {
-        let place = Arc::clone(&places)
+    let permits = Arc::new(Semaphore::new(limits.max_connections));
+    stream::unfold((listener, permits), move |(listener, permits)| async move {
+        let permit = Arc::clone(&permits)
             .acquire_owned()
             .await
             .expect("the semaphore is never closed");
@@ -62,9 +62,9 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
         let connection = Connection {
             stream,
             silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
-            _place: place,
+            _permit: permit,
         };
-        Some((Ok(connection), (listener, places)))
+        Some((Ok(connection), (listener, permits)))
     })
 }
 
@@ -87,7 +87,7 @@ pub struct Connection {
     stream: TcpStream,
     /// Fires unless something has been read.
     silence: Option<Pin<Box<Sleep>>>,
-    _place: OwnedSemaphorePermit,
+    _permit: OwnedSemaphorePermit,
 }
 
 impl Connected for Connection {

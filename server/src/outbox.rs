@@ -99,7 +99,7 @@ struct Waiting {
     updates: Updates,
     weight: usize,
     stamps: SmallVec<[Arc<HandStamp>; 1]>,
-    wanting_space: Vec<Arc<dyn OnSpace>>,
+    space_waiters: Vec<Arc<dyn OnSpace>>,
     /// The end of the stream, taken once.
     end: Option<StreamEnd>,
     ended: bool,
@@ -114,7 +114,7 @@ impl Outbox {
                 updates: Updates::default(),
                 weight: 0,
                 stamps: SmallVec::new(),
-                wanting_space: Vec::new(),
+                space_waiters: Vec::new(),
                 end: None,
                 ended: false,
                 abandoned: false,
@@ -144,9 +144,9 @@ impl Outbox {
         if waiting.weight > 0 && waiting.weight + weight > OUTBOX_CAPACITY {
             // A subscriber that tries several times is notified once.
             if let Some(on_space) = on_space
-                && !(waiting.wanting_space.iter()).any(|other| Arc::ptr_eq(other, on_space))
+                && !(waiting.space_waiters.iter()).any(|other| Arc::ptr_eq(other, on_space))
             {
-                waiting.wanting_space.push(Arc::clone(on_space));
+                waiting.space_waiters.push(Arc::clone(on_space));
             }
             return false;
         }
@@ -272,10 +272,10 @@ impl Stream for OutboxStream {
                 stamp.set(now);
             }
         }
-        let wanting_space = std::mem::take(&mut waiting.wanting_space);
+        let space_waiters = std::mem::take(&mut waiting.space_waiters);
         drop(waiting);
-        for wanting in wanting_space {
-            wanting.space();
+        for waiter in space_waiters {
+            waiter.space();
         }
         Poll::Ready(Some(Ok(updates)))
     }
@@ -288,7 +288,7 @@ impl Drop for OutboxStream {
         waiting.updates = Updates::default();
         waiting.weight = 0;
         waiting.stamps = SmallVec::new();
-        waiting.wanting_space = Vec::new();
+        waiting.space_waiters = Vec::new();
         drop(waiting);
         self.outbox.stop_reading();
         self.outbox.gone.notify_waiters();
@@ -359,7 +359,7 @@ mod tests {
         for _ in 0..100 {
             assert!(!outbox.push(&mut refused, None, Some(&on_space)));
         }
-        assert_eq!(outbox.lock().wanting_space.len(), 1);
+        assert_eq!(outbox.lock().space_waiters.len(), 1);
         assert_eq!(usize::try_from(pushed), Ok(OUTBOX_CAPACITY / 256));
         let next = stream.next().now_or_never().flatten();
         let message = next.expect("ready").expect("no error");

@@ -93,7 +93,7 @@ pub struct GameHeader {
     /// What fills each seat.
     pub fills: Vec<Fill>,
     /// Display names of built-in agents, by seat, if set.
-    pub called: BTreeMap<usize, String>,
+    pub display_names: BTreeMap<usize, String>,
     /// Recorded players, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
     /// How the game starts.

@@ -47,7 +47,7 @@ impl Table {
             rules: rules.validate().expect("a valid rule set"),
             rules_version: RULES_VERSION,
             policy,
-            called: BTreeMap::new(),
+            display_names: BTreeMap::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             fills,

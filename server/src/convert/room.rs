@@ -78,7 +78,7 @@ pub fn seats_to_proto(header: &GameHeader) -> Vec<v1::SeatConfig> {
     let seats = header.fills.iter().enumerate();
     seats
         .map(|(seat, fill)| v1::SeatConfig {
-            name: header.called.get(&seat).cloned().unwrap_or_default(),
+            name: header.display_names.get(&seat).cloned().unwrap_or_default(),
             ..fill_to_proto(fill)
         })
         .collect()
@@ -179,10 +179,10 @@ pub(super) fn state_to_proto(state: State) -> v1::RoomState {
 
 /// The seats of a room.
 pub fn participants(core: &Core) -> Vec<v1::Participant> {
-    let called = &core.header().called;
+    let display_names = &core.header().display_names;
     core.all_seats()
         .map(|seat| {
-            let called = called.get(&seat.index());
+            let display_name = display_names.get(&seat.index());
             let standing = core.standing(seat);
             let (reserved_for, built_in) = match standing.fill {
                 Fill::Open { reserved_for } => (reserved_for, None),
@@ -194,7 +194,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 seat: seat_number(seat),
                 name: match (participant, standing.fill) {
                     (Some(participant), _) => participant.name.clone(),
-                    _ if let Some(name) = called => name.clone(),
+                    _ if let Some(name) = display_name => name.clone(),
                     // Named after the agent, which is what the reader of a record wants to know.
                     (None, Fill::Replay(player)) => {
                         let game = player.game.to_string();

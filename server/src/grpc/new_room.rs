@@ -70,7 +70,7 @@ pub(super) async fn new_room(
         rules: beginning.rules,
         policy,
         fills,
-        called: convert::display_names_from_proto(&request.seats).map_err(refused)?,
+        display_names: convert::display_names_from_proto(&request.seats).map_err(refused)?,
         start: beginning.start,
         game_seed: beginning.game_seed,
         seating: None,

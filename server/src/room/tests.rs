@@ -59,7 +59,7 @@ async fn room_with(
         .expect("a valid rule set"),
         rules_version: RULES_VERSION,
         policy,
-        called: BTreeMap::new(),
+        display_names: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         fills: vec![Fill::Open { reserved_for: None }; 4],

@@ -41,7 +41,7 @@ pub struct NewRoom {
     /// What fills each seat.
     pub fills: Vec<Fill>,
     /// Display names of built-in agents, by seat, if set.
-    pub called: BTreeMap<usize, String>,
+    pub display_names: BTreeMap<usize, String>,
     /// The recorded players of seats that replay one, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
     /// How its game starts.
@@ -388,7 +388,7 @@ impl Reservation {
             policy: new.policy,
             rules_version: RULES_VERSION,
             fills: new.fills,
-            called: new.called,
+            display_names: new.display_names,
             recorded: new.recorded,
             start: new.start,
             seed: match new.game_seed {

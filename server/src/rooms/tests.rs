@@ -25,7 +25,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         rules: RuleSetSpec::default().validate().expect("the standard"),
         policy: Policy::default(),
         fills: vec![fill; 4],
-        called: BTreeMap::new(),
+        display_names: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         game_seed: None,

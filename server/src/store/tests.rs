@@ -29,7 +29,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
         },
         rules_version: RULES_VERSION,
         fills: vec![Fill::Open { reserved_for: None }; 4],
-        called: Default::default(),
+        display_names: Default::default(),
         recorded: Default::default(),
         start: GameStart::default(),
         seed: SeedPlan::Fixed {

@@ -177,7 +177,7 @@ impl Task {
         let game = &state.core.games()[number];
         let plan = &self.handle.plan;
         let entrants = state.core.participants();
-        let (mut participants, mut called) = (BTreeMap::new(), BTreeMap::new());
+        let (mut participants, mut display_names) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
         let fills = fills
             .map(|(seat, participant)| {
@@ -186,7 +186,7 @@ impl Task {
                     return Fill::BuiltIn(plan.core.filler);
                 }
                 if let Some(kind) = entrant.built_in {
-                    called.insert(seat, entrant.name.clone());
+                    display_names.insert(seat, entrant.name.clone());
                     return Fill::BuiltIn(kind);
                 }
                 let kind = entrant.kind;
@@ -218,7 +218,7 @@ impl Task {
             rules: plan.rules,
             policy: plan.policy.clone(),
             fills,
-            called,
+            display_names,
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.handle.game_seed(number, game.deal),

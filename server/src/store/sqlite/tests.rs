@@ -52,7 +52,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
                 seat: Seat::new(2),
             }),
         ],
-        called: BTreeMap::new(),
+        display_names: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart {
             script: None,
@@ -489,7 +489,7 @@ fn the_encoding_of_stored_data_does_not_change() {
 #[test]
 fn fields_added_later_are_read_back() {
     let header = GameHeader {
-        called: BTreeMap::from([(2, "Greta".to_owned())]),
+        display_names: BTreeMap::from([(2, "Greta".to_owned())]),
         policy: Policy::default(),
         ..header(1, Durability::Durable)
     };

@@ -104,7 +104,7 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
         policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
         fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
         // Not checked again: stored games stay readable even if the rules for names change.
-        called: (form.seats.into_iter().enumerate())
+        display_names: (form.seats.into_iter().enumerate())
             .filter(|(_, seat)| !seat.name.is_empty())
             .map(|(seat, config)| (seat, config.name))
             .collect(),
