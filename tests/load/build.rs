@@ -1,4 +1,4 @@
-//! Generates the code of the bare room's service from `proto/bare.proto`, with protox as everywhere.
+//! Generates the code of the bare room's service from `proto/bare.proto` with protox.
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=proto");

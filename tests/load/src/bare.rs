@@ -1,5 +1,5 @@
-//! The bare room: what tonic, a task for each room and a mailbox cost without a game. Streams, tasks and batching are as in the game
-//! server; the content is bytes without meaning.
+//! The bare room: the cost of tonic, one task per room and a mailbox, without a game. Streams,
+//! tasks and batching are those of the game server; messages contain meaningless bytes.
 
 use std::collections::HashMap;
 use std::future::Future;
@@ -22,11 +22,11 @@ pub(crate) mod proto {
     tonic::include_proto!("chefshat.bare");
 }
 
-/// Messages that wait for a room, as in the game server.
+/// Capacity of a room's mailbox, as in the game server.
 const MAILBOX: usize = chefshat_server::config::ROOM_MAILBOX;
-/// Items that wait for a stream, as in the game server.
+/// Capacity of a stream's outbox, as in the game server.
 const OUTBOX: usize = chefshat_server::outbox::OUTBOX_CAPACITY;
-/// Most items in one message, as in the game server.
+/// Maximum items per message, as in the game server.
 const BATCH: usize = chefshat_server::outbox::MESSAGE_CAPACITY;
 
 /// Serves bare rooms until `shutdown` is ready.
@@ -128,14 +128,14 @@ async fn read(rooms: Arc<Rooms>, mut requests: Streaming<Batch>, outbox: mpsc::S
             }
         }
     }
-    // The responses end when nobody holds the outbox any more.
+    // The responses end when the last sender of the outbox is dropped.
     for (seat, mailbox) in mailboxes {
-        // A room that is gone holds nothing.
+        // Ended rooms have no sender.
         let _ = mailbox.send(ToRoom::Leave { seat }).await;
     }
 }
 
-/// A room: as soon as its seats are there, it asks one after the other.
+/// A room: when its seats are attached, it asks one after another.
 async fn room(mut inbox: mpsc::Receiver<ToRoom>) {
     let mut seats: [Option<(mpsc::Sender<Item>, u32)>; SEATS] = Default::default();
     let mut messages = Vec::new();
@@ -152,7 +152,8 @@ async fn room(mut inbox: mpsc::Receiver<ToRoom>) {
                     let complete = seats.iter().all(Option::is_some);
                     (complete && asked.is_none()).then_some(seat / SEATS as u32 * SEATS as u32)
                 }
-                // An answer out of turn or of nothing would be a fault of the client, which counts what it gets.
+                // Answers out of turn would be a fault of the client, which counts what it
+                // receives.
                 ToRoom::Answer { seat, body } if asked == Some(seat) && !body.is_empty() => {
                     Some(if (seat + 1) % SEATS as u32 == 0 {
                         seat + 1 - SEATS as u32

@@ -1,4 +1,4 @@
-//! Where games are kept on disk while they are measured, and how fast that disk is.
+//! The folder for games on disk, and the speed of that disk.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -9,12 +9,12 @@ use tempfile::TempDir;
 use crate::error::LoadError;
 use crate::options::Load;
 
-/// How long the disk is looked at.
+/// Duration of the measurement.
 const LOOK: Duration = Duration::from_millis(500);
-/// A small write: a page of the database.
+/// Size of a small write: a page of the database.
 const PAGE_BYTES: usize = 4_096;
 
-/// A folder on the disk that is meant, empty, gone when dropped.
+/// An empty folder on the disk to measure, deleted when dropped.
 pub(crate) fn folder(load: &Load) -> Result<TempDir, LoadError> {
     match &load.disk {
         Some(folder) => tempfile::tempdir_in(folder),
@@ -23,7 +23,7 @@ pub(crate) fn folder(load: &Load) -> Result<TempDir, LoadError> {
     .map_err(LoadError::io("making a temporary folder"))
 }
 
-/// Small writes, each synced before the next, that the disk takes in a second.
+/// Small writes per second, each synced before the next.
 pub(crate) fn syncs_per_second(load: &Load) -> Result<f64, LoadError> {
     let folder = folder(load)?;
     count_syncs(folder.path()).map_err(LoadError::io("writing to the disk"))

@@ -1,35 +1,36 @@
-//! Why a run fails. A benchmark that did not do what it counts is a failure, not a slow result.
+//! Why a run fails. A benchmark that did not do what it counts fails instead of reporting a slow
+//! result.
 
 /// Why a run failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LoadError {
-    /// The system refused something.
+    /// A system call failed.
     #[error("{what}: {error}")]
     Io {
-        /// What was tried.
+        /// What was attempted.
         what: &'static str,
-        /// What the system said.
+        /// The system's error.
         error: std::io::Error,
     },
-    /// A connection could not be made or was lost.
+    /// A connection failed or was lost.
     #[error("the connection failed: {0}")]
     Transport(#[from] tonic::transport::Error),
     /// A call was refused.
     #[error("a call was refused: {0}")]
     Status(#[from] tonic::Status),
-    /// The server did something it must not.
+    /// The server violated the protocol.
     #[error("the server did not keep to the protocol: {0}")]
     Protocol(String),
-    /// What was counted on one side is not what was counted on the other.
+    /// The counts of both sides differ.
     #[error("the counts do not agree: {0}")]
     Count(String),
-    /// Something took far longer than it may.
+    /// Something exceeded its time limit.
     #[error("{0} did not come to an end")]
     Stuck(&'static str),
 }
 
 impl LoadError {
-    /// For `map_err`: says what was tried.
+    /// For `map_err`: adds what was attempted.
     pub(crate) fn io(what: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |error| Self::Io { what, error }
     }

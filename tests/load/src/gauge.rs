@@ -1,15 +1,16 @@
-//! What the kernel says of a process: its CPU time and its memory, read from `/proc`; and binding a process to a core.
+//! CPU time and memory of a process, read from `/proc`; and binding a process to a core.
 
 use std::io;
 use std::time::Duration;
 
 use rustix::thread::{CpuSet, sched_setaffinity};
 
-/// CPU time of a process so far, its own and the kernel's for it: of the threads that live now, as runtimes keep theirs.
+/// CPU time of a process so far, user and system, of its current threads; runtimes do not end
+/// theirs.
 pub(crate) fn cpu_time(pid: u32) -> io::Result<Duration> {
     let mut total = Duration::ZERO;
     for thread in std::fs::read_dir(format!("/proc/{pid}/task"))? {
-        // A thread may end between being listed and being read.
+        // A thread may end between listing and reading.
         let Ok(times) = std::fs::read_to_string(thread?.path().join("schedstat")) else {
             continue;
         };
@@ -23,7 +24,7 @@ pub(crate) fn cpu_time(pid: u32) -> io::Result<Duration> {
     Ok(total)
 }
 
-/// Memory of a process that is in RAM now, bytes.
+/// Resident memory of a process, bytes.
 pub(crate) fn resident_bytes(pid: u32) -> io::Result<u64> {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status"))?;
     status

@@ -1,5 +1,6 @@
-//! The load program: plays many rooms on a server and on a bare tonic room, in turns, and reports what a decision costs. This file only
-//! parses and wires; the crate's README says what is measured and how.
+//! The load program: plays many rooms on a server and on a bare tonic room, in turns, and reports
+//! the cost of a decision. This file only parses and wires; the crate's README explains the
+//! measurements.
 
 mod bare;
 mod disk;

@@ -1,4 +1,5 @@
-//! The load on the bare room: the same topology, streams and batching as `play`, messages of the sizes that were weighed there.
+//! The load on the bare room: the same topology, streams and batching as `play`, with messages of
+//! the sizes measured there.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -16,14 +17,14 @@ use crate::error::LoadError;
 use crate::options::SEATS;
 use crate::pulse::{Latencies, Plan, Pulse, Window, latencies};
 
-/// Requests that wait for one stream.
+/// Capacity of a stream's request queue.
 const REQUESTS: usize = 1_024;
-/// How long the rooms may take to come to rest, and the streams to close.
+/// Time limit for rooms to come to rest and streams to close.
 const END_LIMIT: Duration = Duration::from_secs(30);
-/// How often is looked whether the rooms have come to rest.
+/// Interval of checks whether rooms have come to rest.
 const GLANCE: Duration = Duration::from_millis(2);
 
-/// Sizes of the game's messages, bytes for a decision.
+/// Bytes of the game's messages per decision.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sizes {
     /// To the server.
@@ -32,18 +33,18 @@ pub(crate) struct Sizes {
     pub(crate) response: usize,
 }
 
-/// What a segment on the bare room showed.
+/// The result of a segment on the bare room.
 #[derive(Debug)]
 pub(crate) struct Pinged {
     /// The window.
     pub(crate) window: Window,
-    /// From sending an answer to the arrival of the room's next observation, at whichever stream, nanoseconds.
+    /// From sending an answer until the room's next observation arrives on any stream, nanoseconds.
     pub(crate) client_ns: Latencies,
-    /// Answers in all of the segment.
+    /// Answers in the complete segment.
     pub(crate) answers: u64,
 }
 
-/// Passes turns around until the window has closed and every room has come to rest.
+/// Answers requests until the window has closed and every room has come to rest.
 pub(crate) async fn segment(
     url: &str,
     server: u32,
@@ -85,7 +86,7 @@ pub(crate) async fn segment(
         let request = Batch {
             items: vec![attach],
         };
-        // A stream that is gone says why when it is read.
+        // A stream that has ended reports its own error.
         let _ = senders[seat as usize % plan.streams].send(request).await;
     }
 
@@ -119,7 +120,7 @@ pub(crate) async fn segment(
     tokio::time::timeout(END_LIMIT, closing)
         .await
         .map_err(|_| LoadError::Stuck("the bare streams"))??;
-    // Each room's last observation is the one that is not answered.
+    // The last observation of each room is not answered.
     let expected = answers + plan.rooms as u64;
     if received != expected || answers != pulse.decisions() || window.decisions == 0 {
         return Err(LoadError::Count(format!(
@@ -135,7 +136,7 @@ pub(crate) async fn segment(
     })
 }
 
-/// The length of a body with which a batch of one item of this seat has `bytes` bytes in all.
+/// The length of a body for which a batch with one item of this seat has `bytes` bytes in total.
 fn body_bytes(seat: u32, bytes: usize) -> u32 {
     let mut body = bytes;
     loop {
@@ -154,7 +155,7 @@ fn body_bytes(seat: u32, bytes: usize) -> u32 {
 
 /// One stream of seats.
 struct Stream {
-    /// Weak, so that the stream ends when the segment lets go of its sender.
+    /// Weak, so that the stream ends when the segment drops its sender.
     requests: mpsc::WeakSender<Batch>,
     pulse: Arc<Pulse>,
     at_rest: Arc<AtomicUsize>,
@@ -189,7 +190,7 @@ impl Stream {
                 continue;
             }
             if let Some(requests) = self.requests.upgrade() {
-                // A stream that is gone says why when it is read.
+                // A stream that has ended reports its own error.
                 let _ = requests.send(Batch { items }).await;
             }
         }

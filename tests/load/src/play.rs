@@ -1,5 +1,6 @@
-//! The load on the game server: a client of its own, as small as one can be. Each stream is a task that decodes what it needs of what
-//! comes, picks a random set bit of each mask, and answers all updates of one response in one request. `host` makes the rooms.
+//! The load on the game server: a minimal client. Each stream is a task that decodes the fields it
+//! needs, picks a random set bit of each mask, and answers all updates of one response in one
+//! request. `host` creates the rooms.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,26 +24,27 @@ use crate::wire::{
     AnswerResult, DecisionRequest, EventBatch, Kind, PlayCodec, PlayResponse, Update,
 };
 
-/// A response and how many bytes it had.
+/// A response and its size in bytes.
 pub(crate) type Weighed = (usize, PlayResponse);
 
-/// Requests that wait for one stream.
+/// Capacity of a stream's request queue.
 const REQUESTS: usize = 1_024;
-/// How long the last games may take to end, and the streams to close.
+/// Time limit for the last games to end and streams to close.
 const END_LIMIT: Duration = Duration::from_secs(300);
 
-/// What a segment on the game server showed.
+/// The result of a segment on the game server.
 #[derive(Debug)]
 pub(crate) struct Played {
     /// The window.
     pub(crate) window: Window,
-    /// Decision times as the server measured them, microseconds: from handing a request to its transport to the answer's arrival.
+    /// Decision times measured by the server, microseconds: from handing a request to the transport
+    /// until the answer has been read.
     pub(crate) server_us: Latencies,
-    /// From sending an answer to the arrival of the room's next decision, at whichever stream, nanoseconds.
+    /// From sending an answer until the room's next decision arrives on any stream, nanoseconds.
     pub(crate) client_ns: Latencies,
-    /// What all of the segment amounted to, checked.
+    /// Counts of the complete segment, checked.
     pub(crate) counts: Counts,
-    /// The weight of its messages.
+    /// Sizes of its messages.
     pub(crate) traffic: Traffic,
 }
 
@@ -77,9 +79,9 @@ pub(crate) async fn segment(
     let (ready, all_rooms_made) = oneshot::channel();
     let mut host = tokio::spawn(host.run(Arc::clone(&pulse), ready));
 
-    // A stream or the host that ends before its time has failed.
+    // A stream or host that ends early has failed.
     let measuring = async {
-        // If the host fails, its end is what is reported.
+        // If the host fails, its error is reported.
         let _ = all_rooms_made.await;
         pulse.measure(plan, server).await
     };
@@ -94,7 +96,7 @@ pub(crate) async fn segment(
         early = streams.join_next() => return Err(early_end(early)),
         hosted = &mut host => hosted.expect("the host does not panic")?,
     };
-    // Half-closes the streams, whose tasks hold no sender of their own.
+    // Half-closes the streams, whose tasks have no sender of their own.
     drop(senders);
     let mut sum = Tally::default();
     let closing = async {
@@ -117,7 +119,7 @@ pub(crate) async fn segment(
     })
 }
 
-/// Opens a stream, as a generated client does, but for messages with the fields alone that are needed.
+/// Opens a stream like a generated client, but decodes only the necessary fields.
 pub(crate) async fn open(
     channel: Channel,
     requests: mpsc::Receiver<v1::PlayRequest>,
@@ -132,7 +134,7 @@ pub(crate) async fn open(
         .into_inner())
 }
 
-/// Why a task ended before its time.
+/// Why a task ended early.
 fn early_end<T>(end: Option<Result<Result<T, LoadError>, tokio::task::JoinError>>) -> LoadError {
     match end {
         Some(Ok(Err(error))) => error,
@@ -141,7 +143,7 @@ fn early_end<T>(end: Option<Result<Result<T, LoadError>, tokio::task::JoinError>
     }
 }
 
-/// What one stream saw, or all.
+/// Counts of one stream or of all.
 #[derive(Debug)]
 struct Tally {
     counts: Counts,
@@ -172,7 +174,7 @@ impl Tally {
 
 /// One stream of seats.
 struct Stream {
-    /// Weak, so that the stream ends when the segment lets go of its sender.
+    /// Weak, so that the stream ends when the segment drops its sender.
     requests: mpsc::WeakSender<v1::PlayRequest>,
     report: mpsc::UnboundedSender<News>,
     pulse: Arc<Pulse>,
@@ -207,13 +209,13 @@ impl Stream {
                 .requests
                 .upgrade()
                 .ok_or_else(|| LoadError::Protocol("asked after the last game had ended".into()))?;
-            // A stream that is gone says why when it is read.
+            // A stream that has ended reports its own error.
             let _ = requests.send(request).await;
         }
         Ok(self.tally)
     }
 
-    /// Takes one update; an answer if it asks for one.
+    /// Processes one update; returns the answer to a decision.
     fn take(
         &mut self,
         handle: u32,
@@ -238,7 +240,7 @@ impl Stream {
             .ok_or_else(|| LoadError::Protocol(format!("handle {handle} was never announced")))?;
         match update {
             Some(Update::Decision(_)) if self.rests() => {
-                // A host that is gone has failed already.
+                // A host that has ended has failed already.
                 let _ = self.report.send(News::AtRest(slot.room));
             }
             Some(Update::Decision(decision)) => return self.decide(slot, &decision).map(Some),
@@ -253,7 +255,7 @@ impl Stream {
                 }
                 self.slots[handle as usize] = None;
                 self.tally.counts.detached += 1;
-                // A host that is gone has failed already.
+                // A host that has ended has failed already.
                 let _ = self.report.send(News::Over(slot.room));
             }
             other => {
@@ -263,7 +265,7 @@ impl Stream {
         Ok(None)
     }
 
-    /// Whether decisions stay unanswered now, until their rooms are closed.
+    /// Whether decisions now stay unanswered until their rooms are closed.
     fn rests(&self) -> bool {
         !self.play_to_end && self.pulse.is_stopping()
     }
@@ -285,7 +287,7 @@ impl Stream {
         })
     }
 
-    /// Any set bit, each as likely as the others.
+    /// A random set bit, uniformly.
     fn pick(&mut self, mask: &[u8]) -> Option<u32> {
         let legal: u32 = mask.iter().map(|byte| byte.count_ones()).sum();
         let mut left = (legal > 0).then(|| self.random.random_range(0..legal))?;
@@ -318,7 +320,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Counts what happened in a room: its first seat for all of them, the end of the game each for itself.
+    /// Counts events of a room: most at its first seat, the end of the game at every seat.
     fn follow(&mut self, slot: Slot, batch: &EventBatch) -> Result<(), LoadError> {
         let first = slot.seat == 0;
         for event in &batch.events {

@@ -1,5 +1,5 @@
-//! What the tasks of a segment share, and the window in which it is measured: counters that are read when the window opens and when it
-//! closes, so that connecting, warming up and playing the last games to their end are no part of the figures.
+//! What the tasks of a segment share, and its window: counters are read when the window opens and
+//! closes, so that connecting, warming up and finishing the last games are not part of the figures.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -9,25 +9,25 @@ use hdrhistogram::Histogram;
 use crate::error::LoadError;
 use crate::gauge;
 
-/// How often the number of decisions is looked at when it bounds the window.
+/// Interval of checks of the number of decisions, if it limits the window.
 const GLANCE: Duration = Duration::from_millis(2);
-/// Longest latency told apart from longer ones, nanoseconds.
+/// Maximum latency recorded exactly, nanoseconds.
 const LONGEST_NS: u64 = 60_000_000_000;
 
-/// A segment: how much is played, and on what.
+/// A segment: how much to play, and on what.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// Rooms at a time.
     pub(crate) rooms: usize,
-    /// Streams the seats are spread over.
+    /// Streams to spread the seats over.
     pub(crate) streams: usize,
     /// Shifts of a game; 0: games to 15 points.
     pub(crate) shifts: u32,
-    /// Whether the games outlive the server.
+    /// Whether games are durable.
     pub(crate) durable: bool,
-    /// Whether the last games are played to their end; else their rooms are closed when the window has closed.
+    /// Whether the last games are finished; otherwise their rooms are closed after the window.
     pub(crate) play_to_end: bool,
-    /// Played before the window opens.
+    /// Warm-up before the window opens.
     pub(crate) warmup: Duration,
     /// Length of the window.
     pub(crate) window: Duration,
@@ -37,14 +37,14 @@ pub(crate) struct Plan {
     pub(crate) seed: u64,
 }
 
-/// What a window showed.
+/// The result of a window.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Window {
     /// Decisions answered in it.
     pub(crate) decisions: u64,
     /// How long it was open.
     pub(crate) elapsed: Duration,
-    /// CPU time of the server's process, unless that runs elsewhere.
+    /// CPU time of the server's process, unless it runs elsewhere.
     pub(crate) server_cpu: Option<Duration>,
     /// CPU time of this process.
     pub(crate) client_cpu: Duration,
@@ -55,7 +55,7 @@ pub(crate) struct Window {
 /// Latencies of one kind, in the units they were recorded in.
 pub(crate) type Latencies = Histogram<u64>;
 
-/// No latencies yet; resolved to one percent.
+/// Creates an empty histogram with a resolution of one percent.
 pub(crate) fn latencies() -> Latencies {
     Histogram::new_with_bounds(1, LONGEST_NS, 2).expect("the bounds are in order")
 }
@@ -72,7 +72,7 @@ pub(crate) struct Pulse {
 }
 
 impl Pulse {
-    /// For so many rooms.
+    /// Creates the state for a number of rooms.
     pub(crate) fn new(rooms: usize) -> Self {
         Self {
             epoch: Instant::now(),
@@ -83,7 +83,7 @@ impl Pulse {
         }
     }
 
-    /// A decision of a room has arrived: notes how long the server took since the answer before.
+    /// Records the arrival of a room's decision, with the time since the previous answer.
     pub(crate) fn asked(&self, room: usize, latencies: &mut Latencies) {
         if self.is_open() {
             let answered = self.answered_ns[room].load(Relaxed);
@@ -93,13 +93,13 @@ impl Pulse {
         }
     }
 
-    /// A decision of a room is being answered.
+    /// Records the time of an answer.
     pub(crate) fn answer(&self, room: usize) {
         self.answered_ns[room].store(self.now_ns(), Relaxed);
         self.decisions.fetch_add(1, Relaxed);
     }
 
-    /// A room begins anew: the time until its first decision is nobody's latency.
+    /// A room starts a new game: the time until its first decision is not a latency.
     pub(crate) fn begin(&self, room: usize) {
         self.answered_ns[room].store(0, Relaxed);
     }
@@ -109,12 +109,12 @@ impl Pulse {
         self.open.load(Relaxed)
     }
 
-    /// No new games: what runs is played to its end.
+    /// Stops new games; running ones are finished.
     pub(crate) fn stop(&self) {
         self.stopping.store(true, Relaxed);
     }
 
-    /// Whether no new games are to begin.
+    /// Whether new games are stopped.
     pub(crate) fn is_stopping(&self) -> bool {
         self.stopping.load(Relaxed)
     }

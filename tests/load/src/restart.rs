@@ -1,6 +1,7 @@
-//! A restart: many games are played for a while, the server is killed, and what is measured is the time from starting another one on the
-//! same folder until every ticket has been attached again and every game's open decision has been put to its seat. After that a few more
-//! decisions of each game are taken, so that what is called playable has been played.
+//! Restarts: many games are played for a while and the server is killed. Measures the time from
+//! starting another server on the same folder until every ticket is attached and every open
+//! decision has reached its seat. Then a few more decisions of each game confirm that the games are
+//! playable.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -24,25 +25,25 @@ use crate::play::{self, Weighed};
 use crate::server::{Kind, Launcher, ServerProcess};
 use crate::wire::{DecisionRequest, Update};
 
-/// The longest that is aimed at from the start of a server until all is playable, seconds.
+/// Goal for the time from the start of a server until all games are playable, seconds.
 const GOAL_S: f64 = 2.0;
-/// Decisions of each game before the first restart; a moment of load plays fewer.
+/// Decisions of each game before the first restart; fewer with --smoke.
 const DECISIONS: u64 = 300;
 const SMOKE_DECISIONS: u64 = 20;
 /// Further decisions of each game after each restart.
 const MORE: u64 = 2;
-/// Connections that the seats are spread over.
+/// Connections to spread the seats over.
 const STREAMS: usize = 64;
-/// Rooms that are made at a time.
+/// Rooms created at a time.
 const MADE_AT_ONCE: usize = 32;
-/// How long the games of one server may take to come so far.
+/// Time limit for the games of one server to reach a target.
 const LIMIT: Duration = Duration::from_secs(600);
-/// Nobody is late here.
+/// Decision time: nobody is late.
 const DECISION_TIME_MS: u32 = 3_600_000;
-/// No game ends meanwhile.
+/// Shifts per game: no game ends during the run.
 const SHIFTS: u32 = 100;
 
-/// What restarts showed.
+/// The results of restarts.
 #[derive(Debug, Serialize)]
 struct Report {
     rooms: usize,
@@ -61,13 +62,13 @@ struct Times {
     open_s: f64,
     /// The first decision has reached its seat.
     first_decision_s: f64,
-    /// Every seat is attached, every open decision has reached its seat.
+    /// Every seat is attached, and every open decision has reached its seat.
     playable_s: f64,
-    /// Every game has gone on by some decisions.
+    /// Further decisions of every game have been acknowledged.
     played_s: f64,
 }
 
-/// Measures restarts and prints what they showed.
+/// Measures restarts and prints the results.
 pub(crate) async fn measure(load: &Load, rooms: u64) -> Result<(), LoadError> {
     let rooms = usize::try_from(rooms).expect("bounded by the options");
     let folder = disk::folder(load)?;
@@ -161,7 +162,7 @@ fn median_playable(restarts: &[Times]) -> f64 {
     times[times.len() / 2]
 }
 
-/// Makes rooms and takes their seats: their tickets, room by room.
+/// Creates rooms and takes their seats. Returns the tickets by room.
 async fn tickets(url: &str, rooms: usize) -> Result<Vec<String>, LoadError> {
     let channel = Endpoint::from_shared(url.to_owned())?.connect().await?;
     let made: Vec<Vec<String>> = futures::stream::iter(0..rooms)
@@ -199,13 +200,13 @@ async fn make_room(channel: Channel) -> Result<Vec<String>, LoadError> {
     Ok(tickets)
 }
 
-/// The games, which outlive the servers.
+/// The games, across servers.
 struct Games {
-    /// Tickets of all seats, room by room.
+    /// Tickets of all seats, by room.
     tickets: Arc<Vec<String>>,
-    /// Events that each seat has seen.
+    /// Events received by each seat.
     seen: Arc<Vec<AtomicU64>>,
-    /// Decisions of each room that were acknowledged.
+    /// Acknowledged decisions of each room.
     taken: Vec<AtomicU64>,
 }
 
@@ -214,7 +215,7 @@ struct Run {
     tickets: Arc<Vec<String>>,
     seen: Arc<Vec<AtomicU64>>,
     taken: Vec<AtomicU64>,
-    /// Decisions after which a room rests.
+    /// Decisions after which a room comes to rest.
     enough: u64,
     begun: Instant,
     /// Whether a decision of each room has reached its seat.
@@ -222,7 +223,7 @@ struct Run {
     counts: watch::Sender<Counts>,
 }
 
-/// What has come about, and when it was complete.
+/// Counts, and the times at which they were complete.
 #[derive(Debug, Clone, Copy, Default)]
 struct Counts {
     attached: usize,
@@ -233,7 +234,7 @@ struct Counts {
     played_s: f64,
 }
 
-/// Attaches every seat and plays every room until it has had enough decisions.
+/// Attaches every seat and plays every room until it has enough decisions.
 async fn play_on(
     games: &mut Games,
     server: &ServerProcess,
@@ -256,7 +257,7 @@ async fn play_on(
         streams.spawn(Arc::clone(&run).stream(endpoint.clone(), number));
     }
     let mut counts = run.counts.subscribe();
-    // A seat that is not asked may be attached again after all games have gone on.
+    // A seat without decisions may be attached again after all games have continued.
     let all_rest = counts.wait_for(|counts| counts.resting == rooms && counts.playable_s > 0.0);
     let counts = tokio::select! {
         counts = tokio::time::timeout(LIMIT, all_rest) => {
@@ -279,7 +280,7 @@ async fn play_on(
 }
 
 impl Run {
-    /// One connection, with every so-manieth seat.
+    /// One connection, with every n-th seat.
     async fn stream(self: Arc<Self>, endpoint: Endpoint, number: usize) -> Result<(), LoadError> {
         let attach: Vec<v1::SeatCommand> = (number..self.tickets.len())
             .step_by(STREAMS)
@@ -306,11 +307,11 @@ impl Run {
     }
 
     async fn send(&self, requests: &mpsc::Sender<v1::PlayRequest>, commands: Vec<v1::SeatCommand>) {
-        // A stream that is gone says why when it is read.
+        // A stream that has ended reports its own error.
         let _ = requests.send(v1::PlayRequest { commands }).await;
     }
 
-    /// Takes the next response; what is to be said to it. `seats` has the seat of each handle.
+    /// Processes a response; returns the commands to send. `seats` has the seat of each handle.
     async fn next(
         &self,
         inbound: &mut Streaming<Weighed>,
@@ -357,7 +358,7 @@ impl Run {
         Ok(Some(commands))
     }
 
-    /// A decision of a room: it is answered unless the room has had enough.
+    /// Answers a decision unless its room has enough.
     fn decide(
         &self,
         room: usize,
@@ -383,7 +384,7 @@ impl Run {
         }))
     }
 
-    /// Counts something, and notes the time when it makes something complete.
+    /// Counts one item; records the time when all are complete.
     fn count(&self, what: impl FnOnce(&mut Counts)) {
         let (seats, rooms) = (self.tickets.len(), self.asked.len());
         self.counts.send_modify(|counts| {

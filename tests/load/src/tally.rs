@@ -39,8 +39,9 @@ impl Counts {
         self.detached += other.detached;
     }
 
-    /// Checks that what was measured has happened: every game has ended for every seat, every answer was accepted, and the turns answered
-    /// are as many as the rooms reported. Games that were not played to their end may have no complete Shift.
+    /// Checks the counts: every game has ended for every seat, every answer was accepted, and the
+    /// turns answered equal those the rooms reported. Games that were not finished may have no
+    /// complete Shift.
     pub(crate) fn check(
         &mut self,
         games: u64,

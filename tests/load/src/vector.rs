@@ -1,5 +1,6 @@
-//! A client's own games: batches of several sizes are stepped by a policy that takes any legal action, on one stream and on several at once,
-//! and what is measured is decisions per second, all of them the client's. The client is the Rust SDK; every batch is decoded whole.
+//! A client's own games: a random policy steps batches of several sizes, on one stream and on
+//! several at once. Measures decisions per second, all of them the client's. The client is the Rust
+//! SDK; every batch is decoded completely.
 
 use std::time::{Duration, Instant};
 
@@ -14,14 +15,14 @@ use crate::gauge::cpu_time;
 use crate::options::{Load, SEATS};
 use crate::server::{Kind, Launcher, ServerProcess};
 
-/// Games of one stream.
+/// Games per stream.
 const GAMES: [u32; 3] = [1, 64, 1_024];
-/// Streams at once.
+/// Parallel streams.
 const STREAMS: [usize; 3] = [1, 2, 4];
-/// What is aimed at with the most games, decisions per second.
+/// Goal with the most games, decisions per second.
 const GOAL: f64 = 4e6;
 
-/// What the scenarios showed.
+/// The results of the scenarios.
 #[derive(Debug, Serialize)]
 struct Report {
     scenarios: Vec<Scenario>,
@@ -30,7 +31,7 @@ struct Report {
     met: bool,
 }
 
-/// So many streams with so many games each; medians over the rounds.
+/// A number of streams with a number of games each; medians over the rounds.
 #[derive(Debug, Serialize)]
 struct Scenario {
     streams: usize,
@@ -44,7 +45,7 @@ struct Scenario {
     client_cpu_us: f64,
 }
 
-/// What one stream did in its window.
+/// The result of one stream in its window.
 #[derive(Debug, Clone, Copy, Default)]
 struct Done {
     decisions: u64,
@@ -52,7 +53,7 @@ struct Done {
     seconds: f64,
 }
 
-/// Measures all scenarios, in turns, and prints what they showed.
+/// Measures all scenarios, in turns, and prints the results.
 pub(crate) async fn measure(load: &Load) -> Result<(), LoadError> {
     let server = Launcher::new(load).start(Kind::InMemory).await?;
     let scenarios: Vec<(usize, u32)> = (STREAMS.iter())
@@ -196,7 +197,7 @@ async fn scenario(
     })
 }
 
-/// Steps all streams side by side for a while.
+/// Steps all streams in parallel for a while.
 async fn run(
     streams: Vec<Stream>,
     window: Duration,
@@ -215,17 +216,17 @@ async fn run(
     Ok((ended, parts))
 }
 
-/// One stream of games, all seats the client's.
+/// One stream of games; the client has all seats.
 struct Stream {
     games: VectorGames,
     batch: Box<v1::VectorBatch>,
     agent: RandomAgent,
-    /// Answers given since the beginning.
+    /// Answers given so far.
     answered: u64,
 }
 
 impl Stream {
-    /// On a connection of its own.
+    /// Opens a stream on its own connection.
     async fn open(server: &ServerProcess, games: u32, seed: u64) -> Result<Self, LoadError> {
         let refused = |error: chefshat_client::Error| LoadError::Protocol(error.to_string());
         let client = Client::connect(server.url()).await.map_err(refused)?;
@@ -274,7 +275,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Holds what was answered against what the server counted.
+    /// Compares the answers given with the server's counts.
     fn check(&self) -> Result<(), LoadError> {
         let totals = self.batch.totals.unwrap_or_default();
         let counted = (totals.client_decisions, totals.decisions);

@@ -1,6 +1,6 @@
-//! The messages of the protocol with the fields alone that a random agent needs: it skips what it does not read, as any program may.
-//! What is measured here is the server; a client that takes in whole observations spends more time of its own, not the server's.
-//! Names and numbers are those of `chefshat.v1`, which a test holds them to.
+//! The messages of the protocol with only the fields that a random agent needs; others are skipped.
+//! The server is measured, so a client that decodes complete observations would only add its own
+//! time. A test compares names and numbers with `chefshat.v1`.
 
 use chefshat_proto::v1;
 use prost::bytes::Buf as _;
@@ -9,7 +9,7 @@ use tonic::Status;
 use tonic::codec::{Codec, DecodeBuf, Decoder};
 use tonic_prost::{ProstDecoder, ProstEncoder};
 
-/// Prost's codec for `PlayService.Play`, which also says how long each response was.
+/// Prost's codec for `PlayService.Play`, which also reports the size of each response.
 #[derive(Debug, Default)]
 pub(crate) struct PlayCodec;
 
@@ -28,7 +28,7 @@ impl Codec for PlayCodec {
     }
 }
 
-/// Decodes responses and says how many bytes each had.
+/// Decodes responses and reports their sizes in bytes.
 #[derive(Debug, Default)]
 pub(crate) struct PlayDecoder(ProstDecoder<PlayResponse>);
 
@@ -59,7 +59,7 @@ pub(crate) struct SeatUpdate {
     pub(crate) update: Option<Update>,
 }
 
-/// What a seat is told, but for snapshots, which nobody asks for here.
+/// Updates of a seat, except for snapshots, which are never requested here.
 #[derive(Clone, PartialEq, Oneof)]
 pub(crate) enum Update {
     #[prost(message, tag = "2")]
@@ -97,7 +97,7 @@ pub(crate) struct GameEvent {
     pub(crate) kind: Option<Kind>,
 }
 
-/// What happened, if it is counted here.
+/// The kinds of events that are counted.
 #[derive(Clone, PartialEq, Oneof)]
 pub(crate) enum Kind {
     #[prost(message, tag = "13")]
@@ -112,7 +112,7 @@ pub(crate) enum Kind {
     GameAborted(GameAborted),
 }
 
-/// A message of which only the coming matters.
+/// A message whose contents are ignored.
 #[derive(Clone, PartialEq, Message)]
 pub(crate) struct Nothing {}
 

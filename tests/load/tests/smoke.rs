@@ -1,5 +1,5 @@
-//! The load program works: a moment of one room, with everything it checks about itself, and a report that can be read. Nothing here
-//! depends on how fast the machine is.
+//! The load program works: a short run of one room, with its internal checks, and a valid report.
+//! Does not depend on the speed of the machine.
 
 use std::process::Command;
 
@@ -118,7 +118,7 @@ fn games_of_a_client_are_stepped_and_counted() {
 
 #[test]
 fn a_server_that_is_not_there_is_an_error() {
-    // Port 1 of the loopback needs privileges to listen on, and nobody does.
+    // Listening on port 1 needs privileges, so no server is there.
     let output = run(&["--server", "http://127.0.0.1:1", "--smoke"]);
     assert!(!output.status.success());
     assert!(output.stdout.is_empty());
