@@ -4,7 +4,8 @@
 use crate::{ActionId, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
 
 /// An event of a game. Private content is in optional fields, which [`Event::seen_by`] removes.
-/// Secret decisions, such as a declined special action, are not events. Large parts are boxed, so that the many small events stay small.
+/// Secret decisions, such as a declined special action, are not events. Large parts are boxed, so
+/// that the many small events stay small.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub enum Event {
     /// Cards were dealt.

@@ -1,9 +1,9 @@
 //! The rule engine of Chef's Hat: pure values, nothing else.
 //!
-//! A [`Game`] is created from a validated [`RuleSet`] and a [`Seed`]. It says whose decision is open
-//! ([`Game::decision`]), what is legal ([`Game::legal_actions`]) and what the rules require
-//! ([`Game::requirement`]), applies an [`ActionId`] ([`Game::apply`]), reports [`Event`]s, and gives
-//! each seat its [`Observation`]. [`Event::seen_by`] alone decides what a viewer may see.
+//! A [`Game`] is created from a validated [`RuleSet`] and a [`Seed`]. It says whose decision is
+//! open ([`Game::decision`]), what is legal ([`Game::legal_actions`]) and what the rules require
+//! ([`Game::requirement`]), applies an [`ActionId`] ([`Game::apply`]), reports [`Event`]s, and
+//! gives each seat its [`Observation`]. [`Event::seen_by`] alone decides what a viewer may see.
 //!
 //! The rules are in `docs/rules.md`; comments cite its sections as §4.3. No files, sockets, clocks,
 //! serialisation, threads, global randomness or agents live here: on every machine, a game is a

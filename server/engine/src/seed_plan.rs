@@ -1,5 +1,5 @@
-//! Where a game's seed comes from. A server commits to its part before the seats add theirs, so that
-//! anyone can check afterwards that neither chose the deals.
+//! Where a game's seed comes from. A server commits to its part before the seats add theirs, so
+//! that anyone can check afterwards that neither chose the deals.
 
 use crate::Seed;
 use sha2::{Digest as _, Sha256};
@@ -41,8 +41,8 @@ impl SeedPlan {
         }
     }
 
-    /// The game seed: SHA-256("chefshat.v1 game" ‖ server seed ‖ for each seat in order the length of
-    /// its bytes in one byte, and the bytes).
+    /// The game seed: SHA-256("chefshat.v1 game" ‖ server seed ‖ for each seat in order the length
+    /// of its bytes in one byte, and the bytes).
     ///
     /// # Panics
     /// If a seat adds more than [`MAX_ENTROPY`] bytes.

@@ -1,6 +1,6 @@
-//! A second, plain implementation of the rules: it follows a game by its events, keeps every card in
-//! a list, and decides from an action's text whether it is legal. It shares no table and no packed
-//! number with the engine.
+//! A second, plain implementation of the rules: it follows a game by its events, keeps every card
+//! in a list, and decides from an action's text whether it is legal. It shares no table and no
+//! packed number with the engine.
 
 use chefshat_engine::{Cards, DecisionKind, Event, Game, Opening, RuleSet};
 

@@ -1,5 +1,5 @@
-//! `docs/rules.md` agrees with the engine: the sections that source code cites exist, and the engine
-//! plays the example Shift.
+//! `docs/rules.md` agrees with the engine: the sections that source code cites exist, and the
+//! engine plays the example Shift.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -200,8 +200,8 @@ fn declining_a_special_action_is_hidden() {
     assert!(silent_decline(HONEST).unwrap() > 100);
 }
 
-/// Twins of which one has a seat that may declare, and declines. No other viewer can tell them apart,
-/// even while the decision is open.
+/// Twins of which one has a seat that may declare, and declines. No other viewer can tell them
+/// apart, even while the decision is open.
 fn silent_decline(view: View) -> Verdict {
     let rules = RuleSetSpec {
         players: 4,

@@ -1,5 +1,5 @@
-//! Twins: two games that differ only in cards hidden from a viewer, played by the same decisions and
-//! compared as the viewer sees them. `secrecy` creates them and states what is expected.
+//! Twins: two games that differ only in cards hidden from a viewer, played by the same decisions
+//! and compared as the viewer sees them. `secrecy` creates them and states what is expected.
 
 use chefshat_engine::{
     BySeat, Cards, DecisionKind, Event, Face, Game, Observation, RuleSet, Seat, Viewer,
@@ -19,11 +19,11 @@ pub(crate) const HONEST: View = View {
     observe: Game::observe,
 };
 
-/// What a viewer cannot tell apart, or what it can.
+/// The number of comparisons without a difference, or the first difference.
 pub(crate) type Verdict = Result<u32, String>;
 
-/// Plays twins by the same decisions while these are legal in both, and compares what the viewer sees
-/// after each. Returns the number of comparisons.
+/// Plays twins by the same decisions while these are legal in both, and compares what the viewer
+/// sees after each. Returns the number of comparisons.
 pub(crate) fn compare(
     view: View,
     viewer: Viewer,

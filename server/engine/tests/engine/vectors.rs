@@ -1,5 +1,5 @@
-//! The vectors of `tests/fixtures/vectors`: deals and games of another engine, which must match card
-//! for card.
+//! The vectors of `tests/fixtures/vectors`: deals and games of another engine, which must match
+//! card for card.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,5 @@
-//! Counts of cards by kind. Unlike the engine's `Cards` they can exceed a deck, as stated facts may.
+//! Counts of cards by kind. Unlike the engine's `Cards` they can exceed a deck, as stated facts
+//! may.
 
 use chefshat_engine::{Action, Cards, Face};
 

@@ -51,8 +51,8 @@ impl StartState {
         })
     }
 
-    /// Reads a transcript: the rows `role` and `points` of its first Shift, unless that is the first
-    /// of the game.
+    /// Reads a transcript: the rows `role` and `points` of its first Shift, unless that is the
+    /// first of the game.
     pub(super) fn of_transcript(transcript: &Transcript) -> Result<Self, TranscriptError> {
         let players = transcript.rules.players();
         let mut start = Self {

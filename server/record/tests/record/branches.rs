@@ -1,5 +1,5 @@
-//! Branches and players of records: the decisions taken over repeat the game up to the branch point,
-//! and impossible branch points are refused.
+//! Branches and players of records: the decisions taken over repeat the game up to the branch
+//! point, and impossible branch points are refused.
 
 use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, Game, RuleSet, RuleSetSpec, Script, Seat, Seed, Stop, Viewer};

@@ -1,5 +1,5 @@
-//! Import of games at real tables: a transcript of any part of a game becomes a record that verifies.
-//! Refusals are in `refused`, what is known of the hands in `known`.
+//! Import of games at real tables: a transcript of any part of a game becomes a record that
+//! verifies. Refusals are in `refused`, what is known of the hands in `known`.
 
 mod known;
 mod refused;

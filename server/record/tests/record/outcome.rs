@@ -46,8 +46,8 @@ fn standings(lines: &mut [v1::RecordLine]) -> &mut Vec<v1::Standing> {
     })
 }
 
-/// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, their time, performance
-/// score in hundredths.
+/// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, their time,
+/// performance score in hundredths.
 fn figures(outcome: &Outcome) -> Vec<[u64; 8]> {
     let seats = outcome.seats.iter().map(|seat| seat.statistics);
     seats

@@ -1,4 +1,5 @@
-//! Scenes of recorded games. What they hide, the action table and the drawings have their own modules.
+//! Scenes of recorded games. What they hide, the action table and the drawings have their own
+//! modules.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,5 @@
-//! Impossible games of real tables are refused, at the row of the transcript or the line of the record.
+//! Impossible games of real tables are refused, at the row of the transcript or the line of the
+//! record.
 
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::import::import;
@@ -54,7 +55,8 @@ fn impossible_rows_are_reported() {
     check_refused(&documented(), &cases);
 }
 
-/// Checks that every change is refused: replaced text, replacement, wrong line, part of the message.
+/// Checks that every change is refused: replaced text, replacement, wrong line, part of the
+/// message.
 fn check_refused(text: &str, cases: &[(&str, &str, usize, &str)]) {
     let mut wrong = Vec::new();
     for (found, replaced, line, words) in cases {
