@@ -61,7 +61,7 @@ pub(crate) fn recorded(name: &str) -> Vec<v1::GameEvent> {
 pub(crate) struct Dealt {
     pub(crate) game: Game,
     viewer: Viewer,
-    told: u64,
+    sent: u64,
     /// Number of decision requests so far.
     asked: u64,
 }
@@ -75,7 +75,7 @@ impl Dealt {
         let mut dealt = Self {
             game,
             viewer,
-            told: 0,
+            sent: 0,
             asked: 0,
         };
         let seats = (0u32..).zip(["Ada", "Ben", "Cleo", "Dan", "Eve", "Fay"]);
@@ -100,16 +100,16 @@ impl Dealt {
             hand_size: rules.hand_size().into(),
             ..v1::GameStarted::default()
         }));
-        let mut told = vec![dealt.numbered(start)];
-        told.extend(dealt.tell(&events));
-        (dealt, told)
+        let mut sent = vec![dealt.numbered(start)];
+        sent.extend(dealt.for_seat(&events));
+        (dealt, sent)
     }
 
     /// Applies an action; returns its events.
     pub(crate) fn apply(&mut self, action: ActionId) -> Vec<v1::GameEvent> {
         let mut events = Vec::new();
         self.game.apply(action, |event| events.push(event)).unwrap();
-        self.tell(&events)
+        self.for_seat(&events)
     }
 
     /// The request for the open decision.
@@ -132,7 +132,7 @@ impl Dealt {
         request
     }
 
-    fn tell(&mut self, events: &[Event]) -> Vec<v1::GameEvent> {
+    fn for_seat(&mut self, events: &[Event]) -> Vec<v1::GameEvent> {
         let space = self.game.rules().actions();
         let by = By {
             source: v1::DecisionSource::Agent,
@@ -150,9 +150,9 @@ impl Dealt {
     }
 
     fn numbered(&mut self, kind: Kind) -> v1::GameEvent {
-        self.told += 1;
+        self.sent += 1;
         v1::GameEvent {
-            sequence: self.told,
+            sequence: self.sent,
             kind: Some(kind),
             ..v1::GameEvent::default()
         }

@@ -1,4 +1,5 @@
-//! The table made of events agrees, at every decision of whole games, with what the engine lets the viewer observe.
+//! The state built from events agrees with the engine's observations at every decision of complete
+//! games.
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_engine::{DecisionKind, PassScope, RuleSetSpec, Seat, Viewer};
@@ -6,9 +7,9 @@ use chefshat_engine::{DecisionKind, PassScope, RuleSetSpec, Seat, Viewer};
 use super::testing::Dealt;
 use crate::narration::view::{End, GameView};
 
-/// Games of many kinds, each seen by seat 0 and by one who sees all hands.
+/// Games of many kinds, as seen by seat 0 and by a viewer of all hands.
 #[test]
-fn the_table_is_what_the_engine_says() {
+fn the_state_agrees_with_the_engine() {
     let mut decisions = 0;
     let mut finished = 0;
     for preset in RuleSetSpec::PRESETS {
@@ -41,7 +42,8 @@ fn agree(table: &GameView, dealt: &Dealt, viewer: Viewer) {
     let seen = dealt.game.observe(viewer);
     let decision = dealt.game.decision().unwrap();
     assert_eq!(table.shift, seen.shift);
-    // Before the first turn of a Shift there is no pizza to the engine, and the first is announced here.
+    // Before the first turn of a Shift the engine has no pizza, but the events have announced the
+    // first.
     assert_eq!(table.pizza, seen.pizza.max(1));
     let board = table
         .board
@@ -50,7 +52,7 @@ fn agree(table: &GameView, dealt: &Dealt, viewer: Viewer) {
     let on_board = (seen.board.face, seen.board.size, seen.board.jokers);
     let on_board = (on_board.0.into(), on_board.1.into(), on_board.2.into());
     assert_eq!(board.unwrap_or(empty), on_board);
-    // What is given is told when the whole exchange is complete.
+    // Gifts are reported when the exchange is complete.
     let complete = decision.kind == DecisionKind::Turn;
     for (index, place) in table.seats.iter().enumerate() {
         let seat = Seat::new(index);
@@ -75,7 +77,7 @@ fn agree(table: &GameView, dealt: &Dealt, viewer: Viewer) {
             assert_eq!((&hand.counts, hand.golden), (&counts, held.has_golden()));
         }
     }
-    // Whose turn it is the events say from the first turn of a Shift on.
+    // From the first turn of a Shift on, the events determine whose turn it is.
     if table.turns > 0 && complete {
         assert_eq!(table.turn, u32::try_from(decision.seat.index()).ok());
     }

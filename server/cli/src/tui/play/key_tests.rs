@@ -1,4 +1,4 @@
-//! The keys that name cards, those that go back in what happened, and those that leave, show a feeling or take a seat back.
+//! Keys that select cards, scroll the log, leave, send expressions, or take the seat back.
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::RuleSetSpec;
@@ -9,9 +9,9 @@ use super::keys::key_of;
 use super::tests::{GameSession, shifts};
 use crate::tui::screen::Key;
 
-/// In decks of any size every stack has a key of its own, which picks it, and the screen says which.
+/// With decks of any size every stack has its own key, which the screen shows.
 #[test]
-fn every_stack_has_its_key() {
+fn every_stack_has_a_key() {
     let (mut pressed, mut added) = (0, 0);
     for (faces, seed) in [(11, 3), (15, 1), (15, 4), (4, 2)] {
         let rules = RuleSetSpec { faces, ..shifts(2) };
@@ -29,7 +29,7 @@ fn every_stack_has_its_key() {
                     if !stack.joker && stack.face >= 10 {
                         assert!(session.screen().contains(&format!("{key}━┓")), "{key}");
                     }
-                    // Again: one more of them, where there are more.
+                    // The same key selects one more, if there are more.
                     let before = session.app.open.as_ref().unwrap().decision.quantity;
                     session.press(KeyCode::Char(key));
                     let after = session.app.open.as_ref().unwrap().decision.quantity;
@@ -41,7 +41,7 @@ fn every_stack_has_its_key() {
                     }
                 }
                 let request = session.dealt.request();
-                session.tell(Update::Decision(request));
+                session.receive(Update::Decision(request));
             }
             let what = session.act();
             session.answered(what);
@@ -51,7 +51,7 @@ fn every_stack_has_its_key() {
 }
 
 #[test]
-fn a_key_without_cards_says_so() {
+fn a_key_without_cards_is_explained() {
     let mut session = GameSession::new(&shifts(1), 3);
     assert!(session.until_asked());
     let held = |session: &GameSession, key| {
@@ -77,7 +77,7 @@ fn a_key_without_cards_says_so() {
 }
 
 #[test]
-fn what_happened_is_scrolled_back() {
+fn the_log_scrolls_back() {
     let mut session = GameSession::new(&shifts(2), 3);
     let mut turns = 0;
     while turns < 12 && session.until_asked() {
@@ -97,7 +97,7 @@ fn what_happened_is_scrolled_back() {
         back.contains(first) && back.contains("more after these"),
         "{back}"
     );
-    // The hand stays to be seen, and other keys give the table back before they mean anything else.
+    // The hand stays visible; other keys close the log before they do anything else.
     assert!(back.contains("your hand"), "{back}");
     session.press(KeyCode::Right);
     assert_eq!(picked(&session), before);
@@ -106,7 +106,7 @@ fn what_happened_is_scrolled_back() {
     session.press(KeyCode::PageDown);
     assert!(session.screen().contains("the pizza"));
 
-    // So it is when the game is over.
+    // The same after the end of the game.
     while session.until_asked() {
         let what = session.act();
         session.answered(what);
@@ -122,7 +122,7 @@ fn what_happened_is_scrolled_back() {
     assert!(session.screen().contains("wins the game") && !session.app.left);
 }
 
-/// In the narrowest window a line of the story is broken between words, not cut.
+/// In the narrowest window a line of the log is wrapped between words, not cut.
 #[test]
 fn long_lines_are_wrapped() {
     let mut session = GameSession::new(&shifts(1), 3);
@@ -130,7 +130,7 @@ fn long_lines_are_wrapped() {
         kind: Some(Kind::ServerRestarted(v1::ServerRestarted::default())),
         ..v1::GameEvent::default()
     };
-    session.tell(Update::Events(v1::EventBatch {
+    session.receive(Update::Events(v1::EventBatch {
         events: vec![restarted],
     }));
     let screen = session.screen();
@@ -139,7 +139,7 @@ fn long_lines_are_wrapped() {
 }
 
 #[test]
-fn leaving_asks_first() {
+fn leaving_asks_for_confirmation() {
     let mut session = GameSession::new(&shifts(1), 3);
     assert_eq!(session.press(KeyCode::Char('q')), None);
     assert_eq!(session.app.dialog, Some(Dialog::Leave));
@@ -154,7 +154,7 @@ fn leaving_asks_first() {
 }
 
 #[test]
-fn feelings_and_substitutes_have_their_keys() {
+fn expressions_and_resuming_have_keys() {
     let mut session = GameSession::new(&shifts(1), 3);
     session.press(KeyCode::Char('e'));
     assert!(session.screen().contains("surprise"));
@@ -168,7 +168,7 @@ fn feelings_and_substitutes_have_their_keys() {
         ..v1::GameEvent::default()
     };
     let events = vec![substituted];
-    session.tell(Update::Events(v1::EventBatch { events }));
+    session.receive(Update::Events(v1::EventBatch { events }));
     assert!(session.screen().contains("Press r"));
     assert_eq!(session.press(KeyCode::Char('r')), Some(Do::Resume));
 }

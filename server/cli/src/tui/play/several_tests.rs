@@ -1,4 +1,5 @@
-//! A place whose ticket has several games at a time, as one that another program had before may: one is on the screen, the others wait for it.
+//! A place with several games at a time, for example after another program used its ticket: one
+//! game is on screen, the others wait.
 
 use chefshat_client::v1::{TournamentFormat::Swiss, TournamentState::Playing};
 use ratatui::crossterm::event::KeyCode;
@@ -6,7 +7,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::part::Heard;
 use super::tournament_session::{TournamentSession, report};
 
-/// A person with three games, of which the first is on the screen.
+/// A person with three games; the first is on screen.
 fn three() -> TournamentSession {
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, Vec::new()));
@@ -17,20 +18,20 @@ fn three() -> TournamentSession {
     session
 }
 
-/// The game on the screen.
+/// The game on screen.
 fn shown(session: &TournamentSession) -> &str {
     let game = session.part.game.as_ref();
     game.map_or("", |game| &game.table.game_id)
 }
 
-/// What is told from now on is of this game.
-fn turn_to(session: &mut TournamentSession, game: &str) {
+/// Sends the following updates to this game.
+fn select_game(session: &mut TournamentSession, game: &str) {
     game.clone_into(&mut session.game);
 }
 
-/// The server asks in this game.
+/// Requests a decision in this game.
 fn ask(session: &mut TournamentSession, game: &str) {
-    turn_to(session, game);
+    select_game(session, game);
     session.now_ms += 1_000;
     assert!(session.until_asked());
 }
@@ -50,14 +51,15 @@ fn the_game_that_asks_first_is_shown() {
             .screen()
             .contains("2 other games wait · ● connected")
     );
-    // Those that ask meanwhile wait until this one has its answer, and come in the order in which they asked.
+    // Games that ask meanwhile wait until this one is answered, and follow in the order in which
+    // they asked.
     ask(&mut session, "two");
     ask(&mut session, "one");
     assert_eq!(shown(&session), "three");
     assert!(session.screen().contains("2 other games ask · ● connected"));
     let answered = ["three", "two", "one"].map(|game| {
         assert_eq!(shown(&session), game);
-        turn_to(&mut session, game);
+        select_game(&mut session, game);
         session.answer();
         shown(&session).to_owned()
     });
@@ -69,9 +71,9 @@ fn the_game_that_asks_first_is_shown() {
     );
 }
 
-/// While the person reads or is asked something else, no other game takes the screen.
+/// While the person reads or answers a dialog, no other game replaces the screen.
 #[test]
-fn what_the_person_looks_at_stays() {
+fn a_dialog_keeps_its_game_on_screen() {
     for (opens, closes) in [
         (KeyCode::PageUp, KeyCode::End),
         (KeyCode::Char('e'), KeyCode::Esc),
@@ -86,7 +88,7 @@ fn what_the_person_looks_at_stays() {
     }
 }
 
-/// None is lost: when one is over the next is shown, to the last.
+/// No game is lost: when one is over the next is shown.
 #[test]
 fn all_games_are_played_to_their_end() {
     let mut session = three();
@@ -95,7 +97,7 @@ fn all_games_are_played_to_their_end() {
         ("two", "1 other game waits"),
         ("three", "● connected"),
     ] {
-        turn_to(&mut session, game);
+        select_game(&mut session, game);
         assert_eq!(shown(&session), game);
         assert!(session.play() > 3);
         let result = session.screen();

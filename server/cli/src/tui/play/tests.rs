@@ -1,4 +1,4 @@
-//! Games played by keys alone, and what the screen shows of them.
+//! Games played by keys, and the contents of the screen.
 
 use chefshat_client::v1::{self, seat_command::Command, seat_update::Update};
 use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
@@ -14,7 +14,7 @@ use crate::tui::theme::Theme;
 
 const ME: Viewer = Viewer::Seat(Seat::new(0));
 
-/// A game and the person who plays seat 0 of it.
+/// A game whose seat 0 is played by keys.
 pub(super) struct GameSession {
     pub(super) dealt: Dealt,
     pub(super) app: App,
@@ -29,12 +29,12 @@ impl GameSession {
             app: App::new(GameView::default(), Some(0)),
             now_ms: 0,
         };
-        session.tell(Update::Attached(v1::Attached::default()));
-        session.tell(Update::Events(v1::EventBatch { events }));
+        session.receive(Update::Attached(v1::Attached::default()));
+        session.receive(Update::Events(v1::EventBatch { events }));
         session
     }
 
-    pub(super) fn tell(&mut self, update: Update) -> Option<Do> {
+    pub(super) fn receive(&mut self, update: Update) -> Option<Do> {
         let input = Input::Update(Box::new(update));
         self.app.take(input, self.now_ms)
     }
@@ -45,15 +45,16 @@ impl GameSession {
 
     pub(super) fn apply(&mut self, action: ActionId) {
         let events = self.dealt.apply(action);
-        self.tell(Update::Events(v1::EventBatch { events }));
+        self.receive(Update::Events(v1::EventBatch { events }));
     }
 
-    /// Has the others play, by default decisions or the first legal one, until the person is asked.
+    /// Lets the other seats decide, by default or the first legal action, until seat 0 has a
+    /// decision.
     pub(super) fn until_asked(&mut self) -> bool {
         while let Some(decision) = self.dealt.game.decision() {
             if decision.seat.index() == 0 {
                 let request = self.dealt.request();
-                self.tell(Update::Decision(request));
+                self.receive(Update::Decision(request));
                 return true;
             }
             let first = self.dealt.game.legal_actions().nth(0).unwrap();
@@ -62,14 +63,14 @@ impl GameSession {
         false
     }
 
-    /// Does what is picked, or passes where that cannot be done.
+    /// Takes the selected action, or passes if it is illegal.
     pub(super) fn act(&mut self) -> Do {
         let picked = self.press(KeyCode::Enter);
         let what = picked.or_else(|| self.press(KeyCode::Char('p')));
         what.expect("one of the two is legal")
     }
 
-    /// The server takes an answer.
+    /// The server processes an answer.
     pub(super) fn answered(&mut self, what: Do) {
         let Do::Answer {
             decision_id,
@@ -79,7 +80,7 @@ impl GameSession {
         else {
             panic!("{what:?} is no answer");
         };
-        self.tell(Update::Result(v1::AnswerResult {
+        self.receive(Update::Result(v1::AnswerResult {
             decision_id,
             action,
             status: v1::AnswerStatus::Accepted.into(),
@@ -102,9 +103,10 @@ pub(super) fn shifts(shifts: u32) -> RuleSetSpec {
     }
 }
 
-/// Every legal action can be picked by keys, and what is picked has an objection just when it is not legal.
+/// Every legal action can be selected by keys, and a selection has an objection exactly if it is
+/// illegal.
 #[test]
-fn whole_games_are_played_by_keys() {
+fn complete_games_are_played_by_keys() {
     let (mut kinds, mut objections) = ([0; 3], 0);
     for seed in 0..6 {
         let mut session = GameSession::new(&shifts(4), seed);
@@ -112,7 +114,7 @@ fn whole_games_are_played_by_keys() {
             let decision = session.dealt.game.decision().unwrap();
             kinds[decision.kind as usize] += 1;
             let legal = session.dealt.game.legal_actions();
-            let (reached, refused) = everything_picked(&mut session);
+            let (reached, refused) = all_selections(&mut session);
             objections += refused;
             let mut missing = legal.iter().filter(|action| !reached.contains(action));
             let pass = session.app.open.as_ref().unwrap().decision.pass();
@@ -121,9 +123,9 @@ fn whole_games_are_played_by_keys() {
             let passes = session.press(KeyCode::Char('p'));
             assert_eq!(passes.is_some(), legal.contains(pass));
             session.app.open.as_mut().unwrap().sent = false;
-            // What is picked to begin with is legal, unless there is nothing to play.
+            // The initial selection is legal, unless nothing can be played.
             let request = session.dealt.request();
-            session.tell(Update::Decision(request));
+            session.receive(Update::Decision(request));
             let what = session.act();
             session.answered(what);
             assert!(session.app.open.is_none());
@@ -141,8 +143,8 @@ fn whole_games_are_played_by_keys() {
     );
 }
 
-/// All that can be picked: the legal actions, and how many others, each with its reason.
-fn everything_picked(session: &mut GameSession) -> (Vec<ActionId>, usize) {
+/// All possible selections: the legal actions, and the number of others, each with its reason.
+fn all_selections(session: &mut GameSession) -> (Vec<ActionId>, usize) {
     let legal = session.dealt.game.legal_actions();
     let (mut reached, mut refused) = (Vec::new(), 0);
     let stacks = session.app.open.as_ref().unwrap().decision.stacks.len();
@@ -161,12 +163,12 @@ fn everything_picked(session: &mut GameSession) -> (Vec<ActionId>, usize) {
                     None => reached.push(picked),
                     Some(why) => {
                         refused += 1;
-                        // A refused key does nothing but say why.
+                        // A refused key only explains why.
                         assert_eq!(session.press(KeyCode::Enter), None);
                         assert_eq!(session.app.notice, why);
                     }
                 }
-                // In an exchange it is the key of the jokers, which would begin anew.
+                // In an exchange this is the key of the jokers, which would restart the selection.
                 if session.app.open.as_ref().unwrap().decision.kind() == v1::DecisionKind::Turn {
                     session.press(KeyCode::Char('j'));
                 }
@@ -204,7 +206,7 @@ fn a_special_action_is_declared_or_declined_by_a_key() {
 }
 
 #[test]
-fn the_screen_says_what_is_asked() {
+fn the_screen_shows_the_request() {
     let mut session = GameSession::new(&shifts(2), 3);
     assert!(session.until_asked());
     session.now_ms += 12_500;
@@ -255,7 +257,7 @@ fn windows_of_any_size_are_drawn() {
 }
 
 #[test]
-fn an_answer_that_was_lost_is_given_again() {
+fn a_lost_answer_is_sent_again() {
     let mut session = GameSession::new(&shifts(1), 3);
     assert!(session.until_asked());
     session.now_ms = 4_000;
@@ -269,27 +271,27 @@ fn an_answer_that_was_lost_is_given_again() {
         panic!("{first:?}");
     };
     assert_eq!(took_ms, 4_000);
-    // Nothing is sent twice by a person who is impatient.
+    // Repeated keys send nothing twice.
     assert_eq!(session.press(KeyCode::Enter), None);
     session.app.take(Input::Lost("gone".into()), 5_000);
     assert!(session.screen().contains("connection is lost"));
     assert_eq!(session.press(KeyCode::Enter), None);
-    session.tell(Update::Attached(v1::Attached::default()));
+    session.receive(Update::Attached(v1::Attached::default()));
     assert_eq!(session.app.link, Link::Live);
     let again = session.dealt.request();
     let again = v1::DecisionRequest {
         decision_id,
         ..again
     };
-    let answer = session.tell(Update::Decision(again));
+    let answer = session.receive(Update::Decision(again));
     assert!(
         matches!(answer, Some(Do::Answer { decision_id: id, action: same, .. }) if (id, same) == (decision_id, action))
     );
 }
 
-/// How long a person takes is recorded only where that was asked for.
+/// Times are recorded only on request.
 #[test]
-fn times_go_with_answers_only_when_asked_for() {
+fn times_are_sent_only_on_request() {
     let annotations = |took_ms, times| {
         let what = Do::Answer {
             decision_id: 1,
@@ -308,7 +310,7 @@ fn times_go_with_answers_only_when_asked_for() {
 }
 
 #[test]
-fn the_servers_word_on_an_answer_is_shown() {
+fn the_result_of_an_answer_is_shown() {
     let table = [
         (v1::AnswerStatus::Invalid, "not so", true),
         (v1::AnswerStatus::Closed, "too late", false),
@@ -325,7 +327,7 @@ fn the_servers_word_on_an_answer_is_shown() {
         else {
             panic!("an answer");
         };
-        session.tell(Update::Result(v1::AnswerResult {
+        session.receive(Update::Result(v1::AnswerResult {
             decision_id,
             action,
             status: status.into(),
@@ -339,7 +341,7 @@ fn the_servers_word_on_an_answer_is_shown() {
 }
 
 #[test]
-fn a_decision_taken_without_the_person_is_closed() {
+fn a_decision_taken_by_the_server_is_closed() {
     let mut session = GameSession::new(&shifts(1), 3);
     assert!(session.until_asked());
     let default = session.dealt.game.default_action().unwrap();
@@ -347,13 +349,13 @@ fn a_decision_taken_without_the_person_is_closed() {
     assert!(session.app.open.is_none());
     assert!(session.screen().contains("too late"));
     assert_eq!(session.press(KeyCode::Enter), None);
-    // The next question takes the words away.
+    // The next decision removes the notice.
     assert!(session.until_asked());
     assert!(!session.screen().contains("too late"));
 }
 
 #[test]
-fn the_clock_runs_into_the_bank() {
+fn the_clock_continues_with_the_bank() {
     let mut session = GameSession::new(&shifts(1), 3);
     assert!(session.until_asked());
     let table = [

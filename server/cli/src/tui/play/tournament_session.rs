@@ -1,4 +1,5 @@
-//! What the tests of a person's part of a tournament share: a tournament of eight, told by data and played by keys.
+//! Shared by the tests of a person's part of a tournament: a tournament of eight, driven by data
+//! and keys.
 
 use std::collections::BTreeMap;
 
@@ -17,11 +18,11 @@ use crate::tui::theme::Theme;
 
 pub(super) const ME: u32 = 2;
 
-/// A tournament of eight, in which the person is number 2.
+/// A tournament of eight; the person is participant 2.
 pub(super) struct TournamentSession {
     pub(super) part: Part,
     dealt: BTreeMap<String, Dealt>,
-    /// The game that is told of.
+    /// The game that receives updates.
     pub(super) game: String,
     pub(super) now_ms: u64,
 }
@@ -54,7 +55,7 @@ impl TournamentSession {
         self.hear(Heard::Report(Box::new(report)));
     }
 
-    fn tell(&mut self, update: Update) -> Option<(String, Do)> {
+    fn receive(&mut self, update: Update) -> Option<(String, Do)> {
         let game = self.game.clone();
         self.hear(Heard::Told(game, Box::new(update)))
     }
@@ -75,15 +76,15 @@ impl TournamentSession {
             ..v1::Attached::default()
         };
         self.hear(Heard::Seated(attached, None));
-        self.tell(Update::Events(v1::EventBatch { events }));
+        self.receive(Update::Events(v1::EventBatch { events }));
     }
 
     fn apply(&mut self, action: ActionId) {
         let events = self.dealt.get_mut(&self.game).unwrap().apply(action);
-        self.tell(Update::Events(v1::EventBatch { events }));
+        self.receive(Update::Events(v1::EventBatch { events }));
     }
 
-    /// Has the others decide until the person is asked.
+    /// Lets the other seats decide until the person has a decision.
     pub(super) fn until_asked(&mut self) -> bool {
         loop {
             let dealt = self.dealt.get_mut(&self.game).unwrap();
@@ -92,7 +93,7 @@ impl TournamentSession {
             };
             if decision.seat.index() == 0 {
                 let request = dealt.request();
-                self.tell(Update::Decision(request));
+                self.receive(Update::Decision(request));
                 return true;
             }
             let first = dealt.game.legal_actions().nth(0).unwrap();
@@ -100,7 +101,7 @@ impl TournamentSession {
         }
     }
 
-    /// Plays the game to its end by keys; gives the number of answers.
+    /// Plays the game to its end by keys. Returns the number of answers.
     pub(super) fn play(&mut self) -> usize {
         let mut answers = 0;
         while self.until_asked() {
@@ -110,7 +111,7 @@ impl TournamentSession {
         answers
     }
 
-    /// Answers the game that is told of, by keys.
+    /// Answers the open decision of the current game by keys.
     pub(super) fn answer(&mut self) {
         let picked = self.press(KeyCode::Enter);
         let what = picked.or_else(|| self.press(KeyCode::Char('p')));
@@ -140,7 +141,7 @@ fn participant(number: u32, name: &str) -> v1::TournamentParticipant {
         }
         .into(),
         connected: number != 5,
-        // The first can play two games at a time.
+        // The first participant can play two games at a time.
         max_games: if number == 0 { 2 } else { 1 },
         ..v1::TournamentParticipant::default()
     }

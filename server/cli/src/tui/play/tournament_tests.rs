@@ -1,5 +1,5 @@
-//! A person's part of a tournament, told by data and played by keys: the lobby, games one after the other, results between them, leaving. Several
-//! games at a time are in `several_tests`.
+//! A person's part of a tournament, driven by data and keys: the lobby, consecutive games, results
+//! between them, leaving. Several games at a time are in `several_tests`.
 
 use chefshat_client::v1;
 use ratatui::crossterm::event::KeyCode;
@@ -15,7 +15,7 @@ use v1::TournamentGameState::{Counted, Due, Playing as Called};
 use v1::TournamentState::{Closed, Finished, Open, Playing};
 
 #[test]
-fn games_follow_each_other_with_result_and_standings_between() {
+fn games_follow_each_other_with_results_between() {
     let mut session = TournamentSession::new();
     assert!(session.screen().contains("Waiting for the server"));
     session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
@@ -24,7 +24,7 @@ fn games_follow_each_other_with_result_and_standings_between() {
     assert!(session.screen().contains("your hand"));
     assert!(session.play() > 3);
 
-    // The result stays for a while, with how the person stands.
+    // The result stays for a while, with the person's standing.
     let result = session.screen();
     assert!(result.contains("3rd of 8, score 2.00"), "{result}");
     session.now_ms += 11_000;
@@ -38,7 +38,8 @@ fn games_follow_each_other_with_result_and_standings_between() {
         session.screen()
     );
 
-    // The next game begins by itself; one that begins while a result is shown waits a little, and less once it asks.
+    // The next game starts by itself. A game that starts while a result is shown waits a little,
+    // and less once it has a decision.
     session.seated("game two");
     assert!(session.play() > 3);
     session.seated("game three");
@@ -74,7 +75,7 @@ fn games_follow_each_other_with_result_and_standings_between() {
 }
 
 #[test]
-fn the_lobby_says_what_comes() {
+fn the_lobby_shows_what_comes_next() {
     let mine = [0, 1, ME, 5];
     let others = [3, 4, 6, 7];
     let table = [
@@ -133,9 +134,9 @@ fn the_lobby_says_what_comes() {
     }
 }
 
-/// Leaving asks where that can lose something, and only there.
+/// Leaving asks for confirmation only if it may lose something.
 #[test]
-fn leaving_asks_while_games_are_to_come() {
+fn leaving_asks_while_games_remain() {
     let mine = [0, 1, ME, 5];
     let table = [
         (report(Swiss, Open, vec![]), true),
@@ -166,7 +167,7 @@ fn leaving_asks_while_games_are_to_come() {
 }
 
 #[test]
-fn standings_are_looked_at_while_a_game_goes_on() {
+fn standings_are_shown_during_a_game() {
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, vec![]));
     session.seated("game one");
@@ -179,13 +180,13 @@ fn standings_are_looked_at_while_a_game_goes_on() {
     session.press(KeyCode::Enter);
     assert!(session.screen().contains("your hand"));
     session.press(KeyCode::Char('s'));
-    // Being asked ends it.
+    // A new decision closes them.
     assert!(session.until_asked());
     assert!(session.screen().contains("Your turn"));
 }
 
 #[test]
-fn a_connection_or_a_game_that_is_lost_is_shown() {
+fn lost_connections_and_games_are_shown() {
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, vec![]));
     session.hear(Heard::Lost("gone".into()));
@@ -208,7 +209,7 @@ fn a_connection_or_a_game_that_is_lost_is_shown() {
     );
     session.press(KeyCode::Enter);
     assert!(session.part.left);
-    // The end may be told before the last report is.
+    // The end may arrive before the last report.
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
     session.hear(Heard::Unfollowed("unknown".into()));
@@ -219,7 +220,7 @@ fn a_connection_or_a_game_that_is_lost_is_shown() {
         "{screen}"
     );
     assert!(!screen.contains("next game"), "{screen}");
-    // With a ticket that opens nothing there is nothing to show.
+    // With an invalid ticket there is nothing to show.
     let mut part = Part::new(None);
     part.take(Heard::Over(Some("unknown".into())), 0);
     assert!(part.left);

@@ -1,4 +1,4 @@
-//! A reel is wound by keys over a recorded game.
+//! Moving through a recorded game by keys.
 
 use chefshat_client::v1::{self, game_event::Kind, record_line};
 use ratatui::crossterm::event::KeyCode;
@@ -23,7 +23,7 @@ fn screen(reel: &Reel) -> String {
 }
 
 #[test]
-fn every_moment_is_the_same_from_both_sides() {
+fn every_moment_is_the_same_forwards_and_back() {
     let mut forth = reel();
     press(&mut forth, KeyCode::Home);
     let mut moments = vec![format!("{:?}", forth.table)];
@@ -69,7 +69,7 @@ fn the_reel_runs_stops_and_jumps() {
 }
 
 #[test]
-fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
+fn a_record_that_does_not_replay_is_refused_and_drawing_is_bounded() {
     let lines = lines("fixed.jsonl");
     assert!(of_record(lines.clone()).is_ok());
     let plays = |line: &v1::RecordLine| match &line.line {
@@ -91,7 +91,7 @@ fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
             panic!("a play");
         };
         spoil(play);
-        // A live game is drawn as it comes, whatever the server says.
+        // A live game is drawn as received, whatever the server sends.
         let mut reel = Reel::live(GameView::default());
         for line in &bad[..=at] {
             if let Some(record_line::Line::Event(event)) = &line.line {
@@ -106,7 +106,7 @@ fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
 }
 
 #[test]
-fn a_live_game_is_followed_unless_it_is_stopped() {
+fn a_live_game_is_followed_until_it_is_paused() {
     let mut reel = Reel::live(GameView::default());
     let mut events = recorded("fixed.jsonl").into_iter();
     for event in events.by_ref().take(20) {
@@ -129,7 +129,7 @@ fn a_live_game_is_followed_unless_it_is_stopped() {
 }
 
 #[test]
-fn the_screens_are_as_kept() {
+fn the_screens_match_the_committed_ones() {
     let mut reel = reel();
     for _ in 0..30 {
         press(&mut reel, KeyCode::Right);
