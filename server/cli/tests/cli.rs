@@ -20,7 +20,6 @@ mod cli {
     mod render;
     mod room;
     mod run;
-    mod server;
     mod simulate;
     mod terminal;
     mod tournament;

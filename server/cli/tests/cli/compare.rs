@@ -16,7 +16,7 @@ const SMALL: &str = concat!(
 );
 
 fn compare(a: &str, b: &str, flags: &str) -> Ended {
-    typed(&["compare", a, b], flags)
+    typed(&format!("compare {a} {b} {flags}"))
 }
 
 fn json(a: &str, b: &str, flags: &str) -> Value {
@@ -147,5 +147,5 @@ fn mistakes_are_explained() {
 
 #[test]
 fn help_shows_an_example() {
-    typed(&["compare"], "--help").assert_helps("chefshat compare greedy random");
+    typed("compare --help").assert_helps("chefshat compare greedy random");
 }

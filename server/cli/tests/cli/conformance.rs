@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::chefshat;
+use super::run::{Ended, chefshat, fixture};
 
 fn vectors(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/fixtures/vectors")
-        .join(file)
+    fixture(&format!("vectors/{file}"))
 }
 
 /// Copies the first lines of a file of vectors and changes the last one.
@@ -27,7 +25,7 @@ fn damaged(folder: &TempDir, file: &str, lines: usize, damage: impl FnOnce(&mut 
     path
 }
 
-fn conformance(path: &Path, flags: &[&str]) -> super::run::Ended {
+fn conformance(path: &Path, flags: &[&str]) -> Ended {
     let mut arguments = vec!["conformance", path.to_str().unwrap()];
     arguments.extend(flags);
     chefshat(&arguments)
@@ -43,8 +41,7 @@ fn the_vectors_agree() {
         ),
         ("deals.jsonl", "all agree: 87 deals", (87, 0, 0)),
     ] {
-        let ended = conformance(&vectors(file), &[]);
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{file}");
+        let ended = conformance(&vectors(file), &[]).clean();
         assert!(
             ended.stdout.trim_end().ends_with(expected),
             "{}",
@@ -53,7 +50,7 @@ fn the_vectors_agree() {
 
         let ended = conformance(&vectors(file), &["--json"]);
         assert_eq!(ended.code, Some(0), "{file}");
-        let result: Value = serde_json::from_str(&ended.stdout).unwrap();
+        let result = ended.json();
         assert_eq!(
             (
                 &result["agree"],
@@ -79,8 +76,7 @@ fn the_first_wrong_vector_is_reported() {
     let path = damaged(&folder, "games.jsonl", 3, |game| {
         game["steps"][5][2] = json!([1, 199])
     });
-    let ended = conformance(&path, &[]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    let ended = conformance(&path, &[]).ended_with(1);
     for expected in [
         "line 3, step 5",
         "where     steps[5], legal actions",
@@ -88,16 +84,12 @@ fn the_first_wrong_vector_is_reported() {
         "got       [",
         "before it: 2 games",
     ] {
-        assert!(
-            ended.stdout.contains(expected),
-            "{expected}: {}",
-            ended.stdout
-        );
+        ended.assert_says(&[expected]);
     }
 
     let ended = conformance(&path, &["--json"]);
     assert_eq!(ended.code, Some(1));
-    let result: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let result = ended.json();
     assert_eq!(
         (&result["agree"], &result["games"]),
         (&json!(false), &json!(2))
@@ -143,13 +135,7 @@ fn other_files_are_refused() {
     ];
     for (path, expected) in table {
         let ended = conformance(&path, &[]);
-        assert_eq!(
-            (ended.code, ended.stdout.as_str()),
-            (Some(1), ""),
-            "{}",
-            path.display()
-        );
-        assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+        ended.assert_failed(expected);
         assert!(
             ended.stderr.contains(path.to_str().unwrap()),
             "{}",

@@ -5,20 +5,15 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat};
+use super::run::{Ended, json_lines, typed};
 
-fn demo(folder: &Path, flags: &[&str]) -> Ended {
-    let mut arguments = vec!["demo", "--data-dir", folder.to_str().unwrap()];
-    arguments.extend(flags);
-    chefshat(&arguments)
+fn demo(folder: &Path, flags: &str) -> Ended {
+    typed(&format!("demo --data-dir {} {flags}", folder.display()))
 }
 
 /// The lines of a record.
 fn record(path: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(path).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+    json_lines(&std::fs::read_to_string(path).unwrap())
 }
 
 /// Seat and points of the final standings of a record, best first.
@@ -65,8 +60,7 @@ fn section<'a>(text: &'a str, heading: &str) -> Vec<&'a str> {
 #[test]
 fn a_game_is_narrated_to_its_end() {
     let folder = TempDir::new().unwrap();
-    let ended = demo(folder.path(), &["--seed", "3"]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let ended = demo(folder.path(), "--seed 3").clean();
     assert!(!ended.stdout.contains('\u{1b}'), "no colours in a pipe");
     for line in ended.stdout.lines() {
         assert!(line.chars().count() <= 100, "{line}");
@@ -113,11 +107,7 @@ fn colours_can_be_forced() {
         .output()
         .unwrap();
     assert!(output.status.success());
-    assert!(
-        String::from_utf8(output.stdout)
-            .unwrap()
-            .contains("\u{1b}[")
-    );
+    assert!(String::from_utf8_lossy(&output.stdout).contains("\u{1b}["));
 }
 
 #[test]
@@ -125,14 +115,10 @@ fn programs_read_every_line() {
     let folder = TempDir::new().unwrap();
     let ended = demo(
         folder.path(),
-        &["--json", "--agents", "random_unmasked,greedy,random"],
-    );
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
-    let lines: Vec<Value> = ended
-        .stdout
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+        "--json --agents random_unmasked,greedy,random",
+    )
+    .clean();
+    let lines = ended.json_lines();
     let (first, rest) = lines.split_first().unwrap();
     let (last, events) = rest.split_last().unwrap();
     assert_eq!(first["event"], "listening");
@@ -175,45 +161,35 @@ fn programs_read_every_line() {
 
 #[test]
 fn a_seed_repeats_the_game() {
-    let game = |flags: &[&str]| -> Vec<Value> {
+    let game = |flags: &str| -> Vec<Value> {
         let folder = TempDir::new().unwrap();
-        let ended = demo(folder.path(), flags);
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+        demo(folder.path(), flags).clean();
         record(&only_record(folder.path()))
             .into_iter()
             .filter_map(|line| line.get("decision").cloned())
             .map(|decision| json!([decision["seat"], decision["text"], decision["actionMask"]]))
             .collect()
     };
-    let first = game(&["--seed", "5"]);
+    let first = game("--seed 5");
     assert!(first.len() > 100, "a game has many decisions");
-    assert_eq!(first, game(&["--seed", "5"]));
-    assert_ne!(first, game(&["--seed", "6"]));
+    assert_eq!(first, game("--seed 5"));
+    assert_ne!(first, game("--seed 6"));
 }
 
 #[test]
 fn invalid_options_are_explained() {
     let folder = TempDir::new().unwrap();
     for (flags, words) in [
-        (
-            vec!["--agents", "greedy,random", "--players", "3"],
-            "2 agents",
-        ),
-        (
-            vec!["--agents", "greedy"],
-            "--agents names 1 agent; name 2 to 6",
-        ),
-        (vec!["--faces", "3"], "--faces: "),
-        (vec!["--max-turns", "0"], "--max-turns is 0"),
+        ("--agents greedy,random --players 3", "2 agents"),
+        ("--agents greedy", "--agents names 1 agent; name 2 to 6"),
+        ("--faces 3", "--faces: "),
+        ("--max-turns 0", "--max-turns is 0"),
     ] {
-        let ended = demo(folder.path(), &flags);
-        assert_eq!(ended.code, Some(1), "{flags:?}");
-        assert!(ended.stderr.contains(words), "{}", ended.stderr);
-        assert_eq!(ended.stdout, "");
+        demo(folder.path(), flags).assert_failed(words);
     }
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
-    let ended = demo(&file, &[]);
+    let ended = demo(&file, "");
     assert_eq!(ended.code, Some(1));
-    assert!(ended.stderr.contains("--data-dir"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("--data-dir"), "{ended:?}");
 }

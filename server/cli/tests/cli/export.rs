@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat};
+use super::run::{Ended, chefshat, typed};
 
 /// A folder that contains a data folder with simulated records.
 struct Stage {
@@ -18,8 +18,7 @@ impl Stage {
         let stage = Self {
             folder: tempfile::tempdir().unwrap(),
         };
-        let ended = simulate(games, &stage.path("data/records"));
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        simulate(games, &stage.path("data/records")).well();
         stage
     }
 
@@ -51,22 +50,9 @@ fn text(path: &Path) -> &str {
 }
 
 fn simulate(games: u32, records: &Path) -> Ended {
-    let games = games.to_string();
-    chefshat(&[
-        "simulate",
-        "--games",
-        &games,
-        "--seed",
-        "7",
-        "--agents",
-        "greedy,random_unmasked,random,random",
-        "--reward",
-        "paper",
-        "--max-invalid-attempts",
-        "20",
-        "--records",
-        text(records),
-    ])
+    let agents = "greedy,random_unmasked,random,random --max-invalid-attempts 20";
+    let line = format!("simulate --games {games} --seed 7 --reward paper --agents {agents}");
+    typed(&format!("{line} --records {}", text(records)))
 }
 
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -95,19 +81,13 @@ fn simulated_games_have_records_that_verify() {
         assert_eq!(*name, format!("{id}.jsonl"));
         assert!(String::from_utf8_lossy(content).contains("DECISION_SOURCE_INVALID"));
     }
-    let verified = chefshat(&["verify", text(&records)]);
-    assert_eq!(verified.code, Some(0), "{verified:?}");
+    chefshat(&["verify", text(&records)]).well();
     // The same batch writes the same records and prints the same.
     let again = simulate(4, &stage.path("again"));
     assert_eq!(contents(&stage.path("again")), first);
     assert_eq!(simulate(4, &stage.path("more")), again);
-    let refused = chefshat(&[
-        "simulate",
-        "--max-invalid-attempts",
-        "1001",
-        "--records",
-        text(&stage.path("none")),
-    ]);
+    let none = format!("--records {}", text(&stage.path("none")));
+    let refused = typed(&format!("simulate --max-invalid-attempts 1001 {none}"));
     assert_eq!(refused.code, Some(1));
     assert!(refused.stderr.contains("at most 1000"), "{refused:?}");
     assert!(!stage.path("none").exists());
@@ -116,10 +96,9 @@ fn simulated_games_have_records_that_verify() {
 #[test]
 fn a_dataset_is_exported_from_the_data_folder() {
     let stage = Stage::new(2);
-    let ended = stage.export("");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = stage.export("").well();
     assert_eq!(ended.stderr, "");
-    assert!(ended.stdout.contains(": 2 games, "), "{}", ended.stdout);
+    ended.assert_says(&[": 2 games, "]);
     let standard = [
         "README.md",
         "SHA256SUMS",
@@ -127,9 +106,10 @@ fn a_dataset_is_exported_from_the_data_folder() {
         "expressions.parquet",
     ];
     assert_eq!(stage.out(), standard);
-    let ended = stage.export("--format csv,jsonl --format csv --force --json --licence CC0-1.0");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let ended = stage
+        .export("--format csv,jsonl --format csv --force --json --licence CC0-1.0")
+        .well();
+    let said = ended.json();
     assert_eq!(said["games"], 2);
     assert_eq!(said["finished"], 2);
     assert_eq!(said["files"].as_array().unwrap().len(), 5);
@@ -154,8 +134,7 @@ fn a_dataset_is_exported_from_the_data_folder() {
 #[test]
 fn the_chefshatgym_layout_has_a_file_for_each_game() {
     let stage = Stage::new(2);
-    let ended = stage.export("--layout chefshatgym");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    stage.export("--layout chefshatgym").well();
     let mut expected: Vec<String> = contents(&stage.path("data/records"))
         .into_iter()
         .map(|(name, _)| name.trim_end_matches(".jsonl").to_owned())
@@ -184,12 +163,11 @@ fn damaged_records_are_reported_or_skipped() {
     );
     assert!(ended.stderr.contains("--skip-damaged"), "{ended:?}");
     assert!(!stage.path("out").exists());
-    let ended = stage.export("--skip-damaged");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = stage.export("--skip-damaged").well();
     assert!(ended.stderr.contains("left out: ") && ended.stderr.contains(&name));
     assert!(ended.stdout.contains(": 1 game, "));
     let ended = stage.export("--skip-damaged --force --json");
-    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let said = ended.json();
     assert!(
         said["left_out"][0]["path"]
             .as_str()
@@ -208,12 +186,8 @@ fn only_a_dataset_is_replaced() {
     let before = contents(&stage.path("out"));
     assert_eq!(before.len(), 5);
     let ended = stage.export("--force");
-    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    assert!(
-        ended.stderr.contains(
-            "it is not only a dataset: it contains notes.txt, which SHA256SUMS does not list"
-        ),
-        "{ended:?}"
+    ended.assert_failed(
+        "it is not only a dataset: it contains notes.txt, which SHA256SUMS does not list",
     );
     assert_eq!(contents(&stage.path("out")), before);
     std::fs::remove_file(&notes).unwrap();
@@ -224,9 +198,8 @@ fn only_a_dataset_is_replaced() {
 fn a_folder_named_like_a_record_is_ignored() {
     let stage = Stage::new(1);
     std::fs::create_dir(stage.path("data/records/old.jsonl")).unwrap();
-    let ended = stage.export("");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    assert!(ended.stdout.contains(": 1 game, "), "{}", ended.stdout);
+    let ended = stage.export("").well();
+    ended.assert_says(&[": 1 game, "]);
     let named = stage.path("data/records/old.jsonl");
     let ended = stage.export(&format!("--force {}", text(&named)));
     assert_eq!(ended.code, Some(1));
@@ -260,10 +233,7 @@ fn mistakes_are_explained() {
         ("missing", "missing: No such file"),
     ];
     for (flags, expected) in table {
-        let ended = stage.export(flags);
-        assert!(matches!(ended.code, Some(1 | 2)), "{flags}: {ended:?}");
-        assert!(ended.stderr.contains(expected), "{flags}: {}", ended.stderr);
-        assert_eq!(ended.stdout, "", "{flags}");
+        stage.export(flags).assert_refused(expected);
     }
     let (nothing, out) = (stage.path("nothing"), stage.path("other"));
     let ended = chefshat(&["export", "--data-dir", text(&nothing), "--out", text(&out)]);
@@ -276,11 +246,5 @@ fn mistakes_are_explained() {
 
 #[test]
 fn help_shows_an_example() {
-    let help = chefshat(&["export", "--help"]);
-    assert_eq!(help.code, Some(0));
-    assert!(
-        help.stdout.contains("chefshat export --out dataset"),
-        "{}",
-        help.stdout
-    );
+    typed("export --help").assert_helps("chefshat export --out dataset");
 }

@@ -3,10 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat};
+use super::run::{Ended, chefshat, fixture, json_lines};
 
 /// A complete transcript of a game of two players.
 pub(super) const TRANSCRIPT: &str = "\
@@ -22,12 +21,6 @@ shift,seat,what,value
 1,1,passes,
 1,0,plays,1
 ";
-
-fn fixture(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/fixtures/records")
-        .join(file)
-}
 
 fn transcript(folder: &TempDir, text: &str) -> PathBuf {
     let path = folder.path().join("table.csv");
@@ -48,9 +41,8 @@ fn a_transcript_becomes_a_record_that_verifies() {
     let data_dir = folder.path().join("data");
     let flags = ["--data-dir", data_dir.to_str().unwrap()];
 
-    let ended = import(&file, &[&flags[..], &["--json"]].concat());
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
-    let told: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let ended = import(&file, &[&flags[..], &["--json"]].concat()).clean();
+    let told = ended.json();
     let game_id = told["game_id"].as_str().unwrap();
     let path = data_dir.join("records").join(format!("{game_id}.jsonl"));
     assert_eq!(told["file"], path.to_str().unwrap());
@@ -63,8 +55,7 @@ fn a_transcript_becomes_a_record_that_verifies() {
         )
     );
 
-    let ended = chefshat(&["verify", flags[0], flags[1]]);
-    assert_eq!(ended.code, Some(0), "{}", ended.stdout);
+    let ended = chefshat(&["verify", flags[0], flags[1]]).well();
     assert!(
         ended
             .stdout
@@ -76,8 +67,7 @@ fn a_transcript_becomes_a_record_that_verifies() {
     // The same transcript is the same game.
     let before = std::fs::read(&path).unwrap();
     let ended = import(&file, &flags);
-    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    assert!(ended.stderr.contains("exists already"), "{}", ended.stderr);
+    ended.assert_failed("exists already");
     assert_eq!(std::fs::read(&path).unwrap(), before);
 }
 
@@ -87,12 +77,8 @@ fn an_impossible_row_is_reported_and_nothing_is_written() {
     let file = transcript(&folder, &TRANSCRIPT.replace("1,0,plays,3 3", "1,0,plays,3"));
     let out = folder.path().join("out");
     let ended = import(&file, &["--out", out.to_str().unwrap()]);
-    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    assert!(
-        ended.stderr.contains("table.csv: line 9: ") && ended.stderr.contains("at least 2 cards"),
-        "{}",
-        ended.stderr
-    );
+    ended.assert_failed("table.csv: line 9: ");
+    ended.assert_failed("at least 2 cards");
     assert!(!out.exists());
 }
 
@@ -101,36 +87,20 @@ fn a_record_of_another_server_is_verified_and_added() {
     let folder = tempfile::tempdir().unwrap();
     let data_dir = folder.path().join("data");
     let flags = ["--data-dir", data_dir.to_str().unwrap()];
-    let ended = import(&fixture("committed.jsonl"), &flags);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let ended = import(&fixture("records/committed.jsonl"), &flags).clean();
     let placed = data_dir.join("records/22b73f3bba773c1120e1858de68cd801.jsonl");
-    assert!(
-        ended.stdout.contains(placed.to_str().unwrap()),
-        "{}",
-        ended.stdout
-    );
-    let values = |path: &Path| -> Vec<Value> {
-        let text = std::fs::read_to_string(path).unwrap();
-        let lines = text.lines();
-        lines
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
-    };
-    assert_eq!(values(&placed), values(&fixture("committed.jsonl")));
+    ended.assert_says(&[placed.to_str().unwrap()]);
+    let values = |path: &Path| json_lines(&std::fs::read_to_string(path).unwrap());
+    assert_eq!(values(&placed), values(&fixture("records/committed.jsonl")));
 
     let damaged = folder.path().join("damaged.jsonl");
-    let text = std::fs::read_to_string(fixture("fixed.jsonl")).unwrap();
+    let text = std::fs::read_to_string(fixture("records/fixed.jsonl")).unwrap();
     std::fs::write(
         &damaged,
         text.replacen("\"sequence\":\"5\"", "\"sequence\":\"6\"", 1),
     )
     .unwrap();
     let ended = import(&damaged, &flags);
-    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    assert!(
-        ended.stderr.contains("sequence is 6 and must be 5"),
-        "{}",
-        ended.stderr
-    );
+    ended.assert_failed("sequence is 6 and must be 5");
     assert_eq!(data_dir.join("records").read_dir().unwrap().count(), 1);
 }

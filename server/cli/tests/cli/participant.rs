@@ -8,8 +8,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::import::TRANSCRIPT;
-use super::run::{Ended, chefshat};
-use super::server::{run, serve, serve_with};
+use super::run::{Ended, chefshat, json_lines, run, serve, serve_with};
 
 /// The participant. Letters beyond ASCII test that names are compared as text.
 const NAME: &str = "Rosa Müßig";
@@ -143,12 +142,6 @@ fn assert_nowhere(folder: &Path, text: &str) -> usize {
     files
 }
 
-fn values(text: &str) -> Vec<Value> {
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
-}
-
 #[test]
 fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
     let folder = TempDir::new().unwrap();
@@ -193,17 +186,12 @@ fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
     check_remaining(&data_dir, &game_id, pseudonym);
 
     let again = participant(&["delete", NAME, "--yes"], &data_dir);
-    assert_eq!(again.code, Some(1));
-    assert!(
-        again.stderr.contains("nothing is stored"),
-        "{}",
-        again.stderr
-    );
+    again.assert_failed("nothing is stored");
 }
 
 /// The export has all data of the participant and none of the other.
 fn check_export(text: &str, game_id: &str, told: &Value) {
-    let lines = values(text);
+    let lines = json_lines(text);
     assert_eq!(lines[0]["participant"]["name"], NAME);
     let of =
         |key: &str| -> Vec<&Value> { lines.iter().filter(|line| !line[key].is_null()).collect() };
@@ -223,7 +211,7 @@ fn check_export(text: &str, game_id: &str, told: &Value) {
 }
 
 fn exported_annotations(out: &Path) -> Value {
-    let lines = values(&std::fs::read_to_string(out).unwrap());
+    let lines = json_lines(&std::fs::read_to_string(out).unwrap());
     let annotated = |line: &&Value| !line["decision"]["annotations"].is_null();
     json!(lines.iter().filter(annotated).count())
 }
@@ -235,7 +223,7 @@ fn check_remaining(data_dir: &Path, game_id: &str, pseudonym: &str) {
     assert!(text.contains(&format!("as {OTHER}")));
     assert!(text.contains(&format!("said by {OTHER}")));
     assert!(text.contains(&format!("{pseudonym}’s table")));
-    let file = values(&text);
+    let file = json_lines(&text);
     let (_server, url) = serve(data_dir);
     let (record, rated) = in_runtime(async {
         let client = Client::connect(&url).await.unwrap();
@@ -345,7 +333,7 @@ fn a_damaged_file_is_reported_if_it_contains_the_name() {
         assert!(ended.stderr.contains("1-damaged.jsonl"), "{ended:?}");
         assert!(!ended.stdout.is_empty(), "{ended:?}");
     }
-    let exported = values(&std::fs::read_to_string(&out).unwrap());
+    let exported = json_lines(&std::fs::read_to_string(&out).unwrap());
     assert_eq!(exported[0]["participant"]["name"], "Ana");
     assert!(exported.len() > 2);
     let rewritten = std::fs::read_to_string(&file).unwrap();
@@ -353,12 +341,7 @@ fn a_damaged_file_is_reported_if_it_contains_the_name() {
 
     std::fs::remove_file(&damaged).unwrap();
     let again = participant(&delete[..3], &data_dir);
-    assert_eq!(again.code, Some(1));
-    assert!(
-        again.stderr.contains("nothing is stored"),
-        "{}",
-        again.stderr
-    );
+    again.assert_failed("nothing is stored");
 }
 
 #[test]
@@ -367,7 +350,7 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_the_database() {
     let data_dir = folder.path().join("data");
     let (file, game_id) = real_table(&data_dir);
     let (server, url) = serve_with(&data_dir, &["--allow-import"]);
-    assert!(run(&url, &["records", "import", &file]).status.success());
+    run(&url, &format!("records import {file}")).well();
     drop(server);
     let before = std::fs::read(&file).unwrap();
 
@@ -380,7 +363,7 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_the_database() {
     assert_nowhere(&data_dir, "\"Ana\"");
     verify(&data_dir);
     let names = |text: &str| -> Vec<Value> {
-        let seats = values(text)[0]["header"]["seats"].clone();
+        let seats = json_lines(text)[0]["header"]["seats"].clone();
         let seats = seats.as_array().unwrap();
         seats.iter().map(|seat| seat["name"].clone()).collect()
     };
@@ -396,8 +379,8 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_the_database() {
     assert_eq!(again["pseudonym"], deleted["pseudonym"]);
     assert_eq!(std::fs::read_to_string(&file).unwrap(), rewritten);
     let (_server, url) = serve(&data_dir);
-    let got = run(&url, &["records", "get", &game_id]);
-    assert_eq!(names(std::str::from_utf8(&got.stdout).unwrap()), expected);
+    let got = run(&url, &format!("records get {game_id}"));
+    assert_eq!(names(&got.stdout), expected);
 }
 
 #[test]

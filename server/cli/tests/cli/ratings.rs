@@ -1,19 +1,13 @@
 //! `chefshat ratings`: a leaderboard from records, each game counted once.
 
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::chefshat;
-use super::server::{json as json_of, run, serve};
+use super::run::{chefshat, fixture, run, serve};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
-
-fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records")
-}
 
 /// Plays a number of games of built-in agents on a server. Returns its data folder and its
 /// leaderboard.
@@ -21,10 +15,8 @@ fn played(games: usize) -> (TempDir, Value) {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     for _ in 0..games {
-        let mut create = vec!["room", "create", "--target-shifts", "1"];
-        create.extend(AGENTS.iter().flat_map(|agent| ["--seat", agent]));
-        let made = run(&url, &create);
-        assert_eq!(made.status.code(), Some(0), "{made:?}");
+        let seats = AGENTS.map(|agent| format!(" --seat {agent}")).concat();
+        run(&url, &format!("room create --target-shifts 1{seats}")).well();
     }
     let records = folder.path().join("records");
     let long_enough = Instant::now() + Duration::from_secs(60);
@@ -37,7 +29,7 @@ fn played(games: usize) -> (TempDir, Value) {
         assert!(Instant::now() < long_enough, "the games were not filed");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let board = json_of(&run(&url, &["leaderboard", "--json"]));
+    let board = run(&url, "leaderboard --json").json();
     (folder, board)
 }
 
@@ -45,7 +37,7 @@ fn played(games: usize) -> (TempDir, Value) {
 fn a_leaderboard_is_recomputed_from_the_records() {
     let (folder, board) = played(12);
     let data_dir = folder.path().to_str().unwrap();
-    let fixtures = fixtures();
+    let fixtures = fixture("records");
     let records = folder.path().join("records");
     let (records, fixtures) = (records.to_str().unwrap(), fixtures.to_str().unwrap());
     // A folder with each record twice counts each game once.
@@ -104,9 +96,9 @@ fn a_leaderboard_is_recomputed_from_the_records() {
 fn damaged_records_are_reported_and_skipped_on_request() {
     let folder = TempDir::new().unwrap();
     let damaged = folder.path().join("damaged.jsonl");
-    let whole = std::fs::read_to_string(fixtures().join("fixed.jsonl")).unwrap();
+    let whole = std::fs::read_to_string(fixture("records").join("fixed.jsonl")).unwrap();
     std::fs::write(&damaged, whole.replace("\"place\":2", "\"place\":3")).unwrap();
-    let (damaged, fixtures) = (damaged.to_str().unwrap(), fixtures());
+    let (damaged, fixtures) = (damaged.to_str().unwrap(), fixture("records"));
     let fixtures = fixtures.to_str().unwrap();
     let refused = chefshat(&["ratings", damaged, fixtures]);
     refused.assert_refused("damaged.jsonl: ");

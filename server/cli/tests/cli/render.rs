@@ -1,28 +1,20 @@
 //! `chefshat render`: complete files of the requested size; errors give advice and leave no file.
 //! The contents of pictures are tested in `chefshat-render`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat};
+use super::run::{Ended, fixture, typed};
 
 const DOCS: &str = include_str!("../../../../docs/pictures.md");
 
-fn fixture(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/fixtures/records")
-        .join(file)
-}
-
 /// Draws the record of three players, small.
-fn render(out: &Path, flags: &[&str]) -> Ended {
-    let record = fixture("fixed.jsonl");
-    let mut arguments = vec!["render", record.to_str().unwrap()];
-    arguments.extend(["--out", out.to_str().unwrap(), "--width", "320"]);
-    arguments.extend(flags);
-    chefshat(&arguments)
+fn render(out: &Path, flags: &str) -> Ended {
+    let (record, out) = (fixture("records/fixed.jsonl"), out.display());
+    let record = record.display();
+    typed(&format!("render {record} --out {out} --width 320 {flags}"))
 }
 
 fn files_in(folder: &TempDir) -> Vec<String> {
@@ -45,14 +37,13 @@ fn png_size(bytes: &[u8]) -> (u32, u32) {
 fn pictures_have_the_requested_size() {
     let folder = TempDir::new().unwrap();
     for (name, flags, height) in [
-        ("end.png", &[][..], 200),
-        ("seat.png", &["--at", "57", "--seat", "2"], 200),
-        ("shift.png", &["--shift", "1", "--spectator"], 200),
-        ("figure.PNG", &["--at", "57", "--figure", "actions"], 226),
+        ("end.png", "", 200),
+        ("seat.png", "--at 57 --seat 2", 200),
+        ("shift.png", "--shift 1 --spectator", 200),
+        ("figure.PNG", "--at 57 --figure actions", 226),
     ] {
         let out = folder.path().join(name);
-        let ended = render(&out, flags);
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{name}");
+        let ended = render(&out, flags).clean();
         let bytes = std::fs::read(&out).unwrap();
         assert_eq!(png_size(&bytes), (320, height), "{name}");
         let told = format!("{}: 320 × {height}, {} bytes\n", out.display(), bytes.len());
@@ -61,17 +52,17 @@ fn pictures_have_the_requested_size() {
 
     // Another perspective gives another picture; the same one gives the same.
     let (one, other) = (folder.path().join("seat.png"), folder.path().join("b.png"));
-    render(&other, &["--at", "57", "--seat", "2"]);
+    render(&other, "--at 57 --seat 2");
     assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
-    render(&other, &["--at", "57", "--seat", "1"]);
+    render(&other, "--at 57 --seat 1");
     assert_ne!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
 
     let out = folder.path().join("end.svg");
-    let ended = render(&out, &["--json"]);
+    let ended = render(&out, "--json");
     let svg = std::fs::read_to_string(&out).unwrap();
     assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"));
     assert_eq!(
-        serde_json::from_str::<Value>(&ended.stdout).unwrap(),
+        ended.json(),
         json!({
             "file": out.to_str().unwrap(),
             "kind": "svg",
@@ -110,48 +101,38 @@ fn missing_letters_cause_no_warning() {
 1,0,plays,1,
 ";
     std::fs::write(&transcript, written).unwrap();
-    let imported = chefshat(&["import", &transcript, "--out", &record]);
-    assert_eq!((imported.code, imported.stderr.as_str()), (Some(0), ""));
+    typed(&format!("import {transcript} --out {record}")).clean();
     for (name, flags) in [
-        ("film.gif", &[][..]),
-        ("seat.gif", &["--seat", "1"]),
-        ("end.svg", &[]),
-        ("figure.png", &["--at", "1", "--figure", "actions"]),
+        ("film.gif", ""),
+        ("seat.gif", "--seat 1"),
+        ("end.svg", ""),
+        ("figure.png", "--at 1 --figure actions"),
     ] {
-        let mut arguments = vec!["render", &record, "--width", "160"];
-        arguments.extend(flags);
         let out = path(name);
-        arguments.extend(["--out", &out]);
-        let ended = chefshat(&arguments);
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{name}");
+        typed(&format!("render {record} --width 160 {flags} --out {out}")).clean();
     }
 }
 
 #[test]
 fn secrets_of_other_seats_are_not_drawn() {
     let folder = TempDir::new().unwrap();
-    let draw = |name: &str, flags: &[&str]| {
+    let draw = |name: &str, flags: &str| {
         let out = folder.path().join(name);
-        let ended = render(&out, flags);
-        assert_eq!(
-            (ended.code, ended.stderr.as_str()),
-            (Some(0), ""),
-            "{flags:?}"
-        );
+        render(&out, flags).clean();
         std::fs::read(&out).unwrap()
     };
     // Only seat 1 knows about decision 59, a special action. Others see the end of the previous
     // Shift.
-    for eyes in [&["--seat", "2"][..], &["--spectator"]] {
-        let with = |flags: &[&'static str]| [eyes, flags].concat();
-        let shift = draw("a.png", &with(&["--shift", "1"]));
-        assert_eq!(shift, draw("a.png", &with(&["--at", "59"])));
-        let film = draw("a.gif", &with(&["--from", "59", "--to", "59"]));
+    for eyes in ["--seat 2", "--spectator"] {
+        let with = |flags: &str| format!("{eyes} {flags}");
+        let shift = draw("a.png", &with("--shift 1"));
+        assert_eq!(shift, draw("a.png", &with("--at 59")));
+        let film = draw("a.gif", &with("--from 59 --to 59"));
         assert!(film.starts_with(b"GIF89a"));
     }
-    let own = ["--seat", "1"];
-    let shift = draw("a.png", &[&own[..], &["--shift", "1"]].concat());
-    assert_ne!(shift, draw("a.png", &[&own[..], &["--at", "59"]].concat()));
+    let own = "--seat 1";
+    let shift = draw("a.png", &format!("{own} --shift 1"));
+    assert_ne!(shift, draw("a.png", &format!("{own} --at 59")));
 }
 
 #[test]
@@ -160,16 +141,12 @@ fn the_length_of_a_film_is_that_of_its_decisions() {
     let out = folder.path().join("film.gif");
     // Decisions 94 to 96, the end of the Shift, the end of the game. Built-in agents take no time.
     for (flags, seconds) in [
-        (
-            &["--seconds-per-decision", "0.5"][..],
-            3.0 * 0.5 + 2.0 * 1.5,
-        ),
-        (&["--real-time"], 3.0 * 0.2 + 2.0 * 3.0),
-        (&["--real-time", "4"], 3.0 * 0.2 + 2.0 * 3.0),
+        ("--seconds-per-decision 0.5", 3.0 * 0.5 + 2.0 * 1.5),
+        ("--real-time", 3.0 * 0.2 + 2.0 * 3.0),
+        ("--real-time 4", 3.0 * 0.2 + 2.0 * 3.0),
     ] {
-        let ended = render(&out, &[&["--from", "94", "--json"], flags].concat());
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
-        let told: Value = serde_json::from_str(&ended.stdout).unwrap();
+        let ended = render(&out, &format!("--from 94 --json {flags}")).clean();
+        let told = ended.json();
         assert_eq!(told["frames"], 5);
         assert!(
             (told["seconds"].as_f64().unwrap() - seconds).abs() < 1e-6,
@@ -201,9 +178,8 @@ fn ffmpeg_receives_every_frame() {
         tools.path(),
         "for last; do :; done; { echo \"$@\"; wc -c; } > \"$last\"",
     );
-    let flags = ["--from", "3", "--to", "5", "--seconds-per-decision", "0.2"];
-    let ended = render(&out, &[&flags[..], &["--ffmpeg", &program]].concat());
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let flags = "--from 3 --to 5 --seconds-per-decision 0.2";
+    render(&out, &format!("{flags} --ffmpeg {program}")).clean();
     let written = std::fs::read_to_string(&out).unwrap();
     assert!(
         written.contains("-video_size 320x200 -framerate 10"),
@@ -216,7 +192,7 @@ fn ffmpeg_receives_every_frame() {
 
     // A failure is reported with its message and leaves the file unchanged.
     let program = fake_ffmpeg(tools.path(), "echo no such codec >&2; exit 3");
-    let ended = render(&out, &[&flags[..], &["--ffmpeg", &program]].concat());
+    let ended = render(&out, &format!("{flags} --ffmpeg {program}"));
     assert_eq!(ended.code, Some(1));
     assert!(ended.stderr.contains("no such codec"), "{}", ended.stderr);
     assert_eq!(std::fs::read_to_string(&out).unwrap(), written);
@@ -228,7 +204,7 @@ fn ffmpeg_receives_every_frame() {
 fn the_samples_of_the_page_work() {
     let (folder, tools) = (TempDir::new().unwrap(), TempDir::new().unwrap());
     let program = fake_ffmpeg(tools.path(), "for last; do :; done; cat > \"$last\"");
-    let record = fixture("committed.jsonl");
+    let record = fixture("records/committed.jsonl");
     let samples: Vec<&str> = DOCS
         .lines()
         .filter_map(|line| line.strip_prefix("chefshat render game.jsonl "))
@@ -237,16 +213,9 @@ fn the_samples_of_the_page_work() {
     for sample in &samples {
         let (flags, out) = sample.split_once("--out ").unwrap();
         let out = folder.path().join(out);
-        let mut arguments = vec!["render", record.to_str().unwrap()];
-        arguments.extend(flags.split_whitespace());
-        arguments.extend(["--out", out.to_str().unwrap()]);
-        arguments.extend(["--ffmpeg", &program, "--width", "160"]);
-        let ended = chefshat(&arguments);
-        assert_eq!(
-            (ended.code, ended.stderr.as_str()),
-            (Some(0), ""),
-            "{sample}"
-        );
+        let (record, target) = (record.display(), out.display());
+        let options = format!("--ffmpeg {program} --width 160");
+        typed(&format!("render {record} {flags} --out {target} {options}")).clean();
         assert!(std::fs::metadata(&out).unwrap().len() > 0);
     }
     assert_eq!(files_in(&folder).len(), samples.len());
@@ -258,98 +227,78 @@ fn impossible_pictures_are_explained() {
     for (name, flags, code, words) in [
         (
             "a.jpg",
-            &[][..],
+            "",
             1,
             "choose a name that ends in .png, .svg, .gif or .mp4",
         ),
         (
             "a",
-            &[],
+            "",
             1,
             "choose a name that ends in .png, .svg, .gif or .mp4",
         ),
         (
             "a.png",
-            &["--at", "97"],
+            "--at 97",
             1,
             "there is no decision 97: the game has decisions 1 to 96",
         ),
-        ("a.png", &["--at", "0"], 1, "there is no decision 0"),
+        ("a.png", "--at 0", 1, "there is no decision 0"),
         (
             "a.png",
-            &["--at", "soon"],
+            "--at soon",
             2,
             "use the number of a decision, from 1, or end",
         ),
         (
             "a.png",
-            &["--shift", "3"],
+            "--shift 3",
             1,
             "there is no shift 3: the game has shifts 1 to 2",
         ),
         (
             "a.png",
-            &["--seat", "3"],
+            "--seat 3",
             1,
             "there is no seat 3: the game has seats 0 to 2",
         ),
-        (
-            "a.png",
-            &["--seat", "1", "--spectator"],
-            2,
-            "cannot be used with",
-        ),
-        ("a.png", &["--from", "3"], 1, "use --at"),
+        ("a.png", "--seat 1 --spectator", 2, "cannot be used with"),
+        ("a.png", "--from 3", 1, "use --at"),
+        ("a.gif", "--at 3", 1, "use --from and --to, or --shift"),
+        ("a.gif", "--from 9 --to 3", 1, "--from 9 is after --to 3"),
+        ("a.gif", "--from 90 --to 97", 1, "there is no decision 97"),
         (
             "a.gif",
-            &["--at", "3"],
-            1,
-            "use --from and --to, or --shift",
-        ),
-        (
-            "a.gif",
-            &["--from", "9", "--to", "3"],
-            1,
-            "--from 9 is after --to 3",
-        ),
-        (
-            "a.gif",
-            &["--from", "90", "--to", "97"],
-            1,
-            "there is no decision 97",
-        ),
-        (
-            "a.gif",
-            &["--seconds-per-decision", "0"],
+            "--seconds-per-decision 0",
             2,
             "use seconds above 0, at most 600",
         ),
         (
             "a.gif",
-            &["--real-time", "nan"],
+            "--real-time nan",
             2,
             "use a number above 0, at most 1000",
         ),
         (
             "a.gif",
-            &["--figure", "actions"],
+            "--figure actions",
             1,
             "choose a name that ends in .png or .svg",
         ),
-        ("a.png", &["--figure", "actions"], 1, "select it with --at"),
+        ("a.png", "--figure actions", 1, "select it with --at"),
         (
             "a.png",
-            &["--figure", "actions", "--at", "3", "--spectator"],
+            "--figure actions --at 3 --spectator",
             1,
             "this viewer does not see its hand",
         ),
         (
             "a.mp4",
-            &["--ffmpeg", "no-such-program"],
+            "--ffmpeg no-such-program",
             1,
             "install ffmpeg, or choose a name that ends in .gif",
         ),
-        ("no/such/folder/a.png", &[], 1, "no such file or directory"),
+        ("no/such/folder/a.png", "", 1, "no such file or directory"),
     ] {
         let ended = render(&folder.path().join(name), flags);
         assert_eq!(ended.code, Some(code), "{name} {flags:?}: {}", ended.stderr);
@@ -367,15 +316,8 @@ fn impossible_pictures_are_explained() {
         (no_record.as_path(), "line 1 is not a line of a record"),
         (Path::new("no-such-record.jsonl"), "no-such-record.jsonl"),
     ] {
-        let arguments = [
-            "render",
-            record.to_str().unwrap(),
-            "--out",
-            out.to_str().unwrap(),
-        ];
-        let ended = chefshat(&arguments);
-        assert_eq!(ended.code, Some(1));
-        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        let (record, out) = (record.display(), out.display());
+        typed(&format!("render {record} --out {out}")).assert_failed(words);
         assert_eq!(files_in(&folder), [""; 0]);
     }
 }

@@ -1,74 +1,54 @@
-//! `chefshat serve`, `room` and `agent` as processes: a room is created, four agents join with the
-//! code from a file, a spectator watches, and all report the same result.
+//! `chefshat serve`, `room` and `agent` as processes: a room, four agents that join it with the code
+//! from a file, and a spectator. All agree on the result.
 
 use std::io::{BufRead as _, BufReader};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::server::{Running, json, program, run, serve};
+use super::run::{Running, run, serve, typed};
+
+/// The only line that an agent printed, as JSON.
+fn only_line(lines: &[String]) -> Value {
+    let [line] = lines else {
+        panic!("expected one line: {lines:?}");
+    };
+    serde_json::from_str(line).unwrap()
+}
 
 #[test]
 fn four_processes_play_a_game_that_a_fifth_watches() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let code_file = folder.path().join("code");
-    let code_file = code_file.to_str().unwrap();
+    let code_file = code_file.display();
 
     // The agents may start before the code exists.
-    let agents: Vec<Running> = ["greedy", "random", "random_unmasked", "greedy"]
-        .iter()
-        .zip(["Ada", "Ben", "Cleo", "Dan"])
+    let kinds = ["greedy", "random", "random_unmasked", "greedy"];
+    let agents: Vec<Running> = (kinds.iter().zip(["Ada", "Ben", "Cleo", "Dan"]))
         .map(|(kind, name)| {
-            let mut command = program();
-            command.args(["agent", kind, "--name", name, "--seed", "7", "--json"]);
-            command.args(["--server", &url, "--code-file", code_file]);
-            Running(command.spawn().unwrap())
+            let line =
+                format!("agent {kind} --name {name} --seed 7 --json --code-file {code_file}");
+            Running::start(&url, &line)
         })
         .collect();
-    let create = [
-        "room",
-        "create",
-        "--name",
-        "friday",
-        "--target-shifts",
-        "2",
-        "--code-file",
-        code_file,
-        "--json",
-    ];
-    let made = json(&run(&url, &create));
+    let create =
+        format!("room create --name friday --target-shifts 2 --code-file {code_file} --json");
+    let made = run(&url, &create).json();
     let room_id = made["room"]["roomId"].as_str().unwrap();
-    let watched = run(&url, &["room", "watch", room_id]);
-    assert_eq!(watched.status.code(), Some(0), "{watched:?}");
-    let watched = String::from_utf8(watched.stdout).unwrap();
-    for words in [
-        "friday",
-        "Ada",
-        "Dan",
-        "Shift 1",
-        "Shift 2",
-        "Standings",
-        "★ wins",
-    ] {
-        assert!(watched.contains(words), "{words} is not in {watched}");
-    }
+    let watched = run(&url, &format!("room watch {room_id}")).well();
+    watched.assert_says(&["friday", "Ada", "Dan", "Shift 1", "Shift 2"]);
+    watched.assert_says(&["Standings", "★ wins"]);
 
     let mut results = Vec::new();
-    for mut agent in agents {
-        let stdout = agent.0.stdout.take().unwrap();
-        let lines: Vec<String> = BufReader::new(stdout).lines().map(Result::unwrap).collect();
-        assert_eq!(agent.0.wait().unwrap().code(), Some(0));
-        let [line] = lines.as_slice() else {
-            panic!("one line was expected: {lines:?}");
-        };
-        let result: Value = serde_json::from_str(line).unwrap();
+    for agent in agents {
+        let (code, lines) = agent.ended();
+        assert_eq!(code, Some(0));
+        let result = only_line(&lines);
         assert_eq!(result["event"], "result");
         assert_eq!(result["game_id"], made["room"]["gameId"]);
-        results.push((
-            result["place"].as_u64().unwrap(),
-            result["points"].as_u64().unwrap(),
-        ));
+        let number = |field: &str| result[field].as_u64().unwrap();
+        results.push((number("place"), number("points")));
     }
     results.sort_unstable();
     let places: Vec<u64> = results.iter().map(|(place, _)| *place).collect();
@@ -81,96 +61,50 @@ fn four_processes_play_a_game_that_a_fifth_watches() {
 fn rooms_are_listed_shown_and_closed() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
-    let none = run(&url, &["room", "list"]);
-    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no rooms\n");
+    assert_eq!(run(&url, "room list").stdout, "no rooms\n");
 
-    let create = [
-        "room", "create", "--name", "quiet", "--seat", "greedy", "--seat", "human", "--json",
-    ];
-    let made = json(&run(&url, &create));
+    let create = "room create --name quiet --seat greedy --seat human --json";
+    let made = run(&url, create).json();
     let room_id = made["room"]["roomId"].as_str().unwrap();
-    let listed = json(&run(
-        &url,
-        &["room", "list", "--json", "--state", "waiting"],
-    ));
+    let listed = run(&url, "room list --json --state waiting").json();
     assert_eq!(listed["roomId"], room_id);
-    let shown = String::from_utf8(run(&url, &["room", "show", room_id]).stdout).unwrap();
-    for words in [
-        "quiet",
-        "waiting",
-        "greedy, played by the server",
-        "free for humans",
-        "free for anyone",
-    ] {
-        assert!(shown.contains(words), "{words} is not in {shown}");
-    }
+    let shown = run(&url, &format!("room show {room_id}"));
+    shown.assert_says(&["quiet", "waiting", "greedy, played by the server"]);
+    shown.assert_says(&["free for humans", "free for anyone"]);
 
-    let wrong = run(
-        &url,
-        &["room", "close", room_id, "--owner-token", "nonsense"],
-    );
-    assert_eq!(wrong.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&wrong.stderr).contains("OWNER_TOKEN_WRONG"));
+    let close = format!("room close {room_id} --json --owner-token");
+    run(&url, &format!("{close} nonsense")).assert_failed("OWNER_TOKEN_WRONG");
     let token = made["owner_token"].as_str().unwrap();
-    let closed = json(&run(
-        &url,
-        &["room", "close", room_id, "--owner-token", token, "--json"],
-    ));
+    let closed = run(&url, &format!("{close} {token}")).json();
     assert_eq!(closed["room"]["state"], "ROOM_STATE_ABORTED");
 
-    let watched = run(&url, &["room", "watch", room_id]);
-    assert_eq!(
-        watched.status.code(),
-        Some(1),
-        "an aborted game has no result"
-    );
+    let watched = run(&url, &format!("room watch {room_id}"));
+    assert_eq!(watched.code, Some(1), "an aborted game has no result");
     let code = made["join_code"].as_str().unwrap();
-    let late = run(&url, &["agent", "greedy", "--code", code]);
-    assert_eq!(late.status.code(), Some(1));
+    let late = run(&url, &format!("agent greedy --code {code}"));
+    assert_eq!(late.code, Some(1));
 }
 
 #[test]
 fn an_agent_reports_an_aborted_game() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
-    let made = json(&run(&url, &["room", "create", "--json"]));
-    let (room_id, token) = (
-        made["room"]["roomId"].as_str(),
-        made["owner_token"].as_str(),
-    );
-    let mut command = program();
-    command.args(["agent", "random", "--json", "--server", &url, "--code"]);
-    let mut agent = Running(
-        command
-            .arg(made["join_code"].as_str().unwrap())
-            .spawn()
-            .unwrap(),
-    );
+    let made = run(&url, "room create --json").json();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let code = text(&made["join_code"]);
+    let mut agent = Running::start(&url, &format!("agent random --json --code {code}"));
     // Printed once it has its seat.
     let mut line = String::new();
     let mut stderr = BufReader::new(agent.0.stderr.take().unwrap());
     stderr.read_line(&mut line).unwrap();
     assert!(line.contains("seat 0; waits for 3 other seats"), "{line}");
 
-    let close = [
-        "room",
-        "close",
-        room_id.unwrap(),
-        "--owner-token",
-        token.unwrap(),
-    ];
-    assert_eq!(run(&url, &close).status.code(), Some(0));
-    let stdout = agent.0.stdout.take().unwrap();
-    let lines: Vec<String> = BufReader::new(stdout).lines().map(Result::unwrap).collect();
-    assert_eq!(agent.0.wait().unwrap().code(), Some(1));
-    let [line] = lines.as_slice() else {
-        panic!("one line was expected: {lines:?}");
-    };
-    let result: Value = serde_json::from_str(line).unwrap();
-    assert!(
-        ["aborted", "lost"].contains(&result["event"].as_str().unwrap()),
-        "{line}"
-    );
+    let (room_id, token) = (text(&made["room"]["roomId"]), text(&made["owner_token"]));
+    run(&url, &format!("room close {room_id} --owner-token {token}")).well();
+    let (code, lines) = agent.ended();
+    assert_eq!(code, Some(1));
+    let event = only_line(&lines)["event"].clone();
+    assert!(event == "aborted" || event == "lost", "{lines:?}");
 }
 
 #[test]
@@ -178,58 +112,44 @@ fn invalid_room_options_are_reported_by_flag_before_a_room_is_created() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let nowhere = folder.path().join("nowhere").join("code");
-    let nowhere = nowhere.to_str().unwrap();
     for (flags, words) in [
-        (["--code-file", nowhere], "--code-file: "),
-        (["--max-turns", "0"], "--max-turns is 0"),
-        (["--decision-time-ms", "1"], "--decision-time-ms: "),
-        (["--target-shifts", "1000000"], "--target-shifts: "),
+        (
+            format!("--code-file {}", nowhere.display()).as_str(),
+            "--code-file: ",
+        ),
+        ("--max-turns 0", "--max-turns is 0"),
+        ("--decision-time-ms 1", "--decision-time-ms: "),
+        ("--target-shifts 1000000", "--target-shifts: "),
     ] {
-        let mut arguments = vec!["room", "create"];
-        arguments.extend(flags);
-        let refused = run(&url, &arguments);
-        assert_eq!(refused.status.code(), Some(1), "{flags:?}");
-        let stderr = String::from_utf8(refused.stderr).unwrap();
-        assert!(stderr.contains(words), "{stderr}");
-        assert!(refused.stdout.is_empty(), "{flags:?}");
+        run(&url, &format!("room create {flags}")).assert_failed(words);
     }
-    let none = run(&url, &["room", "list"]);
-    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no rooms\n");
+    assert_eq!(run(&url, "room list").stdout, "no rooms\n");
 
-    let made = run(&url, &["room", "create", "--seat", "greedy"]);
-    let told = String::from_utf8(made.stdout).unwrap();
-    assert!(told.contains("3 seats are free"), "{told}");
-    assert!(
-        told.contains(&format!("chefshat agent greedy --server {url} --code ")),
-        "{told}"
-    );
+    let made = run(&url, "room create --seat greedy");
+    made.assert_says(&["3 seats are free"]);
+    made.assert_says(&[&format!("chefshat agent greedy --server {url} --code ")]);
 }
 
 #[test]
 fn invalid_server_options_are_reported_at_the_start() {
     for (flags, words) in [
-        (["--listen", "localhost"], "use IP:PORT"),
-        (["--max-rooms", "0"], "--max-rooms"),
-        (["--allow-origin", "example.org"], "https://example.org"),
+        ("--listen localhost", "use IP:PORT"),
+        ("--max-rooms 0", "--max-rooms"),
+        ("--allow-origin example.org", "https://example.org"),
     ] {
-        let ended = program().arg("serve").args(flags).output().unwrap();
-        assert_eq!(ended.status.code(), Some(2), "{flags:?}");
-        let stderr = String::from_utf8(ended.stderr).unwrap();
-        assert!(stderr.contains(words), "{stderr}");
+        let ended = typed(&format!("serve {flags}"));
+        assert_eq!(ended.code, Some(2), "{flags}");
+        ended.assert_refused(words);
     }
 }
 
 #[test]
 fn a_missing_server_is_reported() {
-    // A port that was free a moment ago, without a server.
+    // A port that was free a moment ago; nothing that listens there speaks this protocol.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     drop(listener);
-    let ended = run(&url, &["room", "list"]);
-    assert_eq!(ended.status.code(), Some(1));
-    let words = String::from_utf8(ended.stderr).unwrap();
-    assert!(
-        words.contains(&url) && words.contains("chefshat serve"),
-        "{words}"
-    );
+    let ended = run(&url, "room list");
+    ended.assert_failed(&url);
+    ended.assert_failed("chefshat serve");
 }

@@ -1,7 +1,9 @@
-//! Runs the program to its end, with expectations common to all commands: tables that fit,
-//! explained errors.
+//! Runs the program: to its end, in the background, and as a server. Expectations common to all
+//! commands: tables that fit, explained errors.
 
-use std::process::Command;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -17,15 +19,47 @@ pub(super) struct Ended {
 }
 
 impl Ended {
+    fn of(output: Output) -> Self {
+        Self {
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
     /// Asserts that the program succeeded.
     pub(super) fn well(self) -> Self {
-        assert_eq!(self.code, Some(0), "{}", self.stderr);
+        assert_eq!(self.code, Some(0), "{self:?}");
+        self
+    }
+
+    /// Asserts that the program succeeded and wrote nothing to standard error.
+    pub(super) fn clean(self) -> Self {
+        assert_eq!(self.stderr, "", "{self:?}");
+        self.well()
+    }
+
+    /// Asserts that the program ended with this code and wrote nothing to standard error.
+    pub(super) fn ended_with(self, code: i32) -> Self {
+        assert_eq!((self.code, self.stderr.as_str()), (Some(code), ""));
         self
     }
 
     /// The output as JSON.
     pub(super) fn json(&self) -> Value {
-        serde_json::from_str(&self.stdout).unwrap()
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:?}"))
+    }
+
+    /// The output as JSON lines.
+    pub(super) fn json_lines(&self) -> Vec<Value> {
+        json_lines(&self.stdout)
+    }
+
+    /// Asserts that the output contains all of these.
+    pub(super) fn assert_says(&self, words: &[&str]) {
+        for words in words {
+            assert!(self.stdout.contains(words), "{words} is not in {self:?}");
+        }
     }
 
     /// Asserts that the output is a table of more than `more_than` lines that fits a page and has no
@@ -41,42 +75,116 @@ impl Ended {
         }
     }
 
-    /// Asserts that the program failed with an explanation and no output.
+    /// Asserts that the program or its arguments failed with an explanation and no output.
     pub(super) fn assert_refused(&self, expected: &str) {
         assert!(matches!(self.code, Some(1 | 2)), "{self:?}");
-        assert!(self.stderr.contains(expected), "{}", self.stderr);
+        assert!(self.stderr.contains(expected), "{expected}: {self:?}");
         assert_eq!(self.stdout, "", "{expected}");
+    }
+
+    /// Asserts that the program, not its arguments, failed with an explanation and no output.
+    pub(super) fn assert_failed(&self, expected: &str) {
+        assert_eq!(self.code, Some(1), "{self:?}");
+        self.assert_refused(expected);
     }
 
     /// Asserts that the output is a help text with an example.
     pub(super) fn assert_helps(&self, example: &str) {
         assert_eq!(self.code, Some(0));
-        assert!(self.stdout.contains(example), "{}", self.stdout);
+        self.assert_says(&[example]);
     }
 }
 
-/// Runs a command of `chefshat` with flags as typed.
-pub(super) fn typed(command: &[&str], flags: &str) -> Ended {
-    let arguments: Vec<&str> = command
-        .iter()
-        .copied()
-        .chain(flags.split_whitespace())
-        .collect();
-    chefshat(&arguments)
+/// JSON values, one per line.
+pub(super) fn json_lines(text: &str) -> Vec<Value> {
+    let lines = text.lines();
+    lines
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
 }
 
-/// Runs `chefshat` with arguments and without its environment variables.
-pub(super) fn chefshat(arguments: &[&str]) -> Ended {
+/// A file of the tests' fixtures.
+pub(super) fn fixture(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures")
+        .join(path)
+}
+
+/// The program, without `CHEFSHAT_*` variables.
+pub(super) fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("CHEFSHAT_") {
             command.env_remove(name);
         }
     }
-    let output = command.args(arguments).output().unwrap();
-    Ended {
-        code: output.status.code(),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// Runs `chefshat` with these arguments.
+pub(super) fn chefshat(arguments: &[&str]) -> Ended {
+    Ended::of(program().args(arguments).output().unwrap())
+}
+
+/// Runs `chefshat` with a command line as typed. Arguments are split at white space, paths included.
+pub(super) fn typed(line: &str) -> Ended {
+    chefshat(&line.split_whitespace().collect::<Vec<_>>())
+}
+
+/// Runs a command line against a server.
+pub(super) fn run(server: &str, line: &str) -> Ended {
+    typed(&format!("{line} --server {server}"))
+}
+
+/// A process that is killed at the end of the test.
+pub(super) struct Running(pub(super) Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
+}
+
+impl Running {
+    /// Starts a command line against a server.
+    pub(super) fn start(server: &str, line: &str) -> Self {
+        let mut command = program();
+        command.args(line.split_whitespace());
+        command.args(["--server", server]);
+        Self(command.spawn().unwrap())
+    }
+
+    /// Waits for the end. Returns the exit code and the lines of output.
+    pub(super) fn ended(mut self) -> (Option<i32>, Vec<String>) {
+        let stdout = self.0.stdout.take().unwrap();
+        let lines = BufReader::new(stdout).lines().map(Result::unwrap).collect();
+        (self.0.wait().unwrap().code(), lines)
+    }
+}
+
+/// A server and its address.
+pub(super) fn serve(data_dir: &Path) -> (Running, String) {
+    serve_with(data_dir, &[])
+}
+
+/// A server with more flags, and its address.
+pub(super) fn serve_with(data_dir: &Path, flags: &[&str]) -> (Running, String) {
+    let mut command = program();
+    command.arg("serve").args(flags);
+    command.args(["--listen", "127.0.0.1:0", "--json", "--data-dir"]);
+    // Both are false, so records are written.
+    command.env("CHEFSHAT_NO_RECORDS", "0");
+    command.env("CHEFSHAT_LOG_JSON", "");
+    let child = command.arg(data_dir).stderr(Stdio::inherit()).spawn();
+    let mut server = Running(child.unwrap());
+    let mut line = String::new();
+    let stdout = server.0.stdout.take().unwrap();
+    BufReader::new(stdout).read_line(&mut line).unwrap();
+    let listening: Value = serde_json::from_str(&line).unwrap();
+    let address = listening["address"].as_str().unwrap();
+    let url = format!("http://{address}");
+    (server, url)
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::run::{Ended, typed};
 
 fn simulate(flags: &str) -> Ended {
-    typed(&["simulate"], flags)
+    typed(&format!("simulate {flags}"))
 }
 
 fn json(flags: &str) -> Value {

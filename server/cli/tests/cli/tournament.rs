@@ -8,19 +8,13 @@ use std::path::Path;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::server::{Running, json, program, run, serve};
+use super::run::{Running, json_lines, run, serve};
 
-/// Waits for the end of a program. Returns its exit code and output lines.
-fn ended(mut program: Running) -> (Option<i32>, Vec<String>) {
-    let stdout = program.0.stdout.take().unwrap();
-    let lines = BufReader::new(stdout).lines().map(Result::unwrap).collect();
-    (program.0.wait().unwrap().code(), lines)
-}
-
-fn start(server: &str, arguments: &[&str]) -> Running {
-    let mut command = program();
-    command.args(arguments).args(["--server", server]);
-    Running(command.spawn().unwrap())
+/// Waits for the end of a program that must succeed. Returns its output, JSON lines.
+fn objects_of(program: Running) -> Vec<Value> {
+    let (code, lines) = program.ended();
+    assert_eq!(code, Some(0), "{lines:?}");
+    json_lines(&lines.join("\n"))
 }
 
 fn path(folder: &Path, name: &str) -> String {
@@ -31,58 +25,25 @@ fn path(folder: &Path, name: &str) -> String {
 fn a_tournament_is_played_followed_and_reported() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
-    let none = run(&url, &["tournament", "list"]);
-    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no tournaments\n");
+    assert_eq!(run(&url, "tournament list").stdout, "no tournaments\n");
 
     // The agents may start before the code exists; one of them plays two games at a time.
     let code_file = path(folder.path(), "code");
-    let agents: Vec<Running> = [("greedy", "Ada", "2"), ("random", "Ben", "1")]
-        .into_iter()
-        .map(|(agent, name, games)| {
-            let join = [
-                "tournament",
-                "join",
-                "--agent",
-                agent,
-                "--name",
-                name,
-                "--games",
-                games,
-            ];
-            let rest = ["--seed", "7", "--code-file", &code_file, "--json"];
-            start(&url, &[&join[..], &rest].concat())
-        })
-        .collect();
-    let create = [
-        "tournament",
-        "create",
-        "--name",
-        "friday",
-        "--format",
-        "round_robin",
-        "--rounds",
-        "3",
-        "--built-in",
-        "greedy*2,random",
-        "--start-when",
-        "5",
-        "--target-shifts",
-        "1",
-        "--code-file",
-        &code_file,
-        "--json",
-    ];
-    let made = json(&run(&url, &create));
+    let agents = ["greedy --name Ada --games 2", "random --name Ben --games 1"].map(|agent| {
+        let join = format!("tournament join --agent {agent} --seed 7 --json");
+        Running::start(&url, &format!("{join} --code-file {code_file}"))
+    });
+    let settings = "--format round_robin --rounds 3 --built-in greedy*2,random --start-when 5";
+    let create = format!("tournament create --name friday {settings} --target-shifts 1 --json");
+    let made = run(&url, &format!("{create} --code-file {code_file}")).json();
     assert_eq!(made["event"], "created");
     let id = made["tournament"]["tournamentId"].as_str().unwrap();
-    let lines = start(&url, &["tournament", "follow", id]);
-    let objects = start(&url, &["tournament", "follow", id, "--json"]);
+    let lines = Running::start(&url, &format!("tournament follow {id}"));
+    let objects = Running::start(&url, &format!("tournament follow {id} --json"));
 
     for agent in agents {
-        let (code, lines) = ended(agent);
-        assert_eq!(code, Some(0), "{lines:?}");
-        let (over, games) = lines.split_last().unwrap();
-        let over: Value = serde_json::from_str(over).unwrap();
+        let objects = objects_of(agent);
+        let (over, games) = objects.split_last().unwrap();
         assert_eq!(
             (&over["event"], &over["state"]),
             (&"over".into(), &"finished".into())
@@ -91,61 +52,41 @@ fn a_tournament_is_played_followed_and_reported() {
         assert_eq!(counted, games.len() as u64);
         let byes = over["standing"]["byes"].as_u64().unwrap_or(0);
         assert_eq!(counted + byes, 3);
-        for game in games {
-            let game: Value = serde_json::from_str(game).unwrap();
-            assert_eq!(game["event"], "result");
-        }
+        assert!(games.iter().all(|game| game["event"] == "result"));
     }
-    let (code, lines) = ended(lines);
+    let (code, lines) = lines.ended();
     assert_eq!(code, Some(0), "{lines:?}");
     let finished = "friday: finished; 3 of 3 games over; ahead: ";
-    assert!(
-        lines.iter().any(|line| line.starts_with(finished)),
-        "{lines:?}"
-    );
-    assert!(
-        lines.iter().any(|line| line.contains("Standings")),
-        "{lines:?}"
-    );
-    let (code, objects) = ended(objects);
-    assert_eq!(code, Some(0), "{objects:?}");
-    let last: Value = serde_json::from_str(objects.last().unwrap()).unwrap();
+    let has = |wanted: fn(&str, &str) -> bool, words: &str| {
+        assert!(lines.iter().any(|line| wanted(line, words)), "{lines:?}");
+    };
+    has(|line, words| line.starts_with(words), finished);
+    has(|line, words| line.contains(words), "Standings");
+    let objects = objects_of(objects);
+    let last = objects.last().unwrap();
     assert_eq!(last["event"], "over");
     assert_eq!(last["standings"].as_array().unwrap().len(), 5);
 
     check_results(&url, id, folder.path());
     check_games(&url, id, folder.path());
-    let listed = json(&run(&url, &["tournament", "list", "--json"]));
+    let listed = run(&url, "tournament list --json").json();
     assert_eq!(listed["state"], "TOURNAMENT_STATE_FINISHED");
 }
 
 fn check_results(url: &str, id: &str, folder: &Path) {
     let (standings, reference) = (path(folder, "standings.csv"), path(folder, "final.csv"));
-    let files = ["--csv", &standings, "--final-results", &reference];
-    let told = run(url, &[&["tournament", "results", id], &files[..]].concat());
-    assert_eq!(told.status.code(), Some(0), "{told:?}");
-    let told = String::from_utf8(told.stdout).unwrap();
-    for words in [
-        "friday: finished",
-        "round robin, 5 participants, 3 rounds, 3 of 3 games over",
-        "Ada",
-        "greedy 2",
-        "How sure is the order?",
-        "Rating",
-    ] {
-        assert!(told.contains(words), "{words} is not in {told}");
-    }
-    assert!(
-        told.lines().all(|line| line.chars().count() <= 100),
-        "{told}"
-    );
+    let results = format!("tournament results {id}");
+    let files = format!("--csv {standings} --final-results {reference}");
+    let told = run(url, &format!("{results} {files}")).well();
+    told.assert_says(&["friday: finished", "Ada", "greedy 2", "Rating"]);
+    told.assert_says(&["round robin, 5 participants, 3 rounds, 3 of 3 games over"]);
+    told.assert_says(&["How sure is the order?"]);
+    told.assert_table_fits(5);
 
-    let results = json(&run(url, &["tournament", "results", id, "--json"]));
+    let results = run(url, &format!("{results} --json")).json();
     let best = results["standings"][0]["participant"].as_u64().unwrap_or(0);
     let names = &results["tournament"]["participants"];
-    let best = names[usize::try_from(best).unwrap()]["name"]
-        .as_str()
-        .unwrap();
+    let best = &names[usize::try_from(best).unwrap()]["name"];
     assert_eq!(results["confidence"].as_array().unwrap().len(), 4);
     let standings = std::fs::read_to_string(standings).unwrap();
     assert_eq!(standings.lines().count(), 6);
@@ -158,54 +99,43 @@ fn check_results(url: &str, id: &str, folder: &Path) {
     let header = "Position,Player Name,Final Game Performance Score,Games Played";
     assert_eq!(reference.next(), Some(header));
     let first = reference.next().unwrap();
-    assert!(first.starts_with(&format!("1,{best},")), "{first}");
+    let best = format!("1,{},", best.as_str().unwrap());
+    assert!(first.starts_with(&best), "{first}");
     assert_eq!(reference.filter(|line| !line.is_empty()).count(), 4);
 }
 
 fn check_games(url: &str, id: &str, data_dir: &Path) {
-    let listed = run(url, &["tournament", "games", id, "--json"]);
-    let listed = String::from_utf8(listed.stdout).unwrap();
+    let games = format!("tournament games {id}");
     let mut known = BTreeSet::new();
-    for line in listed.lines() {
-        let line: Value = serde_json::from_str(line).unwrap();
+    for line in run(url, &format!("{games} --json")).json_lines() {
         assert_eq!(line["game"]["state"], "TOURNAMENT_GAME_STATE_COUNTED");
         let record = line["record"].as_str().unwrap();
         assert!(data_dir.join(record).is_file(), "{record}");
         known.insert(record.to_owned());
     }
     assert_eq!(known.len(), 3);
-    let second = run(url, &["tournament", "games", id, "--round", "2"]);
-    let second = String::from_utf8(second.stdout).unwrap();
-    assert_eq!(second.lines().count(), 1, "{second}");
-    assert!(
-        second.contains("round 2 table 1 game 1  counted  1st "),
-        "{second}"
-    );
+    let second = run(url, &format!("{games} --round 2"));
+    assert_eq!(second.stdout.lines().count(), 1, "{second:?}");
+    second.assert_says(&["round 2 table 1 game 1  counted  1st "]);
 
-    let board = json(&run(url, &["leaderboard", "--json"]));
+    let board = run(url, "leaderboard --json").json();
     let rated = board["rated_games"].as_u64().unwrap();
-    let names: BTreeSet<&str> = (board["leaderboard"].as_array().unwrap().iter())
-        .map(|line| line["name"].as_str().unwrap())
-        .collect();
+    let names = board["leaderboard"].as_array().unwrap();
     // A game with two greedy agents is not rated.
     assert!(rated <= 3 && (rated == 0) == names.is_empty(), "{board}");
-    let people = run(url, &["leaderboard", "--kind", "human"]);
-    let people = String::from_utf8(people.stdout).unwrap();
-    assert!(people.contains("no participants"), "{people}");
+    run(url, "leaderboard --kind human").assert_says(&["no participants"]);
 }
 
 #[test]
 fn an_agent_that_ended_resumes_with_its_ticket() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
-    let create = "--name final --format knockout --built-in greedy*3 --target-shifts 1 --json";
-    let create = ["tournament", "create"]
-        .into_iter()
-        .chain(create.split(' '));
-    let made = json(&run(&url, &create.collect::<Vec<&str>>()));
-    let code = made["join_code"].as_str().unwrap();
-    let join = ["tournament", "join", "--agent", "random"];
-    let mut first = start(&url, &[&join[..], &["--code", code]].concat());
+    let settings = "--name final --format knockout --built-in greedy*3 --target-shifts 1";
+    let made = run(&url, &format!("tournament create {settings} --json")).json();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let code = text(&made["join_code"]);
+    let join = "tournament join --agent random";
+    let mut first = Running::start(&url, &format!("{join} --code {code}"));
     let told = BufReader::new(first.0.stderr.take().unwrap()).lines();
     let mut tickets = told.filter_map(|line| {
         let line = line.unwrap();
@@ -215,21 +145,16 @@ fn an_agent_that_ended_resumes_with_its_ticket() {
     let ticket = tickets.next().unwrap();
     drop(first);
 
-    let second = start(
-        &url,
-        &[&join[..], &["--ticket", &ticket, "--json"]].concat(),
-    );
-    let id = made["tournament"]["tournamentId"].as_str().unwrap();
-    let owner = made["owner_token"].as_str().unwrap();
-    let begun = run(&url, &["tournament", "start", id, "--owner-token", owner]);
-    assert_eq!(begun.status.code(), Some(0), "{begun:?}");
-    let (code, lines) = ended(second);
-    assert_eq!(code, Some(0), "{lines:?}");
-    let [line] = lines.as_slice() else {
-        panic!("one game was expected: {lines:?}");
+    let second = Running::start(&url, &format!("{join} --ticket {ticket} --json"));
+    let id = text(&made["tournament"]["tournamentId"]);
+    let owner = text(&made["owner_token"]);
+    let start = format!("tournament start {id} --owner-token {owner}");
+    run(&url, &start).well();
+    let games = objects_of(second);
+    let [game] = games.as_slice() else {
+        panic!("expected one game: {games:?}");
     };
-    let result: Value = serde_json::from_str(line).unwrap();
-    assert_eq!(result["event"], "result");
+    assert_eq!(game["event"], "result");
 }
 
 #[test]
@@ -237,87 +162,40 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     let owner = path(folder.path(), "owner");
-    let create = [
-        "tournament",
-        "create",
-        "--name",
-        "slow",
-        "--format",
-        "knockout",
-        "--built-in",
-        "random*4",
-        "--pace-ms",
-        "60000",
-        "--owner-file",
-        &owner,
-    ];
+    let settings = "--name slow --format knockout --built-in random*4 --pace-ms 60000";
+    let create = format!("tournament create {settings} --owner-file {owner}");
     let made = run(&url, &create);
-    let made = String::from_utf8(made.stdout).unwrap();
-    assert!(
-        made.contains("chefshat tournament join --agent greedy --server"),
-        "{made}"
-    );
-    assert!(made.contains(&format!("--owner-file {owner}")), "{made}");
-    let id = made
-        .lines()
-        .next()
-        .unwrap()
-        .strip_prefix("tournament   ")
-        .unwrap();
-    let told = |arguments: &[&str]| {
-        let told = run(&url, &[&["tournament"], arguments].concat());
-        String::from_utf8(told.stdout).unwrap()
-    };
-    let before = told(&["results", id]);
-    assert!(before.contains("nothing has been played yet"), "{before}");
-    assert!(before.contains("Who takes part"), "{before}");
+    made.assert_says(&["chefshat tournament join --agent greedy --server"]);
+    made.assert_says(&[&format!("--owner-file {owner}")]);
+    let first = made.stdout.lines().next().unwrap();
+    let id = first.strip_prefix("tournament   ").unwrap();
+    let results = format!("tournament results {id}");
+    let before = run(&url, &results);
+    before.assert_says(&["nothing has been played yet", "Who takes part"]);
 
-    let wrong = run(
-        &url,
-        &["tournament", "start", id, "--owner-token", "nonsense"],
-    );
-    assert_eq!(wrong.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&wrong.stderr).contains("OWNER_TOKEN_WRONG"));
-    let begun = run(
-        &url,
-        &["tournament", "start", id, "--owner-file", &owner, "--json"],
-    );
-    let begun = json(&begun);
+    let start = format!("tournament start {id} --json");
+    run(&url, &format!("{start} --owner-token nonsense")).assert_failed("OWNER_TOKEN_WRONG");
+    let begun = run(&url, &format!("{start} --owner-file {owner}")).json();
     assert_eq!(begun["tournament"]["state"], "TOURNAMENT_STATE_PLAYING");
-    let mut join = start(
-        &url,
-        &[
-            "tournament",
-            "join",
-            "--agent",
-            "random",
-            "--code",
-            "BCDF2345",
-        ],
-    );
+    let mut join = Running::start(&url, "tournament join --agent random --code BCDF2345");
     let mut late = String::new();
-    join.0
-        .stderr
-        .take()
-        .unwrap()
-        .read_to_string(&mut late)
-        .unwrap();
+    let stderr = join.0.stderr.as_mut().unwrap();
+    stderr.read_to_string(&mut late).unwrap();
     assert!(late.contains("JOIN_CODE_WRONG"), "{late}");
 
-    let follower = start(&url, &["tournament", "follow", id]);
-    let closed = run(&url, &["tournament", "close", id, "--owner-file", &owner]);
-    let closed = String::from_utf8(closed.stdout).unwrap();
-    assert_eq!(closed, format!("tournament {id} is closed\n"));
-    let (code, lines) = ended(follower);
+    let follower = Running::start(&url, &format!("tournament follow {id}"));
+    let closed = run(&url, &format!("tournament close {id} --owner-file {owner}"));
+    assert_eq!(closed.stdout, format!("tournament {id} is closed\n"));
+    let (code, lines) = follower.ended();
     assert_eq!(
         code,
         Some(1),
         "a closed tournament did not finish: {lines:?}"
     );
-    let after = told(&["results", id]);
-    assert!(after.contains("no game was counted"), "{after}");
-    assert!(told(&["list", "--state", "closed"]).starts_with(id));
-    assert_eq!(told(&["list", "--state", "open"]), "no tournaments\n");
+    run(&url, &results).assert_says(&["no game was counted"]);
+    let listed = |state: &str| run(&url, &format!("tournament list --state {state}")).stdout;
+    assert!(listed("closed").starts_with(id));
+    assert_eq!(listed("open"), "no tournaments\n");
 }
 
 #[test]
@@ -326,26 +204,18 @@ fn invalid_tournament_options_are_reported_by_flag() {
     let (_server, url) = serve(folder.path());
     let nowhere = path(folder.path(), "nowhere/code");
     for (flags, words) in [
-        (["--rounds", "5000"], "--rounds: "),
-        (["--start-when", "1"], "--start-when: "),
-        (["--built-in", "nobody"], "--built-in"),
-        (["--decision-time-ms", "1"], "--decision-time-ms: "),
-        (["--clock", "human:1"], "--clock: "),
-        (["--faces", "3"], "--faces: "),
-        (["--target-shifts", "1000000"], "--target-shifts: "),
-        (["--code-file", &nowhere], "--code-file: "),
+        ("--rounds 5000", "--rounds: "),
+        ("--start-when 1", "--start-when: "),
+        ("--built-in nobody", "--built-in"),
+        ("--decision-time-ms 1", "--decision-time-ms: "),
+        ("--clock human:1", "--clock: "),
+        ("--faces 3", "--faces: "),
+        ("--target-shifts 1000000", "--target-shifts: "),
+        (&format!("--code-file {nowhere}"), "--code-file: "),
     ] {
-        let mut arguments = vec!["tournament", "create", "--name", "x", "--format", "swiss"];
-        arguments.extend(flags);
-        let refused = run(&url, &arguments);
-        assert!(matches!(refused.status.code(), Some(1 | 2)), "{flags:?}");
-        let stderr = String::from_utf8(refused.stderr).unwrap();
-        assert!(stderr.contains(words), "{stderr}");
-        assert!(refused.stdout.is_empty(), "{flags:?}");
+        let create = format!("tournament create --name x --format swiss {flags}");
+        run(&url, &create).assert_refused(words);
     }
-    let none = run(&url, &["tournament", "list"]);
-    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no tournaments\n");
-    let unknown = run(&url, &["tournament", "results", "nonsense"]);
-    assert_eq!(unknown.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&unknown.stderr).contains("TOURNAMENT_UNKNOWN"));
+    assert_eq!(run(&url, "tournament list").stdout, "no tournaments\n");
+    run(&url, "tournament results nonsense").assert_failed("TOURNAMENT_UNKNOWN");
 }

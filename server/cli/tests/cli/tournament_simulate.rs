@@ -3,21 +3,14 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, chefshat};
-
-/// Widest line of the tables.
-const COLUMNS: usize = 100;
+use super::run::{Ended, typed};
 
 fn simulate(flags: &str) -> Ended {
-    let mut arguments = vec!["tournament", "simulate"];
-    arguments.extend(flags.split_whitespace());
-    chefshat(&arguments)
+    typed(&format!("tournament simulate {flags}"))
 }
 
 fn json(flags: &str) -> Value {
-    let ended = simulate(&format!("{flags} --json"));
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    serde_json::from_str(&ended.stdout).unwrap()
+    simulate(&format!("{flags} --json")).well().json()
 }
 
 /// Names in the order of the standings.
@@ -39,8 +32,7 @@ fn order(result: &Value) -> Vec<String> {
 #[test]
 fn the_same_seed_gives_the_same_standings_on_any_number_of_threads() {
     let flags = "--format swiss --agents greedy*4,random*5 --games-per-pairing 3 --seed 7";
-    let ended = simulate(flags);
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = simulate(flags).well();
     for threads in ["--threads 1", "--threads 3"] {
         let again = simulate(&format!("{flags} {threads}"));
         assert_eq!(again.stdout, ended.stdout);
@@ -63,13 +55,7 @@ fn the_same_seed_gives_the_same_standings_on_any_number_of_threads() {
         1,
         "no progress where there is no terminal"
     );
-    for line in ended.stdout.lines() {
-        assert!(line.chars().count() <= COLUMNS, "{line}");
-        assert!(
-            !line.contains('\x1b'),
-            "colours where there is no terminal: {line}"
-        );
-    }
+    ended.assert_table_fits(8);
 }
 
 #[test]
@@ -129,8 +115,7 @@ fn standings_are_written_as_csv() {
         "--format round_robin --agents greedy,random --participants 5 --csv {}",
         file.display()
     );
-    let ended = simulate(&flags);
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    simulate(&flags).well();
     let csv = std::fs::read_to_string(&file).unwrap();
     assert_eq!(csv.lines().count(), 6);
     assert!(csv.starts_with("place,participant,name,"), "{csv}");
@@ -175,21 +160,11 @@ fn mistakes_are_explained() {
             "--players: 9 players",
         ),
     ] {
-        let ended = simulate(flags);
-        assert!(matches!(ended.code, Some(1 | 2)), "{flags}: {ended:?}");
-        assert!(ended.stderr.contains(expected), "{flags}: {}", ended.stderr);
-        assert_eq!(ended.stdout, "", "{flags}");
+        simulate(flags).assert_refused(expected);
     }
 }
 
 #[test]
 fn help_shows_an_example() {
-    let help = chefshat(&["tournament", "simulate", "--help"]);
-    assert_eq!(help.code, Some(0));
-    assert!(
-        help.stdout
-            .contains("chefshat tournament simulate --format swiss"),
-        "{}",
-        help.stdout
-    );
+    simulate("--help").assert_helps("chefshat tournament simulate --format swiss");
 }

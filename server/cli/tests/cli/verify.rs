@@ -1,25 +1,17 @@
 //! `chefshat verify`: accepts valid records, and reports file, line and problem of a damaged one.
 //! The kinds of damage are tested in `chefshat-record`.
 
-use std::path::{Path, PathBuf};
+use serde_json::json;
 
-use serde_json::{Value, json};
-
-use super::run::chefshat;
-
-fn fixture(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/fixtures/records")
-        .join(file)
-}
+use super::run::{chefshat, fixture};
 
 /// A data folder with two records, the second damaged on line 9.
 fn data_dir() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let records = folder.path().join("records");
     std::fs::create_dir(&records).unwrap();
-    std::fs::copy(fixture("committed.jsonl"), records.join("a.jsonl")).unwrap();
-    let text = std::fs::read_to_string(fixture("committed.jsonl")).unwrap();
+    std::fs::copy(fixture("records/committed.jsonl"), records.join("a.jsonl")).unwrap();
+    let text = std::fs::read_to_string(fixture("records/committed.jsonl")).unwrap();
     let damaged: Vec<String> = (1..)
         .zip(text.lines())
         .map(|(number, line)| match number {
@@ -35,13 +27,16 @@ fn data_dir() -> tempfile::TempDir {
 
 #[test]
 fn valid_records_verify() {
-    let (committed, fixed) = (fixture("committed.jsonl"), fixture("fixed.jsonl"));
+    let (committed, fixed) = (
+        fixture("records/committed.jsonl"),
+        fixture("records/fixed.jsonl"),
+    );
     let ended = chefshat(&[
         "verify",
         committed.to_str().unwrap(),
         fixed.to_str().unwrap(),
-    ]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    ])
+    .clean();
     let lines: Vec<&str> = ended.stdout.lines().collect();
     let [first, second, last] = lines[..] else {
         panic!("{}", ended.stdout)
@@ -63,8 +58,7 @@ fn valid_records_verify() {
 fn a_damaged_record_is_reported() {
     let folder = data_dir();
     let data_dir = folder.path().to_str().unwrap();
-    let ended = chefshat(&["verify", "--data-dir", data_dir]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    let ended = chefshat(&["verify", "--data-dir", data_dir]).ended_with(1);
     let lines: Vec<&str> = ended.stdout.lines().collect();
     let [first, second, last] = lines[..] else {
         panic!("{}", ended.stdout)
@@ -77,13 +71,8 @@ fn a_damaged_record_is_reported() {
     assert_eq!(last, "1 of 2 records do not fit");
 
     let records = folder.path().join("records");
-    let ended = chefshat(&["verify", "--json", records.to_str().unwrap()]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
-    let told: Vec<Value> = ended
-        .stdout
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let ended = chefshat(&["verify", "--json", records.to_str().unwrap()]).ended_with(1);
+    let told = ended.json_lines();
     assert_eq!(told.len(), 2);
     assert_eq!(
         told[0],
@@ -115,11 +104,10 @@ fn missing_records_are_reported() {
         (nowhere.as_path(), "No such file"),
     ] {
         let ended = chefshat(&["verify", path.to_str().unwrap()]);
-        assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        ended.assert_failed(words);
     }
     // A record given twice counts once.
-    let fixed = fixture("fixed.jsonl");
+    let fixed = fixture("records/fixed.jsonl");
     let fixed = fixed.to_str().unwrap();
     let ended = chefshat(&["verify", fixed, fixed]);
     assert!(
@@ -129,8 +117,7 @@ fn missing_records_are_reported() {
     );
     let empty = folder.path().join("empty.jsonl");
     std::fs::write(&empty, "").unwrap();
-    let ended = chefshat(&["verify", empty.to_str().unwrap()]);
-    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    let ended = chefshat(&["verify", empty.to_str().unwrap()]).ended_with(1);
     assert!(
         ended
             .stdout
