@@ -19,9 +19,9 @@ use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
 use tracing::{debug, error, info};
 
-use super::handle::{
-    Acted, AttachRequest, Handle, JoinRequest, Joined, Message, NotifySpace, SeatAction,
-    SpectateError, SpectateRequest,
+use super::message::{
+    Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, SeatAction, SpectateError,
+    SpectateRequest,
 };
 use super::subscriber::{
     MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
@@ -61,22 +61,17 @@ pub trait RoomWatcher: Send + Sync {
     fn gone(&self, room: Id);
 }
 
-/// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
-/// has been processed.
-pub fn spawn_room(
+/// Spawns the task of a room and returns the sender of its mailbox and its resting place.
+/// `over_since`: the game is already over, and its end has been processed.
+pub(super) fn spawn(
     core: Core,
     clock: RoomClock,
     over_since: Option<Duration>,
     journal: Box<dyn Journal>,
     context: TaskContext,
-) -> Handle {
+) -> (mpsc::Sender<Message>, Arc<Resting>) {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
     let resting = Arc::new(Resting::default());
-    let handle = Handle {
-        id: core.header().room_id,
-        mailbox: mailbox.clone(),
-        resting: Arc::clone(&resting),
-    };
     let seats = core.header().fills.len();
     let room = Box::new(Room {
         core,
@@ -97,8 +92,10 @@ pub fn spawn_room(
         answers_in_place: false,
         context: context.clone(),
     });
-    context.tracker.spawn(run(room, resting, inbox));
-    handle
+    context
+        .tracker
+        .spawn(run(room, Arc::clone(&resting), inbox));
+    (mailbox, resting)
 }
 
 /// An answer or update that is sent once the changes are committed.

@@ -1,0 +1,146 @@
+//! The messages to a room: requests with the means to answer them.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1;
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::Instant;
+
+use super::subscriber::DeliveryOptions;
+use crate::outbox::{OnSpace, Outbox};
+use chefshat_room::ids::Token;
+use chefshat_room::journal::{AbortReason, ParticipantKind};
+use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError};
+
+/// A request for a seat.
+#[derive(Debug)]
+pub struct JoinRequest {
+    /// Display name.
+    pub name: String,
+    /// The kind of the participant.
+    pub kind: ParticipantKind,
+    /// The requested seat; `None` for any.
+    pub seat: Option<u32>,
+    /// Identifies repetitions of the request.
+    pub request_id: Option<[u8; 32]>,
+}
+
+/// A seat that was taken.
+#[derive(Debug)]
+pub struct Joined {
+    /// The seat.
+    pub seat: Seat,
+    /// Its ticket.
+    pub ticket: Token,
+    /// The room with it.
+    pub room: Box<v1::Room>,
+}
+
+/// A request to attach a stream to a seat.
+#[derive(Debug)]
+pub struct AttachRequest {
+    /// The ticket's secret.
+    pub secret: [u8; 32],
+    /// The client's number for the request.
+    pub request_id: u32,
+    /// The stream.
+    pub outbox: Arc<Outbox>,
+    /// Number of the seat on the stream.
+    pub handle: u32,
+    /// How events and decisions are delivered to it.
+    pub options: DeliveryOptions,
+    /// The seat's contribution to the game seed.
+    pub entropy: Vec<u8>,
+    /// When the request was read.
+    pub arrived: Instant,
+    /// Set when the seat has left the stream.
+    pub detached: Arc<AtomicBool>,
+    /// The seat's ticket, if the server attaches the client.
+    pub assigned_ticket: Option<Token>,
+}
+
+/// A request to watch.
+#[derive(Debug)]
+pub struct SpectateRequest {
+    /// The stream.
+    pub outbox: Arc<Outbox>,
+    /// Position in the log of the first event to send.
+    pub from: usize,
+    /// Whether to start with a snapshot.
+    pub snapshot: bool,
+}
+
+/// Why a room cannot be watched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpectateError {
+    /// The policy does not admit spectators.
+    NotAdmitted,
+    /// There are too many spectators.
+    Full,
+    /// A snapshot of a delayed room would reveal its present state.
+    SnapshotDelayed,
+}
+
+/// A command of a seat.
+#[derive(Debug)]
+pub enum SeatAction {
+    /// Answers a decision.
+    Answer(Answer),
+    /// Expresses something.
+    Express {
+        /// For the record only.
+        record_only: bool,
+        /// The expression, encoded.
+        expression: Box<[u8]>,
+    },
+    /// Takes the seat back from its substitute.
+    Resume,
+}
+
+/// The result of a command without a stream.
+pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
+
+/// A message to a room.
+pub(super) enum Message {
+    Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
+    Attach(
+        Box<AttachRequest>,
+        oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ),
+    Lost(Seat, ConnectionId, Option<v1::DetachReason>),
+    Do(Seat, ConnectionId, SeatAction, Instant),
+    Act(
+        [u8; 32],
+        SeatAction,
+        Instant,
+        oneshot::Sender<Option<Acted>>,
+    ),
+    Spectate(
+        Box<SpectateRequest>,
+        oneshot::Sender<Result<(), SpectateError>>,
+    ),
+    Describe(oneshot::Sender<v1::Room>),
+    Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
+    Leave(
+        [u8; 32],
+        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
+    ),
+    Abort(AbortReason),
+    Suspend,
+    /// Delivers and sets the timer again: a stream has space, or an answer was handled in place.
+    Wake,
+}
+
+/// Tells a room that a stream has space again.
+pub(super) struct NotifySpace(pub(super) mpsc::WeakSender<Message>);
+
+impl OnSpace for NotifySpace {
+    fn space(&self) {
+        if let Some(mailbox) = self.0.upgrade() {
+            // If the mailbox is full, the room will deliver anyway.
+            let _ = mailbox.try_send(Message::Wake);
+        }
+    }
+}
