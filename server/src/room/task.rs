@@ -247,7 +247,7 @@ impl Room {
         answer: Answer,
         arrived: Instant,
     ) -> bool {
-        self.now = self.clock.now();
+        self.now = self.now.max(self.clock.at(arrived));
         self.receive(Message::Do(
             seat,
             connection,

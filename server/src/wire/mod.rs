@@ -4,12 +4,13 @@
 //! its events.
 
 mod decision;
+mod field;
 #[cfg(test)]
 mod hidden_tests;
 
 use std::marker::PhantomData;
 
-use chefshat_proto::v1::{self, seat_update::Update};
+use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use prost::Message;
 use prost::bytes::{Buf, BufMut};
 use prost::encoding::{
@@ -20,6 +21,7 @@ use tonic::codec::{BufferSettings, Codec};
 use tonic_prost::{ProstCodec, ProstDecoder, ProstEncoder};
 
 pub use decision::encode_decision;
+use field::{put_message, put_number};
 
 /// The streaming services, with [`Updates`] as their responses.
 pub mod service {
@@ -109,7 +111,13 @@ impl Updates {
 
     /// Adds the result of an answer.
     pub fn add_result(&mut self, handle: u32, result: &v1::AnswerResult) {
-        self.add_encoded(handle, UPDATE_RESULT, &result.encode_to_vec());
+        if self.bytes.capacity() == 0 {
+            self.bytes.reserve(USUAL_LENGTH);
+        }
+        put_message(&mut self.bytes, RESPONSE_UPDATES, |out| {
+            put_number(out, UPDATE_HANDLE, handle.into());
+            put_message(out, UPDATE_RESULT, |out| put_result(out, result));
+        });
         self.end_part(1);
     }
 
@@ -284,9 +292,55 @@ impl Events {
     }
 }
 
-/// Encodes one event into a batch that is being built.
+/// Encodes one event into a batch. Plays and passes, by far the most frequent, are written directly.
 pub fn put_event(batch: &mut Vec<u8>, event: &v1::GameEvent) {
-    prost::encoding::message::encode(BATCH_EVENTS, event, batch);
+    let common = |out: &mut Vec<u8>| {
+        put_number(out, 1, event.sequence);
+        put_number(out, 2, event.elapsed_ms);
+    };
+    match &event.kind {
+        Some(Kind::Play(play)) if event.rewards.is_empty() => {
+            put_message(batch, BATCH_EVENTS, |out| {
+                common(out);
+                put_message(out, 13, |out| {
+                    put_number(out, 1, play.seat.into());
+                    put_number(out, 2, play.action.into());
+                    put_number(out, 3, play.face.into());
+                    put_number(out, 4, play.quantity.into());
+                    put_number(out, 5, play.jokers.into());
+                    put_number(out, 6, play.cards_left.into());
+                    put_number(out, 7, enum_number(play.source));
+                    put_number(out, 8, play.decision_time_us);
+                });
+            });
+        }
+        Some(Kind::Pass(pass)) if event.rewards.is_empty() => {
+            put_message(batch, BATCH_EVENTS, |out| {
+                common(out);
+                put_message(out, 14, |out| {
+                    put_number(out, 1, pass.seat.into());
+                    put_number(out, 2, enum_number(pass.source));
+                    put_number(out, 3, pass.decision_time_us);
+                });
+            });
+        }
+        _ => prost::encoding::message::encode(BATCH_EVENTS, event, batch),
+    }
+}
+
+fn put_result(out: &mut Vec<u8>, result: &v1::AnswerResult) {
+    if result.status() == v1::AnswerStatus::Invalid {
+        return result.encode_raw(out);
+    }
+    put_number(out, 1, result.decision_id);
+    put_number(out, 2, enum_number(result.status));
+    put_number(out, 3, result.action.into());
+    put_number(out, 4, result.decision_time_us);
+    put_number(out, 8, result.annotations_dropped.into());
+}
+
+fn enum_number(value: i32) -> u64 {
+    u64::try_from(value).expect("enums of the protocol are not negative")
 }
 
 fn delimited_length(field: u32, length: usize) -> usize {
@@ -317,6 +371,68 @@ mod tests {
     fn decoded(updates: &Updates) -> Vec<v1::SeatUpdate> {
         let response = v1::PlayResponse::decode(updates.encode_to_vec().as_slice());
         response.expect("a response").updates
+    }
+
+    #[test]
+    fn messages_written_directly_are_those_of_prost() {
+        let numbers = [0, 1, 127, 128, 300, 70_000];
+        let large = [0, 1, 127, 128, 1 << 40];
+        for (number, time) in numbers.iter().flat_map(|n| large.map(|time| (*n, time))) {
+            let play = v1::Play {
+                seat: number,
+                action: number,
+                face: number,
+                quantity: number,
+                jokers: number,
+                cards_left: number,
+                source: v1::DecisionSource::Timeout.into(),
+                decision_time_us: time,
+            };
+            let pass = v1::Pass {
+                seat: number,
+                source: v1::DecisionSource::Agent.into(),
+                decision_time_us: time,
+            };
+            for kind in [Kind::Play(play), Kind::Pass(pass)] {
+                let event = v1::GameEvent {
+                    sequence: time,
+                    elapsed_ms: number.into(),
+                    rewards: Vec::new(),
+                    kind: Some(kind),
+                };
+                let (mut direct, mut prost) = (Vec::new(), Vec::new());
+                put_event(&mut direct, &event);
+                prost::encoding::message::encode(BATCH_EVENTS, &event, &mut prost);
+                assert_eq!(direct, prost);
+            }
+            for status in [
+                v1::AnswerStatus::Accepted,
+                v1::AnswerStatus::Closed,
+                v1::AnswerStatus::UnknownDecision,
+                v1::AnswerStatus::Invalid,
+            ] {
+                let invalid = status == v1::AnswerStatus::Invalid;
+                let result = v1::AnswerResult {
+                    decision_id: time,
+                    status: status.into(),
+                    action: number,
+                    decision_time_us: time,
+                    detail: if invalid {
+                        "no ".repeat(90)
+                    } else {
+                        String::new()
+                    },
+                    invalid_attempts_left: invalid.then_some(0),
+                    reward: invalid.then_some(-1.0),
+                    annotations_dropped: number == 1,
+                };
+                let mut updates = Updates::default();
+                updates.add_result(number, &result);
+                let mut prost = Updates::default();
+                prost.add(number, Update::Result(result));
+                assert_eq!(updates, prost);
+            }
+        }
     }
 
     #[test]
