@@ -203,7 +203,7 @@ impl CheckAgent {
             };
             write!(text, "\n      {style}{fault}{style:#}{times}")?;
             write!(text, "\n        expected: {}", finding.expected)?;
-            write!(text, "\n        came:     {}", finding.got)?;
+            write!(text, "\n        got:      {}", finding.got)?;
             write!(text, "\n        to do:    {}", fault.advice())?;
         }
         if !outcome.last_lines.is_empty() {

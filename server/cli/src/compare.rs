@@ -25,12 +25,12 @@ const MAX_LABEL: usize = 14;
 
 const HELP: &str = "\
 A and B are built-in agents (random, greedy and so on) or network files, as chefshat.learn writes them. Every deal is played \
-in all seatings of the two, so that neither is favoured by the cards. How much that is worth depends on the two: last of all the output \
-says how many Shifts of independent deals would make the result as sure. A network plays the legal action with the highest output.
+in all seatings of the two, so that the cards favour neither. The gain depends on the agents: the last line of the output says how many \
+Shifts of independent deals would give the same precision. A network plays the legal action with the highest output.
 
-Figures are per seat and Shift: what a seat of A gets, and a seat of B. The 95 % interval is 1.96 standard errors to either side of the \
-difference; independent of each other are the deals. Roles and exchange begin with the second Shift of a game. Only the deals are the \
-same in all seatings: agents that draw do so anew.
+Figures are per seat and Shift, for a seat of A and for a seat of B. The 95 % interval is 1.96 standard errors to either side of the \
+difference, with deals as independent samples. Roles and exchange begin with the second Shift of a game. All seatings have the same \
+deals, but agents with random choices make new ones in each.
 
 Examples:
   chefshat compare greedy random

@@ -13,10 +13,10 @@ use serde_json::{Value, json};
 use super::CommandError;
 
 const HELP: &str = "\
-A file of vectors has one JSON object a line, either a deal (rules, seed, shift, hands, leader) or a whole game (rules, seed, steps, \
+A vector file has one JSON object per line, either a deal (rules, seed, shift, hands, leader) or a complete game (rules, seed, steps, \
 shifts, scores, winner).
 
-Exit code 0: all agree. 1: one does not agree (the first is named), or the file is none of vectors.
+Exit code 0: all vectors agree. 1: a vector does not agree (the first is reported), or the file is not a vector file.
 
 Example:
   chefshat conformance tests/fixtures/vectors/games.jsonl";

@@ -50,7 +50,7 @@ impl ServerArg {
     /// The last failure.
     pub(super) async fn connect_patiently(&self) -> Result<Client, CommandError> {
         let give_up_at = Instant::now() + PATIENCE;
-        let mut told = false;
+        let mut announced = false;
         loop {
             match Client::connect(&self.server).await {
                 Ok(client) => return Ok(client),
@@ -58,15 +58,15 @@ impl ServerArg {
                     if Instant::now() + PAUSE > give_up_at {
                         let waited = PATIENCE.as_secs();
                         return Err(format!(
-                            "{}; nobody answered there for {waited} seconds, see that `chefshat serve` is running",
+                            "{}; no answer for {waited} seconds; check that `chefshat serve` is running there",
                             error.message()
                         )
                         .into());
                     }
-                    if !std::mem::replace(&mut told, true) {
+                    if !std::mem::replace(&mut announced, true) {
                         let patience = PATIENCE.as_secs();
                         anstream::eprintln!(
-                            "nobody answers at {} yet; trying for up to {patience} seconds",
+                            "no answer from {} yet; retrying for up to {patience} seconds",
                             self.server
                         );
                     }
@@ -127,7 +127,7 @@ impl JoinArgs {
 /// There is none in time, or the file is unreadable.
 async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError> {
     let give_up_at = Instant::now() + PATIENCE;
-    let mut told = false;
+    let mut announced = false;
     loop {
         match std::fs::read_to_string(file) {
             Ok(text) if !text.trim().is_empty() && last != Some(text.trim()) => {
@@ -144,12 +144,12 @@ async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError
         };
         if Instant::now() + PAUSE > give_up_at {
             return Err(format!(
-                "there was not {what} in {} for {patience} seconds; `create --code-file` of `chefshat room` or `chefshat tournament` writes one",
+                "there was no {what} in {} for {patience} seconds; `create --code-file` of `chefshat room` or `chefshat tournament` writes one",
                 file.display()
             )
             .into());
         }
-        if !std::mem::replace(&mut told, true) {
+        if !std::mem::replace(&mut announced, true) {
             anstream::eprintln!(
                 "waiting for {what} in {} for up to {patience} seconds",
                 file.display()

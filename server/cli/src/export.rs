@@ -15,15 +15,15 @@ use super::numbers::counted;
 use super::{CommandError, data_dir};
 
 const HELP: &str = "\
-The folder gets the tables `decisions` and `expressions` in every format asked for, a dataset card (README.md) and SHA256SUMS. It \
-appears whole or not at all. Every record is replayed first; one that is damaged fails the export unless it is to be skipped.
+The directory contains the tables `decisions` and `expressions` in every requested format, a dataset card (README.md) and SHA256SUMS. \
+It is written atomically. Every record is replayed first; a damaged one fails the export unless --skip-damaged is given.
 
 Examples:
   chefshat export --out dataset
   chefshat export records/ --out dataset --format parquet,csv --finished-only
   chefshat export game.jsonl --out dataset --layout chefshatgym";
 
-/// Kinds of players as spelt in the tables.
+/// Names of the kinds of players in the tables.
 const KINDS: [&str; 4] = ["agent", "human", "robot", "built_in"];
 
 /// Export records as a dataset: Parquet, CSV or JSON Lines, with a dataset card.
@@ -139,16 +139,12 @@ impl Export {
 
     /// The report for people.
     fn write_report(&self, out: &mut impl Write, exported: &Exported) -> std::io::Result<()> {
-        for left_out in &exported.skipped {
-            anstream::eprintln!(
-                "left out: {}: {}",
-                left_out.path.display(),
-                left_out.problem
-            );
+        for record in &exported.skipped {
+            anstream::eprintln!("skipped: {}: {}", record.path.display(), record.problem);
         }
         if exported.filtered > 0 {
             anstream::eprintln!(
-                "left out by the filter: {}",
+                "excluded by the filter: {}",
                 counted(exported.filtered, "game")
             );
         }

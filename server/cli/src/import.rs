@@ -17,11 +17,11 @@ use serde_json::json;
 use super::{CommandError, data_dir, verify};
 
 const HELP: &str = "\
-A FILE that ends in .jsonl is a record, perhaps of another server: it is verified and copied. Any other is a transcript: a CSV file in \
-which somebody wrote down a game played with real cards. It becomes a record; hands that nobody wrote down stay unknown where they do not \
-follow from what was played. docs/records.md describes both forms.
+A FILE that ends in .jsonl is a record, perhaps of another server: it is verified and copied. Any other FILE is a transcript: a CSV file \
+with the notes of a game played with real cards. It becomes a record; hands that are not in the notes stay unknown unless they follow \
+from the plays. docs/records.md describes both formats.
 
-Exit code 0: the record is there. 1: a line does not fit (it is named), or the record was there before.
+Exit code 0: the record was added. 1: a line is invalid (it is reported), or the record exists already.
 
 Examples:
   chefshat import table-3.csv
@@ -63,7 +63,7 @@ impl Import {
             .into());
         }
         jsonl::write(&path, &lines)?;
-        self.tell(&path, header, &replayed)?;
+        self.print(&path, header, &replayed)?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -102,7 +102,7 @@ impl Import {
         })
     }
 
-    fn tell(
+    fn print(
         &self,
         path: &Path,
         header: &v1::RecordHeader,

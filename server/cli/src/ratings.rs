@@ -99,38 +99,38 @@ impl RatingsCommand {
         let bar = ProgressBar::new(bytes).with_style(ProgressStyle::with_template(
             "{bar:40} {bytes} of {total_bytes} of records, {eta} left",
         )?);
-        let read: Vec<(&Path, Result<Told, String>)> = files
+        let read: Vec<(&Path, Result<ReadRecord, String>)> = files
             .par_iter()
             .map(|file| {
-                let told = tell(&file.path);
+                let read = read(&file.path);
                 bar.inc(file.bytes);
-                (file.path.as_path(), told)
+                (file.path.as_path(), read)
             })
             .collect();
         bar.finish_and_clear();
         let mut gathered = Gathered::default();
         let (mut games, mut known) = (Vec::new(), BTreeSet::new());
-        for (path, told) in read {
-            let told = match told {
-                Ok(told) => told,
+        for (path, record) in read {
+            let record = match record {
+                Ok(record) => record,
                 Err(problem) if self.skip_damaged => {
-                    anstream::eprintln!("chefshat: left out {}: {problem}", path.display());
+                    anstream::eprintln!("chefshat: skipped {}: {problem}", path.display());
                     gathered.damaged += 1;
                     continue;
                 }
                 Err(problem) => {
                     return Err(format!(
-                        "{}: {problem}; use --skip-damaged to leave out damaged records",
+                        "{}: {problem}; use --skip-damaged to skip damaged records",
                         path.display()
                     )
                     .into());
                 }
             };
-            if !known.insert(told.game_id) {
+            if !known.insert(record.game_id) {
                 continue;
             }
             gathered.records += 1;
-            match told.outcome {
+            match record.outcome {
                 Ok(outcome) => games.push(outcome),
                 Err(reason) => *gathered.not_rated.entry(reason).or_default() += 1,
             }
@@ -148,14 +148,14 @@ impl RatingsCommand {
 }
 
 /// What a record contributes to ratings.
-struct Told {
+struct ReadRecord {
     game_id: String,
     /// Why the game is not rated.
     outcome: Result<Outcome, (&'static str, String)>,
 }
 
 /// Reads and verifies a record.
-fn tell(path: &Path) -> Result<Told, String> {
+fn read(path: &Path) -> Result<ReadRecord, String> {
     let lines = jsonl::read(path).map_err(|error| match error {
         jsonl::RecordFileError::Io { source, .. } => source.to_string(),
         jsonl::RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
@@ -173,7 +173,7 @@ fn tell(path: &Path) -> Result<Told, String> {
         Err(error @ OutcomeError::NotFinished) => Err(("not_finished", error.to_string())),
         Err(damage) => return Err(damage.to_string()),
     };
-    Ok(Told { game_id, outcome })
+    Ok(ReadRecord { game_id, outcome })
 }
 
 fn as_text(gathered: &Gathered, board: &v1::GetLeaderboardResponse) -> String {
@@ -195,7 +195,7 @@ fn as_text(gathered: &Gathered, board: &v1::GetLeaderboardResponse) -> String {
     if gathered.damaged > 0 {
         line(
             &mut text,
-            &format!("{} damaged, left out", counted(gathered.damaged, "record")),
+            &format!("{} damaged, skipped", counted(gathered.damaged, "record")),
         );
     }
     if !board.rated.is_empty() {

@@ -191,7 +191,7 @@ impl Render {
         } else {
             self.picture(&lines, kind)?
         };
-        self.tell(kind, &written)?;
+        self.print(kind, &written)?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -311,7 +311,7 @@ impl Render {
         Duration::from_secs_f64(seconds)
     }
 
-    fn tell(&self, kind: Kind, written: &Written) -> Result<(), CommandError> {
+    fn print(&self, kind: Kind, written: &Written) -> Result<(), CommandError> {
         let bytes = std::fs::metadata(&self.out)?.len();
         let Written {
             width,

@@ -12,7 +12,7 @@ pub(super) struct SecretFile<'a> {
     what: &'static str,
     file: &'a Path,
     part: PathBuf,
-    whole: File,
+    temporary: File,
 }
 
 impl<'a> SecretFile<'a> {
@@ -41,18 +41,18 @@ impl<'a> SecretFile<'a> {
             options.write(true).create_new(true).mode(0o600).open(&part)
         };
         match open() {
-            Ok(whole) => Ok(Self {
+            Ok(temporary) => Ok(Self {
                 what,
                 file,
                 part,
-                whole,
+                temporary,
             }),
             Err(error) => {
                 let file = file.display();
-                Err(
-                    format!("{flag}: {what} cannot be left in {file}: {error}; nothing was made")
-                        .into(),
+                Err(format!(
+                    "{flag}: {what} cannot be written to {file}: {error}; nothing was created"
                 )
+                .into())
             }
         }
     }
@@ -62,11 +62,11 @@ impl<'a> SecretFile<'a> {
     /// # Errors
     /// The file cannot be written.
     pub(super) fn leave(mut self, secret: &str) -> Result<(), CommandError> {
-        writeln!(self.whole, "{secret}")
+        writeln!(self.temporary, "{secret}")
             .and_then(|()| std::fs::rename(&self.part, self.file))
             .map_err(|error| {
                 format!(
-                    "what was asked for was made, but {} cannot be left in {}: {error}",
+                    "everything was created, but {} cannot be written to {}: {error}",
                     self.what,
                     self.file.display()
                 )
@@ -115,7 +115,9 @@ mod tests {
             .expect("the folder")
             .count();
         assert_eq!(left, 0);
-        let refused = prepare(folder.path()).err().expect("a folder is no file");
+        let refused = prepare(folder.path())
+            .err()
+            .expect("a folder is not a file");
         assert!(
             refused
                 .to_string()

@@ -37,7 +37,7 @@ pub(super) struct Serve {
     /// Let any client import records of games played elsewhere.
     #[arg(long, env = "CHEFSHAT_ALLOW_IMPORT", value_parser = FalseyValueParser::new())]
     allow_import: bool,
-    /// Maximum number of rooms at a time.
+    /// Maximum number of open rooms.
     #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
     /// Threads for the games of learning agents; 0 means one per core. Rooms have separate threads.
@@ -102,10 +102,10 @@ impl Serve {
         };
         let server = Server::restored(config, store).await?;
         if let Some(folder) = kept_in {
-            eprintln!("games are kept in {}", folder.display());
+            eprintln!("games are stored in {}", folder.display());
         }
         if server.games() > 0 {
-            eprintln!("unfinished games that go on: {}", server.games());
+            eprintln!("resumed games: {}", server.games());
         }
         if self.json {
             say(serde_json::json!({
@@ -116,7 +116,7 @@ impl Serve {
         }
         eprintln!("listening on http://{address}");
         if !web::is_built_in() {
-            eprintln!("the page for people is not built in; `cargo xtask web` builds it");
+            eprintln!("the web page is not built in; `cargo xtask web` builds it");
         }
         let input_ends = self.until_stdin_closes.then(end_of_input);
         let stop = async move {
@@ -126,7 +126,7 @@ impl Serve {
                 Some(_) = OptionFuture::from(input_ends) => {}
             }
             eprintln!(
-                "stopping: no new rooms; running games may end within {grace} s, after that durable ones are put down and go on at the next \
+                "stopping: no new rooms; running games may end within {grace} s, then durable ones are suspended and resume at the next \
                  start; stop again to end at once"
             );
             tokio::spawn(async move {
@@ -135,7 +135,7 @@ impl Serve {
                     _ = interrupt.recv() => {}
                 }
                 eprintln!(
-                    "stopped at once: durable games go on when the server is started again, all others are lost"
+                    "stopped at once: durable games resume when the server is started again, all others are lost"
                 );
                 std::process::exit(1);
             });
@@ -148,19 +148,19 @@ impl Serve {
 
 /// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own at shutdown.
 fn end_of_input() -> oneshot::Receiver<()> {
-    let (tell, told) = oneshot::channel();
+    let (sender, closed) = oneshot::channel();
     std::thread::spawn(move || {
         // A read error ends the input, too.
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        let _ = tell.send(());
+        let _ = sender.send(());
     });
-    told
+    closed
 }
 
 /// Checks the form of an address; the host is resolved later.
 fn host_and_port(text: &str) -> Result<String, String> {
-    let whole = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
-    match text.rsplit_once(':').is_some_and(whole) {
+    let is_complete = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
+    match text.rsplit_once(':').is_some_and(is_complete) {
         true => Ok(text.to_owned()),
         false => Err("use IP:PORT or HOST:PORT, for example 127.0.0.1:50051".to_owned()),
     }

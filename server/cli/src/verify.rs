@@ -93,7 +93,7 @@ impl Verify {
                 fitting += 1;
                 decisions += fits.replayed.decisions;
             }
-            bar.suspend(|| tell(&checked, self.json))?;
+            bar.suspend(|| print(&checked, self.json))?;
         }
         bar.finish_and_clear();
         if !self.json {
@@ -162,7 +162,7 @@ pub(super) fn ending(replayed: &Replayed) -> &'static str {
     }
 }
 
-fn tell(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<(), CommandError> {
+fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<(), CommandError> {
     let mut out = anstream::stdout().lock();
     for (file, checked) in checked {
         let name = file.display();

@@ -181,7 +181,7 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     let terminal = Terminal::start(test, &back).expect("tmux is installed");
     terminal.wait_for("your hand").await;
     server.kill().await;
-    terminal.wait_for("connection is lost").await;
+    terminal.wait_for("Connection lost, reconnecting").await;
     let server = launch.start().await.expect("the server listens");
     terminal.wait_for("● connected").await;
     let decisions = terminal.play("final standings").await;

@@ -156,7 +156,7 @@ impl Demo {
                 writeln!(out, "{line}")?;
             } else if !matches!(event.kind, Some(Kind::Seated(_))) {
                 // The start of the game lists the seats.
-                write!(out, "{}", narrator.tell(&event))?;
+                write!(out, "{}", narrator.narrate(&event))?;
                 out.flush()?;
             }
             match event.kind {

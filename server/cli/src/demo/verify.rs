@@ -27,7 +27,7 @@ impl Checked {
         let seed = if self.committed {
             "the seed committed to"
         } else {
-            "the seed asked for"
+            "the requested seed"
         };
         format!("check out: {deals} from {seed}")
     }
@@ -71,7 +71,7 @@ pub(super) fn check(
     let seed: [u8; 32] = exactly(&reveal.game_seed).ok_or(Unproven("the seed is not 32 bytes"))?;
     match asked {
         Some(asked) if asked == seed => {}
-        Some(_) => return Err(Unproven("the seed is not the one asked for")),
+        Some(_) => return Err(Unproven("the seed is not the requested one")),
         None => check_commitment(reveal, &game_id, commitment, seed, outcomes)?,
     }
     for start in &shifts {
@@ -93,7 +93,7 @@ fn check_commitment(
     seed: [u8; 32],
     outcomes: &[Outcome],
 ) -> Result<(), Unproven> {
-    let short = Unproven("what the server revealed is not of the right length");
+    let short = Unproven("the revealed values have the wrong length");
     let (Some(server_seed), Some(nonce)) = (exactly(&reveal.server_seed), exactly(&reveal.nonce))
     else {
         return Err(short);

@@ -47,7 +47,7 @@ impl Narrator {
     }
 
     /// Returns the text of an event. It ends in the middle of a line while a pizza is being made.
-    pub(super) fn tell(&mut self, event: &v1::GameEvent) -> String {
+    pub(super) fn narrate(&mut self, event: &v1::GameEvent) -> String {
         let Some(kind) = &event.kind else {
             return String::new();
         };

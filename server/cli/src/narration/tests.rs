@@ -12,7 +12,7 @@ use super::text::{WIDTH, columns};
 fn text_of(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> String {
     let mut out = String::new();
     for kind in events {
-        out.push_str(&narrator.tell(&v1::GameEvent {
+        out.push_str(&narrator.narrate(&v1::GameEvent {
             kind: Some(kind),
             ..v1::GameEvent::default()
         }));

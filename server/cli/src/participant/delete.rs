@@ -205,8 +205,8 @@ async fn held(
     if !names.contains(&name) {
         return Ok(None);
     }
-    let kept = database.seated_names(game).await?;
-    Ok(pseudonym_of(name, &names, &kept).cloned())
+    let stored = database.seated_names(game).await?;
+    Ok(pseudonym_of(name, &names, &stored).cloned())
 }
 
 /// The names of the participants seated in a record, in order.
@@ -223,10 +223,10 @@ fn sat_down(lines: &[v1::RecordLine]) -> Vec<&str> {
 }
 
 /// The pseudonym stored for a name, by the participants seated in the same game.
-fn pseudonym_of<'k>(name: &str, recorded: &[&str], kept: &'k [String]) -> Option<&'k String> {
-    let mut both = recorded.iter().zip(kept);
-    let found = both.find(|(recorded, kept)| **recorded == name && kept.starts_with(PSEUDONYM));
-    found.map(|(_, kept)| kept)
+fn pseudonym_of<'k>(name: &str, recorded: &[&str], stored: &'k [String]) -> Option<&'k String> {
+    let mut both = recorded.iter().zip(stored);
+    let found = both.find(|(recorded, stored)| **recorded == name && stored.starts_with(PSEUDONYM));
+    found.map(|(_, stored)| stored)
 }
 
 #[cfg(test)]
@@ -247,8 +247,8 @@ mod tests {
         let lines = ["Ana", "Bo", "Ana"].map(seated);
         let recorded = sat_down(&lines);
         assert_eq!(recorded, ["Ana", "Bo", "Ana"]);
-        let kept = |names: [&str; 3]| names.map(str::to_owned);
-        let held = |names| pseudonym_of("Ana", &recorded, &kept(names)).cloned();
+        let stored = |names: [&str; 3]| names.map(str::to_owned);
+        let held = |names| pseudonym_of("Ana", &recorded, &stored(names)).cloned();
         let pseudonym = format!("{PSEUDONYM}a1b2c3");
         assert_eq!(
             held([&pseudonym, "Bo", &pseudonym]),

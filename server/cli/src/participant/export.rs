@@ -126,9 +126,9 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
         after = *last;
         for (_, summary) in found {
             if let Some(game) = Id::parse(&summary.game_id)
-                && let Some(kept) = store.finished(game).await?
+                && let Some(stored) = store.finished(game).await?
             {
-                sheet.add_game(&summary, &convert::lines_of(&kept), name);
+                sheet.add_game(&summary, &convert::lines_of(&stored), name);
             }
             known.insert(summary.game_id);
         }

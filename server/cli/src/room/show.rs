@@ -137,7 +137,7 @@ fn in_full(room: &v1::Room) -> String {
     }
     let policy = room.policy.clone().unwrap_or_default();
     if policy.durability() == v1::Durability::Ephemeral {
-        out.push_str("kept  in memory until it ends; lost when the server stops\n");
+        out.push_str("store in memory; the game is lost when the server stops\n");
     }
     for seat in &room.seats {
         out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));
@@ -231,7 +231,7 @@ mod tests {
             "room  a\ngame  b\nstate playing\n\
              start as game c until after decision 40, later deals as there\n\
              deal  from a seed its creator fixed\n\
-             kept  in memory until it ends; lost when the server stops\n\
+             store in memory; the game is lost when the server stops\n\
              seat 0 replay, imitates seat 2 of game c\n\
              seat 1 free for anyone\n"
         );

@@ -63,7 +63,7 @@ fn read_hands(file: &Path) -> Result<v1::ScriptedShift, CommandError> {
     let text =
         std::fs::read_to_string(file).map_err(|error| format!("--hands: {name}: {error}"))?;
     serde_json::from_str(&text)
-        .map_err(|error| format!("--hands: {name} is no ScriptedShift: {error}").into())
+        .map_err(|error| format!("--hands: {name} is not a ScriptedShift: {error}").into())
 }
 
 /// Number of players of a recorded game, from the header of its record.

@@ -77,7 +77,7 @@ impl Watch {
                 let line = serde_json::json!({"event": "game", "game_event": game_event});
                 writeln!(out, "{line}")?;
             } else {
-                write!(out, "{}", narrator.tell(&event))?;
+                write!(out, "{}", narrator.narrate(&event))?;
             }
             out.flush()?;
         }

@@ -177,7 +177,7 @@ impl Create {
         let (id, server) = (&tournament.tournament_id, self.server.url());
         if tournament.state() != v1::TournamentState::Open {
             return format!(
-                "it has begun; follow it with: chefshat tournament follow {id} --server {server}"
+                "it has started; follow it with: chefshat tournament follow {id} --server {server}"
             );
         }
         let join =

@@ -165,13 +165,13 @@ impl Agent for Teller {
     }
 
     fn on_game_over(&mut self, outcome: &Outcome) {
-        let told = match self.json {
+        let printed = match self.json {
             true => say(outcome_json(outcome)),
             false => say(outcome_in_words(outcome)),
         };
-        if let Err(error) = told {
+        if let Err(error) = printed {
             // The agent plays on even if nobody listens.
-            tracing::debug!(%error, "a game was told to nobody");
+            tracing::debug!(%error, "cannot print the result of a game");
         }
     }
 }

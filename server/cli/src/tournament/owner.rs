@@ -60,7 +60,7 @@ impl Start {
         let token = self.owned.token()?;
         let client = self.owned.server.connect().await?;
         let tournament = client.start_tournament(tournament_id, token).await?;
-        self.owned.tell("started", &tournament)
+        self.owned.print("started", &tournament)
     }
 }
 
@@ -70,7 +70,7 @@ impl Close {
         let token = self.owned.token()?;
         let client = self.owned.server.connect().await?;
         let tournament = client.close_tournament(tournament_id, token).await?;
-        self.owned.tell("closed", &tournament)
+        self.owned.print("closed", &tournament)
     }
 }
 
@@ -86,7 +86,7 @@ impl Owned {
         }
     }
 
-    fn tell(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {
+    fn print(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {
         if self.json {
             say(serde_json::json!({"event": event, "tournament": tournament}))?;
         } else {

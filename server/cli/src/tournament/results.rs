@@ -79,7 +79,7 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
     let participants = counted(tournament.participants.len() as u64, "participant");
     let (over, games) = (tournament.games_over, tournament.games);
     let course = match tournament.state() {
-        v1::TournamentState::Open => "not begun".to_owned(),
+        v1::TournamentState::Open => "not started".to_owned(),
         _ => format!(
             "{}, {over} of {games} games over",
             counted(tournament.rounds.into(), "round")
@@ -113,7 +113,7 @@ pub(super) fn of_deals(deals: v1::TournamentDeals) -> Option<&'static str> {
     match deals {
         v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent => None,
         v1::TournamentDeals::SameAtAllTables => {
-            Some("all tables of a round were dealt alike; nobody met a deal twice")
+            Some("all tables of a round had the same deals; no participant met a deal twice")
         }
         v1::TournamentDeals::Rotated => Some(
             "participants met each deal in all seats: built-in agents, and others that declared to remember nothing",

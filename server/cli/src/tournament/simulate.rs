@@ -38,7 +38,7 @@ const MAX_PARALLEL: usize = 256;
     after_help = "Examples:\n  chefshat tournament simulate --format round_robin --agents greedy*4,trained*4,random*4 --games-per-pairing 100\n  \
                   chefshat tournament simulate --format swiss --agents greedy,trained,random --participants 40 --games-per-pairing 50 --deals same\n  \
                   chefshat tournament simulate --format knockout --agents trained*5,greedy*8 --seed 7 --json\n\n\
-                  The same seed gives the same output, on any number of threads. What it took is said on standard error."
+                  The same seed gives the same output, on any number of threads. The duration is printed to standard error."
 )]
 pub(super) struct Simulate {
     /// Format of the tournament.

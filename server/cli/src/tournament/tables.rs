@@ -103,7 +103,7 @@ pub(super) fn standings(
     standings: &[v1::TournamentStanding],
 ) {
     if !has_counted(standings) {
-        heading(text, "Who takes part");
+        heading(text, "Participants");
         let rows = (standings.iter()).map(|standing| {
             vec![
                 field.name(standing.participant),
@@ -238,7 +238,7 @@ mod tests {
         let mut text = String::new();
         standings(&mut text, &Field::new(&tournament), &lines);
         let text = anstream::adapter::strip_str(&text).to_string();
-        for words in ["Who takes part", "Ada", "human"] {
+        for words in ["Participants", "Ada", "human"] {
             assert!(text.contains(words), "{words} is not in {text}");
         }
         assert!(!text.contains("Place"), "{text}");

@@ -164,7 +164,7 @@ fn damaged_records_are_reported_or_skipped() {
     assert!(ended.stderr.contains("--skip-damaged"), "{ended:?}");
     assert!(!stage.path("out").exists());
     let ended = stage.export("--skip-damaged").well();
-    assert!(ended.stderr.contains("left out: ") && ended.stderr.contains(&name));
+    assert!(ended.stderr.contains("skipped: ") && ended.stderr.contains(&name));
     assert!(ended.stdout.contains(": 1 game, "));
     let ended = stage.export("--skip-damaged --force --json");
     let said = ended.json();

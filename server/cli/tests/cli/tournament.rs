@@ -171,7 +171,7 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     let id = first.strip_prefix("tournament   ").unwrap();
     let results = format!("tournament results {id}");
     let before = run(&url, &results);
-    before.assert_says(&["nothing has been played yet", "Who takes part"]);
+    before.assert_says(&["nothing has been played yet", "Participants"]);
 
     let start = format!("tournament start {id} --json");
     run(&url, &format!("{start} --owner-token nonsense")).assert_failed("OWNER_TOKEN_WRONG");

@@ -28,7 +28,7 @@ pub(super) struct Hints {
 ///
 /// # Errors
 /// The seat, or the place in the tournament, was lost.
-pub(super) fn told(part: &Part, hints: &Hints) -> Result<ExitCode, CommandError> {
+pub(super) fn print_end(part: &Part, hints: &Hints) -> Result<ExitCode, CommandError> {
     if let Some(lobby) = &part.lobby {
         return of_tournament(part, lobby, hints);
     }
@@ -116,13 +116,13 @@ fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, 
 
 /// A sentence with the person's standing.
 fn standing(lobby: &Lobby, what: &str) -> String {
-    let told = lobby.report.as_ref().and_then(|report| {
+    let place = lobby.report.as_ref().and_then(|report| {
         let line = report.standing(lobby.me)?;
         let place = place_in_words(line, report.standings.len());
         Some(place.map_or_else(|| NO_GAME_COUNTED.to_owned(), |it| format!("you are {it}")))
     });
-    match told {
-        Some(told) => format!("{what}: {told}"),
+    match place {
+        Some(place) => format!("{what}: {place}"),
         None => what.to_owned(),
     }
 }

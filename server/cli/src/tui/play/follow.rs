@@ -4,14 +4,14 @@ use chefshat_client::{Client, Error, v1};
 use tokio::sync::mpsc;
 
 use super::lobby::{Report, sits};
-use super::part::Heard;
+use super::part::PartInput;
 
 /// Page size and maximum number of pages of games.
 const GAMES_PAGE: u32 = 500;
 const MAX_PAGES: usize = 20;
 
 /// Passes on each report until the tournament is over.
-pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Sender<Heard>) {
+pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Sender<PartInput>) {
     let mut follower = client.follow_tournament(&*entered.tournament_id);
     // The next game as found last.
     let mut found: Option<v1::TournamentGame> = None;
@@ -25,7 +25,7 @@ pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Se
             Err(error) => {
                 // The receiver may be gone.
                 let _ = heard
-                    .send(Heard::Unfollowed(error.message().to_owned()))
+                    .send(PartInput::Unfollowed(error.message().to_owned()))
                     .await;
                 return;
             }
@@ -40,7 +40,11 @@ pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Se
             }
             report.next.clone_from(&found);
         }
-        if heard.send(Heard::Report(Box::new(report))).await.is_err() {
+        if heard
+            .send(PartInput::Report(Box::new(report)))
+            .await
+            .is_err()
+        {
             return;
         }
     }

@@ -14,7 +14,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status};
 
-use super::part::Heard;
+use super::part::PartInput;
 
 /// Commands that may wait to be sent.
 const COMMANDS: usize = 16;
@@ -101,7 +101,7 @@ impl Connection {
     pub(super) async fn serve(
         mut self,
         mut orders: mpsc::Receiver<Order>,
-        heard: mpsc::Sender<Heard>,
+        heard: mpsc::Sender<PartInput>,
     ) {
         let mut outage: Option<Instant> = None;
         let mut delay = FIRST_DELAY;
@@ -123,7 +123,7 @@ impl Connection {
                     let words = status.message().to_owned();
                     if since.elapsed() > GIVE_UP_AFTER {
                         Some(Some(format!("the server did not come back: {words}")))
-                    } else if heard.send(Heard::Lost(words)).await.is_err() {
+                    } else if heard.send(PartInput::Lost(words)).await.is_err() {
                         return;
                     } else {
                         None
@@ -132,7 +132,7 @@ impl Connection {
             };
             if let Some(why) = why {
                 // The receiver may be gone.
-                let _ = heard.send(Heard::Over(why)).await;
+                let _ = heard.send(PartInput::Over(why)).await;
                 return;
             }
             tokio::select! {
@@ -179,7 +179,7 @@ impl Connection {
     async fn converse(
         &mut self,
         orders: &mut mpsc::Receiver<Order>,
-        heard: &mpsc::Sender<Heard>,
+        heard: &mpsc::Sender<PartInput>,
     ) -> Stopped {
         let mut stream = Stream {
             asked: Vec::new(),
@@ -208,7 +208,7 @@ impl Connection {
                 response = responses.message() => match response {
                     Ok(Some(response)) => {
                         for update in response.updates {
-                            if let Some(over) = self.hear(&mut stream, update, heard).await {
+                            if let Some(over) = self.handle(&mut stream, update, heard).await {
                                 return over;
                             }
                         }
@@ -236,11 +236,11 @@ impl Connection {
     }
 
     /// Passes on one update; returns how the stream ended if it was the last.
-    async fn hear(
+    async fn handle(
         &mut self,
         stream: &mut Stream,
         update: v1::SeatUpdate,
-        heard: &mpsc::Sender<Heard>,
+        heard: &mpsc::Sender<PartInput>,
     ) -> Option<Stopped> {
         let (handle, mut update) = (update.handle, update.update?);
         let game = stream.games.get(&handle).cloned();
@@ -252,7 +252,7 @@ impl Connection {
             Update::Entered(entered) => {
                 stream.attached.get_or_insert_with(Instant::now);
                 stream.place = Some(handle);
-                Heard::Entered(entered.clone())
+                PartInput::Entered(entered.clone())
             }
             Update::Detached(detached) if stream.place == Some(handle) => {
                 return Some(Stopped::Over(match detached.reason() {
@@ -274,7 +274,7 @@ impl Connection {
                 if game.ended {
                     return None;
                 }
-                Heard::Gone(id, why.to_owned())
+                PartInput::Gone(id, why.to_owned())
             }
             Update::Refused(refused) if refused.request_id == ATTACHMENT => {
                 return Some(Stopped::Over(Some(refused.message.clone())));
@@ -283,15 +283,15 @@ impl Connection {
                 // Its room was removed during the outage.
                 let id = stream.asked_for(refused.request_id)?;
                 self.games.remove(&id);
-                Heard::Gone(id, refused.message.clone())
+                PartInput::Gone(id, refused.message.clone())
             }
             Update::Events(batch) => {
                 let id = game?;
                 let game = self.games.get_mut(&id)?;
                 self.progress |= game.events(batch);
-                Heard::Told(id, Box::new(update))
+                PartInput::Update(id, Box::new(update))
             }
-            _ => Heard::Told(game?, Box::new(update)),
+            _ => PartInput::Update(game?, Box::new(update)),
         };
         match heard.send(what).await {
             Ok(()) => None,
@@ -300,7 +300,12 @@ impl Connection {
     }
 
     /// A seat was attached. For a new game, requests its room, which lists the participants before the game starts.
-    async fn seated(&mut self, stream: &mut Stream, handle: u32, attached: &v1::Attached) -> Heard {
+    async fn seated(
+        &mut self,
+        stream: &mut Stream,
+        handle: u32,
+        attached: &v1::Attached,
+    ) -> PartInput {
         let id = attached.game_id.clone();
         // A new handle replaces the old one.
         stream.games.retain(|_, other| *other != id);
@@ -320,7 +325,7 @@ impl Connection {
             };
             self.games.insert(id, game);
         }
-        Heard::Seated(attached.clone(), room)
+        PartInput::Seated(attached.clone(), room)
     }
 }
 

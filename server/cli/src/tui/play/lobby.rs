@@ -128,9 +128,9 @@ impl Lobby {
                 format!("Your last game: {place} of {all}, {points} in it.")
             }
             Some(End::Aborted(_)) => {
-                "Your last game was aborted; it is called again, or counts for nobody.".to_owned()
+                "Your last game was aborted; it is called again or does not count.".to_owned()
             }
-            None => "Your last game is out of reach; its result will be in the standings.".into(),
+            None => "Your last game is unavailable; see the standings for its result.".into(),
         });
     }
 
@@ -152,7 +152,7 @@ impl Lobby {
     /// The sentences of the lobby, most important first; `ended`: no more games, whatever the last report says.
     pub(super) fn words(&self, ended: bool) -> Vec<String> {
         let Some(report) = &self.report else {
-            return vec!["Waiting for the server to say how the tournament stands.".to_owned()];
+            return vec!["Waiting for the state of the tournament.".to_owned()];
         };
         let mut lines = vec![self.own_standing(report)];
         lines.extend(self.last.clone());
@@ -265,11 +265,11 @@ impl Lobby {
         let (round, rounds) = (tournament.round, tournament.rounds);
         let left = tournament.games.saturating_sub(tournament.games_over);
         if report.is_out(self.me) {
-            return "You are out; the others play on.".to_owned();
+            return "You are eliminated; the others continue.".to_owned();
         }
         if report.format() == v1::TournamentFormat::RoundRobin || round >= rounds {
             let left = counted(left.into(), "game");
-            return format!("All your games are over; {left} of the others go on.");
+            return format!("All your games are over; {left} of the others remain.");
         }
         if report.games.iter().any(|game| sits(game, self.me)) {
             format!(
@@ -286,8 +286,8 @@ fn before_the_beginning(tournament: &v1::Tournament) -> String {
     let joined = counted(tournament.participants.len() as u64, "participant");
     let settings = tournament.settings.as_ref();
     match settings.map_or(0, |settings| settings.start_when_joined) {
-        0 => format!("{joined} so far. It begins when its host says so."),
-        count => format!("{joined} so far. It begins when {count} have joined."),
+        0 => format!("{joined} so far. It starts when its host starts it."),
+        count => format!("{joined} so far. It starts when {count} have joined."),
     }
 }
 

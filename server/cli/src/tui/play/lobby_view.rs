@@ -21,15 +21,15 @@ const OWN_ROWS: u16 = 7;
 const NAME: usize = 24;
 
 const HELP: [&str; 9] = [
-    "Each of your games begins here by itself; when it is over,",
+    "Each of your games starts here automatically; afterwards",
     "its result and then the standings are shown.",
     "",
     "PgUp PgDn  ↑ ↓   through the standings",
-    "s                while you play: the standings, any key goes back",
+    "s                while you play: the standings; any key returns",
     "q                leave; your games wait for you for a while, then",
     "                 they are played without you",
     "",
-    "any key goes back",
+    "any key returns",
 ];
 
 /// Draws the lobby.
@@ -56,20 +56,20 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lob
         ),
         _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), theme.bold()),
         Link::Lost(why) => (
-            format!(" The connection is lost and being made again: {why}"),
+            format!(" Connection lost, reconnecting: {why}"),
             theme.warning(),
         ),
         _ if !lobby.notice.is_empty() => (format!(" ! {}", lobby.notice), theme.warning()),
         _ if part.peek => (
-            " Your game goes on. Any key goes back to it.".to_owned(),
+            " Your game continues. Any key returns to it.".to_owned(),
             theme.bold(),
         ),
         _ if lobby.has_games_to_come() => (
-            " Your next game begins here by itself.".to_owned(),
+            " Your next game starts here automatically.".to_owned(),
             theme.bold(),
         ),
         _ => (
-            " No game of yours is to come. Stay to see the end, or leave with q.".to_owned(),
+            " You have no more games. Stay until the end, or leave with q.".to_owned(),
             theme.bold(),
         ),
     };
@@ -94,15 +94,15 @@ pub(super) fn draw_over(frame: &mut Frame<'_>, theme: Theme, part: &Part) {
 fn leaving(part: &Part) -> Vec<Line<'static>> {
     let report = part.lobby.as_ref().and_then(|it| it.report.as_ref());
     let settings = report.and_then(|it| it.tournament.settings.as_ref());
-    let mut lines = vec!["Leave the tournament? Games of yours are still to come.".to_owned()];
+    let mut lines = vec!["Leave the tournament? You still have games to play.".to_owned()];
     if let Some(settings) = settings {
         let seconds = settings.no_show_time_ms.div_ceil(1000);
         lines.push(format!(
-            "Each waits {seconds} s for you, {} times at most, then you forfeit it.",
+            "Each waits {seconds} s for you, at most {} times; then you forfeit it.",
             settings.max_calls
         ));
     }
-    lines.push("You can come back with the ticket that is told when you have left.".to_owned());
+    lines.push("When you leave, a ticket is printed; resume with it.".to_owned());
     lines.push(String::new());
     lines.push("y leaves, any other key stays".to_owned());
     lines.into_iter().map(Line::from).collect()
@@ -151,7 +151,7 @@ fn draw_standings(frame: &mut Frame<'_>, theme: Theme, lobby: &Lobby, area: Rect
     let tournament = &report.tournament;
     let title = match (report.is_over(), tournament.games) {
         (true, _) => " final standings ".to_owned(),
-        _ if tournament.state() == v1::TournamentState::Open => " who takes part ".to_owned(),
+        _ if tournament.state() == v1::TournamentState::Open => " participants ".to_owned(),
         (false, 0) => " standings ".to_owned(),
         (false, games) => format!(
             " standings · {} of {games} games over ",

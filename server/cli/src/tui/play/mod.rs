@@ -40,7 +40,7 @@ use crate::remote::agent_kind;
 use crate::rules_args::{RulesArgs, rules_of};
 use crate::tui::screen::missing;
 use chefshat_server::host::Host;
-use ending::{Hints, told};
+use ending::{Hints, print_end};
 use run::{Taken, play};
 
 /// Maximum wait of built-in agents before a decision, in milliseconds.
@@ -129,7 +129,7 @@ impl Play {
                     format!("chefshat records get {game} --server {server}")
                 }),
             };
-            return told(&play(taken, self.times).await?, &hints);
+            return print_end(&play(taken, self.times).await?, &hints);
         };
         let host = Host::in_memory(Some(data_dir.clone())).await?;
         let played = async { play(self.take_local(&host).await?, self.times).await }.await;
@@ -146,7 +146,7 @@ impl Play {
                 )
             }),
         };
-        told(&played?, &hints)
+        print_end(&played?, &hints)
     }
 
     async fn take(&self) -> Result<Taken, CommandError> {

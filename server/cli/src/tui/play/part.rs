@@ -20,7 +20,7 @@ const SHORT_RESULT_MS: u64 = 3_000;
 
 /// Input of a part.
 #[derive(Debug)]
-pub(super) enum Heard {
+pub(super) enum PartInput {
     Key(Key),
     /// Time has passed.
     Tick,
@@ -33,7 +33,7 @@ pub(super) enum Heard {
     /// A seat was attached; for a new game with its room, if known.
     Seated(v1::Attached, Option<Box<v1::Room>>),
     /// An update for the seat of a game.
-    Told(String, Box<Update>),
+    Update(String, Box<Update>),
     /// A game is lost before its end, with the reason.
     Gone(String, String),
     /// The connection was lost, with the reason; it is being restored.
@@ -83,15 +83,15 @@ impl Part {
     }
 
     /// Handles an input at `now_ms` of a monotonic clock; returns an action and its game.
-    pub(super) fn take(&mut self, heard: Heard, now_ms: u64) -> Option<(String, Do)> {
+    pub(super) fn take(&mut self, heard: PartInput, now_ms: u64) -> Option<(String, Do)> {
         let act = match heard {
-            Heard::Key(key) => self.key(key, now_ms),
-            Heard::Told(game, update) => {
+            PartInput::Key(key) => self.key(key, now_ms),
+            PartInput::Update(game, update) => {
                 let what = self.in_game(&game, Input::Update(update), now_ms);
                 what.map(|what| (game, what))
             }
             heard => {
-                self.hear(heard, now_ms);
+                self.handle(heard, now_ms);
                 None
             }
         };
@@ -99,37 +99,37 @@ impl Part {
         act
     }
 
-    fn hear(&mut self, heard: Heard, now_ms: u64) {
+    fn handle(&mut self, heard: PartInput, now_ms: u64) {
         match heard {
-            Heard::Key(_) | Heard::Told(..) | Heard::Tick => {}
-            Heard::Entered(entered) => {
+            PartInput::Key(_) | PartInput::Update(..) | PartInput::Tick => {}
+            PartInput::Entered(entered) => {
                 self.link = Link::Live;
                 let lobby = self.lobby.get_or_insert_with(|| {
                     Lobby::new(entered.tournament_id.clone(), entered.participant)
                 });
                 lobby.notice.clear();
             }
-            Heard::Report(report) => {
+            PartInput::Report(report) => {
                 if let Some(lobby) = &mut self.lobby {
                     lobby.report = Some(*report);
                 }
             }
-            Heard::Unfollowed(why) => {
+            PartInput::Unfollowed(why) => {
                 if let Some(lobby) = &mut self.lobby {
-                    lobby.notice = format!("standings are not told any more: {why}");
+                    lobby.notice = format!("no more updates of the standings: {why}");
                 }
             }
-            Heard::Seated(attached, room) => self.seated(attached, room, now_ms),
-            Heard::Gone(game, why) => {
+            PartInput::Seated(attached, room) => self.seated(attached, room, now_ms),
+            PartInput::Gone(game, why) => {
                 self.in_game(&game, Input::Over(Some(why)), now_ms);
             }
-            Heard::Lost(why) => {
+            PartInput::Lost(why) => {
                 for app in self.apps() {
                     app.take(Input::Lost(why.clone()), now_ms);
                 }
                 self.link = Link::Lost(why);
             }
-            Heard::Over(why) => {
+            PartInput::Over(why) => {
                 for app in self.apps() {
                     app.take(Input::Over(why.clone()), now_ms);
                 }
@@ -207,7 +207,7 @@ impl Part {
         if let Some(game) = &mut self.game {
             game.standing = standing;
             game.then = match self.waiting.is_empty() {
-                false => "Another game of yours has begun. Enter goes to it",
+                false => "Another of your games has started. Enter goes to it",
                 true => "Enter: the standings",
             };
         }

@@ -11,7 +11,7 @@ use tokio::sync::mpsc;
 use super::app::{App, Do, EXPRESSIONS};
 use super::follow::follow;
 use super::link::{Connection, Order};
-use super::part::{Heard, Part};
+use super::part::{Part, PartInput};
 use super::view;
 use crate::CommandError;
 use crate::tui::screen::{Screen, Wake};
@@ -59,8 +59,8 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
         screen.draw(|frame| view::draw(frame, theme, &part, now_ms))?;
         let what = tokio::select! {
             wake = screen.next() => match wake {
-                Wake::Key(key) => Heard::Key(key),
-                Wake::Tick => Heard::Tick,
+                Wake::Key(key) => PartInput::Key(key),
+                Wake::Tick => PartInput::Tick,
             },
             Some(what) = heard.recv() => what,
             end = &mut serving, if !served => {
@@ -70,7 +70,7 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
                 continue;
             }
         };
-        if let (Heard::Entered(entered), None) = (&what, &following) {
+        if let (PartInput::Entered(entered), None) = (&what, &following) {
             let followed = follow(client.clone(), entered.clone(), sender.clone());
             following = Some(tokio::spawn(followed));
         }

@@ -4,7 +4,7 @@
 use chefshat_client::v1::{TournamentFormat::Swiss, TournamentState::Playing};
 use ratatui::crossterm::event::KeyCode;
 
-use super::part::Heard;
+use super::part::PartInput;
 use super::tournament_session::{TournamentSession, report};
 
 /// A person with three games; the first is on screen.
@@ -103,10 +103,14 @@ fn all_games_are_played_to_their_end() {
         let result = session.screen();
         assert!(result.contains("the game is over"), "{result}");
         assert!(result.contains(others), "{result}");
-        assert_eq!(result.contains("Another game"), game != "three", "{result}");
+        assert_eq!(
+            result.contains("Another of your games"),
+            game != "three",
+            "{result}"
+        );
         session.press(KeyCode::Enter);
     }
     assert!(session.part.game.is_none());
-    session.hear(Heard::Tick);
+    session.handle(PartInput::Tick);
     assert!(session.screen().contains("Your last game: "));
 }

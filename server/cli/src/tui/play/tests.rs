@@ -274,7 +274,7 @@ fn a_lost_answer_is_sent_again() {
     // Repeated keys send nothing twice.
     assert_eq!(session.press(KeyCode::Enter), None);
     session.app.take(Input::Lost("gone".into()), 5_000);
-    assert!(session.screen().contains("connection is lost"));
+    assert!(session.screen().contains("Connection lost, reconnecting"));
     assert_eq!(session.press(KeyCode::Enter), None);
     session.receive(Update::Attached(v1::Attached::default()));
     assert_eq!(session.app.link, Link::Live);

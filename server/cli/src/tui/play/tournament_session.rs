@@ -9,7 +9,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::app::Do;
 use super::lobby::Report;
-use super::part::{Heard, Part};
+use super::part::{Part, PartInput};
 use super::tests::shifts;
 use super::view;
 use crate::tui::screen::Key;
@@ -35,7 +35,7 @@ impl TournamentSession {
             game: String::new(),
             now_ms: 0,
         };
-        session.hear(Heard::Entered(v1::Entered {
+        session.handle(PartInput::Entered(v1::Entered {
             tournament_id: "7ea82e54d878816e4e9bde8b21aa7dce".into(),
             participant: ME,
             ..v1::Entered::default()
@@ -43,21 +43,21 @@ impl TournamentSession {
         session
     }
 
-    pub(super) fn hear(&mut self, heard: Heard) -> Option<(String, Do)> {
+    pub(super) fn handle(&mut self, heard: PartInput) -> Option<(String, Do)> {
         self.part.take(heard, self.now_ms)
     }
 
     pub(super) fn press(&mut self, code: KeyCode) -> Option<(String, Do)> {
-        self.hear(Heard::Key(Key::Code(code)))
+        self.handle(PartInput::Key(Key::Code(code)))
     }
 
     pub(super) fn report(&mut self, report: Report) {
-        self.hear(Heard::Report(Box::new(report)));
+        self.handle(PartInput::Report(Box::new(report)));
     }
 
     fn receive(&mut self, update: Update) -> Option<(String, Do)> {
         let game = self.game.clone();
-        self.hear(Heard::Told(game, Box::new(update)))
+        self.handle(PartInput::Update(game, Box::new(update)))
     }
 
     /// The server seats the person in a new game.
@@ -75,7 +75,7 @@ impl TournamentSession {
             tournament_id: "7ea82e54d878816e4e9bde8b21aa7dce".into(),
             ..v1::Attached::default()
         };
-        self.hear(Heard::Seated(attached, None));
+        self.handle(PartInput::Seated(attached, None));
         self.receive(Update::Events(v1::EventBatch { events }));
     }
 

@@ -6,7 +6,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::app::Link;
 use super::lobby::Report;
-use super::part::{Heard, Over, Part};
+use super::part::{Over, Part, PartInput};
 use super::tournament_session::{ME, TournamentSession, game, report};
 use crate::tui::testing::assert_screens;
 
@@ -17,7 +17,7 @@ use v1::TournamentState::{Closed, Finished, Open, Playing};
 #[test]
 fn games_follow_each_other_with_results_between() {
     let mut session = TournamentSession::new();
-    assert!(session.screen().contains("Waiting for the server"));
+    assert!(session.screen().contains("Waiting for the state"));
     session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
     let lobby = session.screen();
     session.seated("game one");
@@ -28,10 +28,10 @@ fn games_follow_each_other_with_results_between() {
     let result = session.screen();
     assert!(result.contains("3rd of 8, score 2.00"), "{result}");
     session.now_ms += 11_000;
-    session.hear(Heard::Tick);
+    session.handle(PartInput::Tick);
     assert!(session.screen().contains("the game is over"));
     session.now_ms += 1_000;
-    session.hear(Heard::Tick);
+    session.handle(PartInput::Tick);
     assert!(
         session.screen().contains("Your last game: "),
         "{}",
@@ -45,14 +45,14 @@ fn games_follow_each_other_with_results_between() {
     session.seated("game three");
     let result = session.screen();
     assert!(
-        result.contains("Another game of yours has begun"),
+        result.contains("Another of your games has started"),
         "{result}"
     );
     assert!(session.until_asked());
-    session.hear(Heard::Tick);
+    session.handle(PartInput::Tick);
     assert!(session.screen().contains("the game is over"));
     session.now_ms += 3_000;
-    session.hear(Heard::Tick);
+    session.handle(PartInput::Tick);
     assert!(
         session.screen().contains("Your turn"),
         "{}",
@@ -63,7 +63,7 @@ fn games_follow_each_other_with_results_between() {
     assert!(session.part.game.is_none());
 
     session.report(report(Swiss, Finished, Vec::new()));
-    session.hear(Heard::Over(None));
+    session.handle(PartInput::Over(None));
     let end = session.screen();
     assert!(
         end.contains("final standings") && end.contains("Enter ends"),
@@ -79,7 +79,7 @@ fn the_lobby_shows_what_comes_next() {
     let mine = [0, 1, ME, 5];
     let others = [3, 4, 6, 7];
     let table = [
-        (report(Swiss, Open, vec![]), "It begins when 12 have joined"),
+        (report(Swiss, Open, vec![]), "It starts when 12 have joined"),
         (
             report(Swiss, Playing, vec![game(2, Due, mine)]),
             "Your next game: round 2, table 1, with greedy, Ben and Eve.",
@@ -110,7 +110,7 @@ fn the_lobby_shows_what_comes_next() {
         ),
         (
             report(Knockout, Playing, vec![game(3, Called, others)]),
-            "You are out",
+            "You are eliminated",
         ),
         (
             report(RoundRobin, Playing, vec![]),
@@ -173,7 +173,7 @@ fn standings_are_shown_during_a_game() {
     session.seated("game one");
     session.press(KeyCode::Char('s'));
     assert!(
-        session.screen().contains("Any key goes back"),
+        session.screen().contains("Any key returns"),
         "{}",
         session.screen()
     );
@@ -189,19 +189,22 @@ fn standings_are_shown_during_a_game() {
 fn lost_connections_and_games_are_shown() {
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, vec![]));
-    session.hear(Heard::Lost("gone".into()));
-    assert!(session.screen().contains("being made again: gone"));
+    session.handle(PartInput::Lost("gone".into()));
+    assert!(session.screen().contains("reconnecting: gone"));
     session.seated("game one");
     assert_eq!(session.part.link, Link::Live);
-    session.hear(Heard::Gone("game one".into(), "the room is gone".into()));
+    session.handle(PartInput::Gone(
+        "game one".into(),
+        "the room is gone".into(),
+    ));
     assert!(session.screen().contains("the room is gone"));
     session.press(KeyCode::Enter);
     assert!(
-        session.screen().contains("out of reach"),
+        session.screen().contains("unavailable"),
         "{}",
         session.screen()
     );
-    session.hear(Heard::Over(Some("another has it".into())));
+    session.handle(PartInput::Over(Some("another has it".into())));
     assert!(
         session
             .screen()
@@ -212,8 +215,8 @@ fn lost_connections_and_games_are_shown() {
     // The end may arrive before the last report.
     let mut session = TournamentSession::new();
     session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
-    session.hear(Heard::Unfollowed("unknown".into()));
-    session.hear(Heard::Over(None));
+    session.handle(PartInput::Unfollowed("unknown".into()));
+    session.handle(PartInput::Over(None));
     let screen = session.screen();
     assert!(
         screen.contains("The tournament is over.") && screen.contains("Enter ends."),
@@ -222,6 +225,6 @@ fn lost_connections_and_games_are_shown() {
     assert!(!screen.contains("next game"), "{screen}");
     // With an invalid ticket there is nothing to show.
     let mut part = Part::new(None);
-    part.take(Heard::Over(Some("unknown".into())), 0);
+    part.take(PartInput::Over(Some("unknown".into())), 0);
     assert!(part.left);
 }

@@ -31,10 +31,10 @@ const SPECIAL_KEYS: &str = " d declare  n decline  e feeling  ? keys  q leave";
 const WAITING_KEYS: &str = " PgUp what happened  e feeling  ? keys  q leave";
 
 const HELP: [&str; 18] = [
-    "You want to be the first without cards. A play is cards of one",
-    "face, jokers with them or not. It must be of a lower face than",
-    "the one on the board, and of no fewer cards. Who passes is out",
-    "until the next pizza.",
+    "Be the first to get rid of your cards. A play is cards of one",
+    "face, with or without jokers. Its face must be lower than the one",
+    "on the board, and it needs at least as many cards. If you pass,",
+    "you are out until the next pizza.",
     "",
     "1 … 9, 0  the cards of face 1 … 9, 10; those of higher faces have",
     "          a letter on their edge; again: one more of them",
@@ -45,10 +45,10 @@ const HELP: [&str; 18] = [
     "p         pass",
     "d, n      declare a special action, or do not",
     "e         show a feeling to the table",
-    "PgUp      what happened before, PgDn goes on",
+    "PgUp      earlier events, PgDn later ones",
     "s         in a tournament: the standings",
-    "r         play on yourself after a substitute has played for you",
-    "q         leave; the room's rules say who plays on",
+    "r         take your seat back from a substitute",
+    "q         leave; the room's rules say who replaces you",
 ];
 
 /// Draws everything.
@@ -196,7 +196,7 @@ fn draw_asked(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64, area:
 /// The request to the person, or whose turn it is.
 fn asked(app: &App) -> String {
     if let Link::Lost(why) = &app.link {
-        return format!("The connection is lost and being made again: {why}");
+        return format!("Connection lost, reconnecting: {why}");
     }
     if app.substituted() {
         return "A substitute plays for you. Press r to play on yourself.".to_owned();
@@ -231,7 +231,7 @@ fn waiting(app: &App) -> String {
     let first = table.turns == 0 && table.shift > 0;
     match table.turn {
         _ if table.end.is_some() => String::new(),
-        _ if !table.started => "The game has not begun.".to_owned(),
+        _ if !table.started => "The game has not started.".to_owned(),
         Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", table.name(seat)),
         None if first && table.last_order.is_empty() => {
             "Another player opens the Shift.".to_owned()
@@ -319,7 +319,7 @@ fn draw_over(frame: &mut Frame<'_>, theme: Theme, app: &App) {
         }
         (None, _, Some(Dialog::Help)) => {
             let mut lines: Vec<Line<'_>> = HELP.iter().map(|line| plain(line)).collect();
-            lines.push(Line::from(Span::styled("any key goes back", theme.dim())));
+            lines.push(Line::from(Span::styled("any key returns", theme.dim())));
             popup(frame, theme, "help", lines);
         }
         (None, _, Some(Dialog::Leave)) => popup(

@@ -161,10 +161,10 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
 }
 
 /// An event of a room, or why no more follow.
-type Heard = Result<v1::GameEvent, chefshat_client::Error>;
+type PartInput = Result<v1::GameEvent, chefshat_client::Error>;
 
 /// Follows the room in a separate task: keys and ticks would otherwise cancel its connection attempts.
-fn follow(mut spectator: Spectator) -> mpsc::Receiver<Heard> {
+fn follow(mut spectator: Spectator) -> mpsc::Receiver<PartInput> {
     let (sender, heard) = mpsc::channel(EVENTS);
     tokio::spawn(async move {
         while let Some(event) = spectator.next().await.transpose() {
@@ -178,7 +178,7 @@ fn follow(mut spectator: Spectator) -> mpsc::Receiver<Heard> {
 }
 
 /// The next event of the room; pending forever without one.
-async fn next(following: &mut Option<mpsc::Receiver<Heard>>) -> Option<Heard> {
+async fn next(following: &mut Option<mpsc::Receiver<PartInput>>) -> Option<PartInput> {
     match following {
         Some(heard) => heard.recv().await,
         None => std::future::pending().await,

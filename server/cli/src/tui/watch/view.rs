@@ -24,7 +24,7 @@ const HELP: [&str; 10] = [
     "h            shows or hides the hands (known once a game is over)",
     "q            ends",
     "",
-    "any key goes back",
+    "any key returns",
 ];
 
 /// Draws everything.
