@@ -24,10 +24,10 @@ use crate::kind::{KindArg, kind_filter};
 use chefshat_server::convert::leaderboard;
 
 const HELP: &str = "\
-Rated are finished games that a server dealt by its own seed, all of whose seats were played by different participants without \
-substitutes. Every record is replayed first. Games count in the order in which they ended; one that is found twice counts once. A rating is \
-a mean with its deviation: the skill lies within 1.96 deviations with a confidence of 95 %. The order is by the mean less two deviations. \
-docs/ratings.md says how far these numbers can be trusted.
+A game is rated if it is finished, was dealt from the server's own seed, and each seat was played by a different participant without a \
+substitute. Every record is replayed first. Games count once, in the order in which they ended. A rating is a mean with its deviation: \
+the skill lies within 1.96 deviations with a confidence of 95 %. Participants are sorted by the mean minus two deviations. \
+docs/ratings.md says how reliable these numbers are.
 
 Examples:
   chefshat ratings

@@ -19,8 +19,8 @@ use super::{CommandError, say};
 use reel::Reel;
 
 const HELP: &str = "\
-The name of FILE says what is made: .png or .svg show one moment, .gif and .mp4 a row of them (.mp4 needs the program ffmpeg). Moments are \
-named by decisions, which are counted over the whole game from 1.
+The name of FILE selects the format: .png and .svg show one moment, .gif and .mp4 an animation (.mp4 needs ffmpeg). A moment is the \
+number of a decision, counted from 1 over the game.
 
 Examples:
   chefshat render game.jsonl --out end.png
@@ -29,7 +29,7 @@ Examples:
   chefshat render game.jsonl --from 40 --to 60 --real-time --out moments.mp4
   chefshat render game.jsonl --at 57 --figure actions --out table.svg
 
-docs/pictures.md shows what comes of it.";
+docs/pictures.md shows examples.";
 
 /// Default width of a picture, in pixels.
 const PICTURE_WIDTH: u32 = 1280;

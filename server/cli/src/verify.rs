@@ -19,8 +19,8 @@ use super::numbers::counted;
 use super::{CommandError, data_dir};
 
 const HELP: &str = "\
-Everything is checked that can be: the seed against the commitment, every deal, whose decision it was and what was legal, every event, \
-reward, score and count. docs/records.md describes the form.
+All contents are checked: the seed against the commitment, every deal, the seat and the legal actions of each decision, every event, \
+reward, score and count. docs/records.md describes the format.
 
 Exit code 0: all records fit. 1: one does not, or there is none.
 

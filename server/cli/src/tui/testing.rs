@@ -28,17 +28,19 @@ pub(crate) fn text(columns: u16, rows: u16, picture: impl FnOnce(&mut Frame<'_>)
 
 /// Compares screens with the committed ones, by name; screens that differ are written to the directory for temporary files.
 pub(crate) fn assert_screens(screens: &[(&str, String, &str)]) {
-    let differ = screens.iter().filter(|(_, screen, kept)| screen != kept);
-    let left = differ.map(|(name, screen, _)| {
+    let differ = screens
+        .iter()
+        .filter(|(_, screen, committed)| screen != committed);
+    let differ = differ.map(|(name, screen, _)| {
         let new = std::env::temp_dir().join(format!("chefshat-{name}"));
         std::fs::write(&new, screen).unwrap();
         format!("{}:\n{screen}", new.display())
     });
-    let left: Vec<String> = left.collect();
+    let differ: Vec<String> = differ.collect();
     assert!(
-        left.is_empty(),
-        "other screens than those kept: {}",
-        left.join("\n")
+        differ.is_empty(),
+        "screens differ from the committed ones: {}",
+        differ.join("\n")
     );
 }
 

@@ -309,7 +309,7 @@ pub(crate) fn play_words(face: u32, quantity: u32, jokers: u32, faces: u32) -> S
 fn waiting(table: &GameView) -> String {
     match table.free_seats() {
         0 if table.seats.is_empty() => "Waiting for the table.".to_owned(),
-        0 => "All seats are taken: the game is about to begin.".to_owned(),
+        0 => "All seats are taken: the game is about to start.".to_owned(),
         free => format!(
             "Waiting for {} to be taken.",
             counted(u64::try_from(free).unwrap_or(0), "seat")

@@ -104,7 +104,7 @@ fn leaving(part: &Part) -> Vec<Line<'static>> {
     }
     lines.push("When you leave, a ticket is printed; resume with it.".to_owned());
     lines.push(String::new());
-    lines.push("y leaves, any other key stays".to_owned());
+    lines.push("y: leave; any other key: stay".to_owned());
     lines.into_iter().map(Line::from).collect()
 }
 

@@ -58,7 +58,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, part: &Part, now_ms: u64
         (_, Some(lobby)) => lobby_view::draw(frame, theme, part, lobby),
         (_, None) => {
             let words = match &part.link {
-                Link::Lost(why) => format!(" Connecting, again and again: {why}"),
+                Link::Lost(why) => format!(" Connecting, retrying: {why}"),
                 _ => " Connecting.".to_owned(),
             };
             frame.render_widget(Paragraph::new(words), frame.area());
@@ -199,7 +199,7 @@ fn asked(app: &App) -> String {
         return format!("Connection lost, reconnecting: {why}");
     }
     if app.substituted() {
-        return "A substitute plays for you. Press r to play on yourself.".to_owned();
+        return "A substitute plays for you. Press r to take your seat back.".to_owned();
     }
     let Some(open) = &app.open else {
         return waiting(app);
@@ -327,9 +327,9 @@ fn draw_over(frame: &mut Frame<'_>, theme: Theme, app: &App) {
             theme,
             "leave",
             vec![
-                plain("Leave the table? The room's rules say who plays on."),
+                plain("Leave the table? The room's rules say who replaces you."),
                 plain(""),
-                plain("y leaves, any other key stays"),
+                plain("y: leave; any other key: stay"),
             ],
         ),
         (None, _, Some(Dialog::Express)) => {

@@ -15,14 +15,14 @@ use crate::tui::view::{draw as draw_table, end_lines, padded, popup};
 const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
 
 const HELP: [&str; 10] = [
-    "space        stops, and runs again",
-    "← →          one event back, one on",
-    "s S          to the next deal, to the one before",
-    "PgUp PgDn    back and on in what happened",
-    "Home End     to the beginning, to the end (and follow a live game)",
+    "space        pause, resume",
+    "← →          one event back, one forward",
+    "s S          next deal, previous deal",
+    "PgUp PgDn    scroll through what happened",
+    "Home End     beginning, end (and follow a live game)",
     "↑ ↓          faster, slower",
-    "h            shows or hides the hands (known once a game is over)",
-    "q            ends",
+    "h            show or hide the hands (known once a game is over)",
+    "q            quit",
     "",
     "any key returns",
 ];
@@ -112,7 +112,7 @@ fn cards(theme: Theme, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
 
 fn draw_bar(frame: &mut Frame<'_>, theme: Theme, reel: &Reel, area: Rect) {
     if let Some(why) = &reel.lost {
-        let words = format!(" ! nothing more comes: {why}");
+        let words = format!(" ! no more events: {why}");
         frame.render_widget(Paragraph::new(words).style(theme.warning()), area);
         return;
     }
