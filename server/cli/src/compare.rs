@@ -12,13 +12,12 @@ use chefshat_simulation::{
     Comparison, Contender, Duplicate, DuplicateError, Figure, RulesForm, SeatPlan,
 };
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::numbers::counted;
 use super::output::{self, heading, line, table};
 use super::rules_args::RulesArgs;
-use super::{CommandError, threads};
+use super::{CommandError, progress, threads};
 
 /// Maximum length of an agent's name in a table.
 const MAX_LABEL: usize = 14;
@@ -106,9 +105,7 @@ impl Compare {
         let contenders = entrants.each_ref().map(|entrant| entrant.contender.clone());
         let duplicate = Duplicate::new(rules, self.shifts, contenders, plan, self.deals, self.seed)
             .map_err(|error| self.explained(error))?;
-        let bar = ProgressBar::new(self.deals).with_style(ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} deals, {eta} left",
-        )?);
+        let bar = progress::of_items(self.deals, "deals");
         let pool = threads::pool(self.threads, self.deals)?;
         let comparison = pool.install(|| duplicate.run(|deals| bar.inc(deals)));
         bar.finish_and_clear();

@@ -7,10 +7,10 @@ use std::process::ExitCode;
 
 use chefshat_simulation::conformance::{Agreed, Failure, Report, check};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
-use super::CommandError;
+use super::{CommandError, progress};
 
 const HELP: &str = "\
 A vector file has one JSON object per line, either a deal (rules, seed, shift, hands, leader) or a complete game (rules, seed, steps, \
@@ -42,9 +42,10 @@ impl Conformance {
         if bytes.is_dir() {
             return Err(format!("{name} is a folder: name a file of vectors in it").into());
         }
-        let bar = ProgressBar::new(bytes.len()).with_style(ProgressStyle::with_template(
+        let bar = progress::styled(
+            ProgressBar::new(bytes.len()),
             "{bar:40} {bytes} of {total_bytes}",
-        )?);
+        );
         let report = check(BufReader::new(file), |bytes| bar.inc(bytes));
         bar.finish_and_clear();
         let mut out = anstream::stdout().lock();

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use chefshat_record::files::{RecordFile, find_records};
+use clap::Args;
 use etcetera::BaseStrategy as _;
 
 use super::CommandError;
@@ -23,16 +25,31 @@ pub(super) fn name(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     wanted.map_or_else(default, Ok)
 }
 
-/// The existing folder of records in the given or default data directory.
-///
-/// # Errors
-/// It does not exist.
-pub(super) fn records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
-    let folder = name(wanted)?;
-    let records = folder.join("records");
-    if records.is_dir() {
-        Ok(records)
-    } else {
+/// Records to read.
+#[derive(Debug, Args)]
+pub(super) struct RecordsArg {
+    /// Records (GAME-ID.jsonl) or directories of them. Default: the records of the data directory.
+    #[arg(value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+impl RecordsArg {
+    /// The files of the records.
+    ///
+    /// # Errors
+    /// There are none, or a directory is unreadable.
+    pub(super) fn files(&self) -> Result<Vec<RecordFile>, CommandError> {
+        if !self.paths.is_empty() {
+            return Ok(find_records(&self.paths)?);
+        }
+        let folder = name(self.data_dir.clone())?;
+        let records = folder.join("records");
+        if records.is_dir() {
+            return Ok(find_records(&[records])?);
+        }
         Err(format!(
             "there are no records in {} yet; name files or folders, or choose another data directory with --data-dir",
             folder.display()

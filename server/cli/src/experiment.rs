@@ -10,12 +10,11 @@ use chefshat_simulation::mechanics::{Condition, MechanicsTable, SHIFTS_PER_GAME}
 use chefshat_tournament::statistics::Interval;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::numbers::{counted, grouped};
 use super::output::{heading, line, table};
-use super::{CommandError, threads};
+use super::{CommandError, progress, threads};
 
 const HELP: &str = "\
 What the paper calls a game is a Shift here; its rounds are laps. As in the paper, each Shift takes its roles from the result of the \
@@ -106,9 +105,7 @@ impl Mechanics {
             .iter()
             .sum::<u64>()
             .saturating_mul(rows.len() as u64);
-        let bar = ProgressBar::new(shifts).with_style(ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} Shifts, {eta} left",
-        )?);
+        let bar = progress::of_items(shifts, "Shifts");
         let pool = threads::pool(self.threads, u64::MAX)?;
         pool.install(|| {
             for row in &mut rows {

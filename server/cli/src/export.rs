@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_dataset::{Export as Exporter, Exported, Filter, Format, Layout};
-use chefshat_record::files::find_records;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
+use super::data_dir::RecordsArg;
 use super::numbers::counted;
-use super::{CommandError, data_dir};
+use super::{CommandError, progress};
 
 const HELP: &str = "\
 The directory contains the tables `decisions` and `expressions` in every requested format, a dataset card (README.md) and SHA256SUMS. \
@@ -30,9 +29,8 @@ const KINDS: [&str; 4] = ["agent", "human", "robot", "built_in"];
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Export {
-    /// Records (GAME-ID.jsonl) or directories of them. Default: the records in the data directory.
-    #[arg(value_name = "PATH")]
-    paths: Vec<PathBuf>,
+    #[command(flatten)]
+    records: RecordsArg,
     /// Directory to create; it must not exist or be empty.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -60,9 +58,6 @@ pub(super) struct Export {
     /// Licence of the dataset, for its card.
     #[arg(long, value_name = "SPDX", default_value = "CC-BY-4.0")]
     licence: String,
-    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
-    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
-    data_dir: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -84,12 +79,7 @@ fn formats() -> impl TypedValueParser<Value = Format> {
 impl Export {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let formats = self.wanted_formats()?;
-        let paths = if self.paths.is_empty() {
-            vec![data_dir::records(self.data_dir.clone())?]
-        } else {
-            self.paths.clone()
-        };
-        let records = find_records(&paths)?;
+        let records = self.records.files()?;
         let exporter = Exporter {
             out: self.out.clone(),
             replace: self.force,
@@ -108,9 +98,7 @@ impl Export {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let bytes = records.iter().map(|record| record.bytes).sum();
-        let bar = ProgressBar::new(bytes).with_style(ProgressStyle::with_template(
-            "{bar:40} {bytes} of {total_bytes} of records, {eta} left",
-        )?);
+        let bar = progress::of_record_bytes(bytes);
         let result = exporter.run(&records, |bytes| bar.inc(bytes));
         bar.finish_and_clear();
         let exported = result?;

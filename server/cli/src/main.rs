@@ -20,6 +20,7 @@ mod output;
 mod pages;
 mod participant;
 mod policy_args;
+mod progress;
 mod ratings;
 mod records;
 mod remote;

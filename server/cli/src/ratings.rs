@@ -3,23 +3,23 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use chefshat_proto::v1;
-use chefshat_record::files::{RecordFile, find_records};
+use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, outcome};
 use chefshat_record::replay::replay;
 use chefshat_tournament::ratings::Ratings;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::data_dir::RecordsArg;
 use super::numbers::counted;
 use super::output::{heading, line};
-use super::{CommandError, board, data_dir};
+use super::{CommandError, board, progress};
 use crate::kind::{KindArg, kind_filter};
 use chefshat_server::convert::leaderboard;
 
@@ -38,12 +38,8 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct RatingsCommand {
-    /// Records, or directories of records (*.jsonl). Default: the records of the data directory.
-    #[arg(value_name = "PATH")]
-    paths: Vec<PathBuf>,
-    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
-    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
-    data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    records: RecordsArg,
     /// Only participants of this kind, rated by all their games.
     #[arg(long, value_enum)]
     kind: Option<KindArg>,
@@ -73,12 +69,7 @@ struct Gathered {
 
 impl RatingsCommand {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let paths = if self.paths.is_empty() {
-            vec![data_dir::records(self.data_dir.clone())?]
-        } else {
-            self.paths.clone()
-        };
-        let files = find_records(&paths)?;
+        let files = self.records.files()?;
         let gathered = self.gather(&files)?;
         let kind = kind_filter(self.kind);
         let board = leaderboard(&gathered.ratings, kind, self.min_games, usize::MAX);
@@ -96,9 +87,7 @@ impl RatingsCommand {
     /// Reads all records on all cores, then rates the games in order.
     fn gather(&self, files: &[RecordFile]) -> Result<Gathered, CommandError> {
         let bytes = files.iter().map(|file| file.bytes).sum();
-        let bar = ProgressBar::new(bytes).with_style(ProgressStyle::with_template(
-            "{bar:40} {bytes} of {total_bytes} of records, {eta} left",
-        )?);
+        let bar = progress::of_record_bytes(bytes);
         let read: Vec<(&Path, Result<ReadRecord, String>)> = files
             .par_iter()
             .map(|file| {

@@ -15,12 +15,11 @@ use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::numbers::grouped;
 use super::rules_args::RulesArgs;
-use super::{CommandError, threads};
+use super::{CommandError, progress, threads};
 use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 
 const EXAMPLES: &str = "\
@@ -78,9 +77,7 @@ impl Simulate {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let batch = self.batch()?;
         let pool = threads::pool(self.threads, batch.games())?;
-        let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} games, {eta} left",
-        )?);
+        let bar = progress::of_items(batch.games(), "games");
         let start = Instant::now();
         let table = pool.install(|| batch.run(|games| bar.inc(games)));
         bar.finish_and_clear();
@@ -133,9 +130,7 @@ impl Simulate {
 
 /// Writes the records of all games on the current thread pool.
 fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
-    let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
-        "{bar:40} {human_pos} of {human_len} records, {eta} left",
-    )?);
+    let bar = progress::of_items(batch.games(), "records");
     (0..batch.games())
         .into_par_iter()
         .try_for_each(|index| records::write(batch, index, folder).inspect(|()| bar.inc(1)))?;

@@ -6,17 +6,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, record_line::Line};
-use chefshat_record::files::find_records;
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
 use chefshat_record::replay::{Replayed, replay};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::data_dir::RecordsArg;
 use super::numbers::counted;
-use super::{CommandError, data_dir};
+use super::{CommandError, progress};
 
 const HELP: &str = "\
 All contents are checked: the seed against the commitment, every deal, the seat and the legal actions of each decision, every event, \
@@ -36,12 +35,8 @@ const AT_A_TIME: usize = 64;
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Verify {
-    /// Records, or directories of records (*.jsonl). Default: the records of the data directory.
-    #[arg(value_name = "PATH")]
-    paths: Vec<PathBuf>,
-    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
-    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
-    data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    records: RecordsArg,
     /// Print one JSON object per record.
     #[arg(long)]
     json: bool,
@@ -62,20 +57,13 @@ struct Problem {
 
 impl Verify {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let paths = if self.paths.is_empty() {
-            vec![data_dir::name(self.data_dir)?.join("records")]
-        } else {
-            self.paths
-        };
-        let files: Vec<PathBuf> = find_records(&paths)?
+        let files: Vec<PathBuf> = self
+            .records
+            .files()?
             .into_iter()
             .map(|file| file.path)
             .collect();
-        let bar = ProgressBar::new(files.len().try_into().unwrap_or(u64::MAX)).with_style(
-            ProgressStyle::with_template(
-                "{bar:40} {human_pos} of {human_len} records, {eta} left",
-            )?,
-        );
+        let bar = progress::of_items(files.len().try_into().unwrap_or(u64::MAX), "records");
         let (mut fitting, mut decisions) = (0usize, 0u64);
         for files in files.chunks(AT_A_TIME) {
             let checked: Vec<_> = files

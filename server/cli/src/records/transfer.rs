@@ -9,12 +9,12 @@ use chefshat_client::v1::{self, RecordLine, record_line::Line};
 use chefshat_client::{Client, Error};
 use chefshat_record::jsonl;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use prost::Message as _;
 use tonic::transport::Channel;
 
 use super::super::connect::ServerArg;
-use super::super::{CommandError, say};
+use super::super::{CommandError, progress, say};
 use super::filter::FilterArgs;
 use super::list::in_a_line;
 
@@ -91,9 +91,10 @@ impl Stream {
         let mut parts = (service(&client).stream_records(request).await)
             .map_err(Error::from)?
             .into_inner();
-        let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template(
+        let bar = progress::styled(
+            ProgressBar::no_length(),
             "{spinner} {human_pos} records, {per_sec}",
-        )?);
+        );
         let mut record: Vec<RecordLine> = Vec::new();
         let mut count = 0_u64;
         while let Some(part) = parts.message().await.map_err(Error::from)? {
@@ -139,9 +140,7 @@ impl Import {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect().await?;
         let mut service = service(&client);
-        let bar = ProgressBar::new(self.files.len() as u64).with_style(
-            ProgressStyle::with_template("{bar:40} {pos} of {len} records, {eta} left")?,
-        );
+        let bar = progress::of_items(self.files.len() as u64, "records");
         for file in &self.files {
             let requests = in_parts(jsonl::read(file)?);
             let added = (service.import_record(tokio_stream::iter(requests)).await)

@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use chefshat_record::atomic_file::AtomicFile;
 use chefshat_render::{Frame, GifWriter, Painter, Palette, Pixels};
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::CommandError;
+use crate::error::CommandError;
+use crate::progress;
 
 /// Frames painted per batch: enough for all cores within bounded memory.
 const AT_A_TIME: usize = 32;
@@ -111,9 +111,7 @@ impl<'a> Reel<'a> {
         mut take: impl FnMut(&Pixels, Duration) -> Result<(), CommandError>,
     ) -> Result<(), CommandError> {
         let total = self.frames.len().try_into().unwrap_or(u64::MAX);
-        let bar = ProgressBar::new(total).with_style(ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} frames, {eta} left",
-        )?);
+        let bar = progress::of_items(total, "frames");
         for frames in self.frames.chunks(AT_A_TIME) {
             let painted: Result<Vec<_>, _> = frames
                 .par_iter()

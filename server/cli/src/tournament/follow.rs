@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use chefshat_client::{Backoff, v1};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::super::connect::{PATIENCE, ServerArg};
-use super::super::{CommandError, say};
+use super::super::{CommandError, progress, say};
 use super::tables::{self, Field};
 use super::words::{is_over, state};
 use crate::narration::clean;
@@ -81,7 +81,7 @@ impl Display {
             return Ok(Self::Lines(String::new()));
         }
         let style = "{prefix}\n{bar:40} {human_pos} of {human_len} games, {elapsed}\n{msg}";
-        let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(style)?);
+        let bar = progress::styled(ProgressBar::new(0), style);
         // Shows that time passes while nothing changes.
         bar.enable_steady_tick(TICK);
         Ok(Self::Live(bar))

@@ -37,9 +37,15 @@ enum TournamentAction {
     /// Take part with a built-in agent, until the tournament is over.
     Join(join::Join),
     /// Start a tournament with the participants who have joined.
-    Start(owner::Start),
-    /// Close a tournament early.
-    Close(owner::Close),
+    #[command(
+        after_help = "Example:\n  chefshat tournament start 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+    )]
+    Start(owner::Owned),
+    /// Close a tournament early: games in progress are aborted, counted games keep their results.
+    #[command(
+        after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+    )]
+    Close(owner::Owned),
     /// Follow a tournament to its end.
     Follow(follow::Follow),
     /// Show the standings of a tournament and their confidence.
@@ -57,8 +63,8 @@ impl TournamentCommand {
         match self.action {
             TournamentAction::Create(command) => command.run().await,
             TournamentAction::Join(command) => command.run().await,
-            TournamentAction::Start(command) => command.run().await,
-            TournamentAction::Close(command) => command.run().await,
+            TournamentAction::Start(owned) => owned.start().await,
+            TournamentAction::Close(owned) => owned.close().await,
             TournamentAction::Follow(command) => command.run().await,
             TournamentAction::Results(command) => command.run().await,
             TournamentAction::Simulate(command) => command.run(),

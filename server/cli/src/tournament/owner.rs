@@ -10,29 +10,9 @@ use super::super::connect::ServerArg;
 use super::super::{CommandError, say};
 use super::words::state;
 
-/// Start a tournament with the participants who have joined.
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  chefshat tournament start 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
-)]
-pub(super) struct Start {
-    #[command(flatten)]
-    owned: Owned,
-}
-
-/// Close a tournament early: games in progress are aborted, counted games keep their results.
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
-)]
-pub(super) struct Close {
-    #[command(flatten)]
-    owned: Owned,
-}
-
 /// The tournament and the proof of ownership.
 #[derive(Debug, Args)]
-struct Owned {
+pub(super) struct Owned {
     /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
@@ -54,27 +34,25 @@ struct Owned {
     json: bool,
 }
 
-impl Start {
-    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let Owned { tournament_id, .. } = &self.owned;
-        let token = self.owned.token()?;
-        let client = self.owned.server.connect().await?;
-        let tournament = client.start_tournament(tournament_id, token).await?;
-        self.owned.print("started", &tournament)
-    }
-}
-
-impl Close {
-    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let Owned { tournament_id, .. } = &self.owned;
-        let token = self.owned.token()?;
-        let client = self.owned.server.connect().await?;
-        let tournament = client.close_tournament(tournament_id, token).await?;
-        self.owned.print("closed", &tournament)
-    }
-}
-
 impl Owned {
+    /// Starts the tournament with the participants who have joined.
+    pub(super) async fn start(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.token()?, self.server.connect().await?);
+        let tournament = client
+            .start_tournament(self.tournament_id.as_str(), token)
+            .await?;
+        self.print("started", &tournament)
+    }
+
+    /// Closes the tournament.
+    pub(super) async fn close(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.token()?, self.server.connect().await?);
+        let tournament = client
+            .close_tournament(self.tournament_id.as_str(), token)
+            .await?;
+        self.print("closed", &tournament)
+    }
+
     /// The owner token; the file has priority over the environment.
     fn token(&self) -> Result<String, CommandError> {
         match (&self.owner_file, &self.owner_token) {

@@ -15,13 +15,12 @@ use chefshat_tournament::{
     SettingsProblem, Tournament,
 };
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::super::numbers::{counted, grouped};
 use super::super::output::{self, heading, line};
 use super::super::rules_args::{RulesArgs, by_flag};
-use super::super::{CommandError, threads};
+use super::super::{CommandError, progress, threads};
 use super::create::{BuiltIn, built_in};
 use super::files;
 use super::results::of_deals;
@@ -82,9 +81,7 @@ impl Simulate {
         let mut tournament = self.tournament(&rules)?;
         let games = tournament.games_expected() as u64;
         let pool = threads::pool(self.threads, games)?;
-        let bar = ProgressBar::new(games).with_style(ProgressStyle::with_template(
-            "{bar:40} {human_pos} of {human_len} games, {eta} left",
-        )?);
+        let bar = progress::of_items(games, "games");
         let start = Instant::now();
         for change in tournament.begin()? {
             tournament.fold(&change);
