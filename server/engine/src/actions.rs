@@ -5,34 +5,6 @@ use std::fmt;
 
 use crate::{ActionId, Face, MAX_FACES};
 
-/// Number of plays of cards with a face in the largest deck.
-const MAX_PLAYS: usize = play_offset(MAX_FACES + 1) as usize;
-
-/// Index of the first play of a face: 3f(f-1)/2.
-pub(crate) const fn play_offset(face: u8) -> u16 {
-    3 * (face as u16) * (face as u16 - 1) / 2
-}
-
-/// Face, quantity and jokers of each play, by index.
-static PLAYS: [[u8; 3]; MAX_PLAYS] = {
-    let mut table = [[0; 3]; MAX_PLAYS];
-    let (mut face, mut index) = (1, 0);
-    while face <= MAX_FACES {
-        let mut quantity = 1;
-        while quantity <= face {
-            let mut jokers = 0;
-            while jokers <= 2 {
-                table[index] = [face, quantity, jokers];
-                index += 1;
-                jokers += 1;
-            }
-            quantity += 1;
-        }
-        face += 1;
-    }
-    table
-};
-
 /// What a seat does at a decision: a play, a pass, a gift, or its answer to a special action.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub enum Action {
@@ -253,3 +225,31 @@ fn parse_action(text: &str) -> Option<Action> {
         jokers,
     })
 }
+
+/// Number of plays of cards with a face in the largest deck.
+const MAX_PLAYS: usize = play_offset(MAX_FACES + 1) as usize;
+
+/// Index of the first play of a face: 3f(f-1)/2.
+pub(crate) const fn play_offset(face: u8) -> u16 {
+    3 * (face as u16) * (face as u16 - 1) / 2
+}
+
+/// Face, quantity and jokers of each play, by index.
+static PLAYS: [[u8; 3]; MAX_PLAYS] = {
+    let mut table = [[0; 3]; MAX_PLAYS];
+    let (mut face, mut index) = (1, 0);
+    while face <= MAX_FACES {
+        let mut quantity = 1;
+        while quantity <= face {
+            let mut jokers = 0;
+            while jokers <= 2 {
+                table[index] = [face, quantity, jokers];
+                index += 1;
+                jokers += 1;
+            }
+            quantity += 1;
+        }
+        face += 1;
+    }
+    table
+};

@@ -1,7 +1,7 @@
-//! What is legal. This file states the rules of a decision once: [`PlayRequirement`] says what the
-//! board and the rule set ask of a turn, and a turn is legal if it meets that and the hand holds
-//! its cards. `crate::patterns` lists all legal turns by table look-up; a test compares its masks
-//! with [`PlayRequirement::allows`] in random games, and with a second implementation of the rules.
+//! What is legal. This file states the rules of a decision once: it derives a [`PlayRequirement`]
+//! from the board and the rule set, and a turn is legal if it meets that and the hand holds its
+//! cards. `crate::patterns` lists all legal turns by table look-up; a test compares its masks with
+//! [`PlayRequirement::allows`] in random games, and with a second implementation of the rules.
 
 use super::decision::{Decision, GiftRequirement, PlayRequirement, Requirement};
 use super::error::{ActionError, Refusal};

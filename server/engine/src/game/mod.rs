@@ -1,7 +1,7 @@
 //! A game as a value: its open decision, applying an action, and reading its state. The modules:
-//! `start` (deal, special action, exchange), `turn` (plays, passes, pizzas), `end` (places,
-//! points), `legal` (what is legal), `view` (what a seat may know), `script` (games from given
-//! hands).
+//! `decision` (the open decision and its requirements), `start` (deal, special action, exchange),
+//! `turn` (plays, passes, pizzas), `end` (places, points), `shift_state` (board and turn order),
+//! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands).
 
 mod decision;
 mod end;
