@@ -61,7 +61,7 @@ impl<'a> SecretFile<'a> {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(super) fn leave(mut self, secret: &str) -> Result<(), CommandError> {
+    pub(super) fn write(mut self, secret: &str) -> Result<(), CommandError> {
         writeln!(self.temporary, "{secret}")
             .and_then(|()| std::fs::rename(&self.part, self.file))
             .map_err(|error| {
@@ -97,7 +97,7 @@ mod tests {
         let file = folder.path().join("code");
         for code in ["BCDF2345", "BCDF2346"] {
             let prepared = prepare(&file).expect("it can be written");
-            prepared.leave(code).expect("written");
+            prepared.write(code).expect("written");
         }
         assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
         let mode = std::fs::metadata(&file)

@@ -77,12 +77,12 @@ impl Create {
         let code_file = (self.code_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
-        let made = client.create_room(request).await.map_err(refused)?;
-        let room = made
+        let created = client.create_room(request).await.map_err(refused)?;
+        let room = created
             .room
             .ok_or("the server did not return the created room")?;
-        let left = code_file.map_or(Ok(()), |file| file.leave(&made.join_code));
-        let (code, owner) = (made.join_code, made.owner_token);
+        let written = code_file.map_or(Ok(()), |file| file.write(&created.join_code));
+        let (code, owner) = (created.join_code, created.owner_token);
         if self.json {
             let line = serde_json::json!({
                 "event": "created", "room": room, "join_code": code, "owner_token": owner,
@@ -98,7 +98,7 @@ impl Create {
             }
         }
         // Last, so that the secrets are printed even if this fails.
-        left?;
+        written?;
         Ok(ExitCode::SUCCESS)
     }
 

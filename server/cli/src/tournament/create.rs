@@ -113,13 +113,13 @@ impl Create {
         let owner_file = (self.owner_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
             .transpose()?;
-        let made = client.create_tournament(settings).await.map_err(refused)?;
-        let tournament = made
+        let created = client.create_tournament(settings).await.map_err(refused)?;
+        let tournament = created
             .tournament
             .ok_or("the server did not return the created tournament")?;
-        let (code, owner) = (made.join_code, made.owner_token);
-        let left = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
-            Some(file) => file.leave(secret),
+        let (code, owner) = (created.join_code, created.owner_token);
+        let written = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
+            Some(file) => file.write(secret),
             None => Ok(()),
         });
         if self.json {
@@ -134,7 +134,7 @@ impl Create {
             say(self.next_steps(&tournament, &code))?;
         }
         // Last, so that the secrets are printed even if this fails.
-        left.into_iter().collect::<Result<Vec<()>, _>>()?;
+        written.into_iter().collect::<Result<Vec<()>, _>>()?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -186,13 +186,13 @@ impl Create {
             Some(file) => format!("--owner-file {}", file.display()),
             None => "--owner-token TOKEN".to_owned(),
         };
-        let begins = match self.start_when {
-            Some(count) => format!("it begins when {count} have joined"),
+        let starts = match self.start_when {
+            Some(count) => format!("it starts when {count} have joined"),
             None => {
-                format!("begin it with: chefshat tournament start {id} --server {server} {owner}")
+                format!("start it with: chefshat tournament start {id} --server {server} {owner}")
             }
         };
-        format!("take part with: {join}\n{begins}")
+        format!("join with: {join}\n{starts}")
     }
 }
 

@@ -162,7 +162,7 @@ impl App {
         Some((time.saturating_sub(gone), bank.saturating_sub(beyond)))
     }
 
-    /// Whether keys act on the table, not on a dialog or the story.
+    /// Whether keys act on the table, not on a dialog or the log.
     pub(super) fn takes_keys(&self) -> bool {
         self.dialog.is_none() && !self.log.is_open()
     }

@@ -118,7 +118,7 @@ impl Reel {
             return;
         }
         if self.log.key(code) {
-            // Stop while the person reads the story.
+            // Stop while the person reads the log.
             self.running &= !self.log.is_open();
             return;
         }
