@@ -143,7 +143,7 @@ pub struct Game {
     pub deal: Option<u32>,
     /// The state.
     pub state: GameState,
-    /// Number of calls, including those in vain.
+    /// Number of calls, including those without success.
     pub calls: u32,
     /// Participants who forfeited it.
     pub forfeited: Vec<usize>,

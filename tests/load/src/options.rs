@@ -18,7 +18,7 @@ const MAX_SECONDS: f64 = 600.0;
 #[command(
     name = "chefshat-load",
     version,
-    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --scale                4 to 4,000 connections on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --vector               batches of a client's own games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
+    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --scale                4 to 4,000 connections on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with 1,000 unfinished games\n  chefshat-load --vector               batches of a client's own games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
 )]
 pub(crate) struct Options {
     #[command(subcommand)]

@@ -19,7 +19,7 @@ use tokio::task::JoinSet;
 const KILLS: u64 = 100;
 /// Most decisions acknowledged between two kills.
 const MOST_BETWEEN: u64 = 40;
-/// After every so many kills the next server is also killed while it starts.
+/// Kills after which the next server is also killed while it starts.
 const KILLED_AT_START: u64 = 8;
 /// Longest time before a starting server is killed.
 const LONGEST_START: Duration = Duration::from_millis(100);

@@ -30,7 +30,7 @@ pub(super) struct Reel<'a> {
 }
 
 impl<'a> Reel<'a> {
-    /// A film, so many pixels wide.
+    /// A film with its width in pixels.
     pub(super) fn new(frames: Vec<(&'a Frame, Duration)>, width: u32) -> Self {
         Self {
             frames,
