@@ -19,16 +19,18 @@ use tracing::debug;
 /// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Idle time before the kernel probes the peer. Unlike HTTP/2 pings, probes cost nothing per message,
-/// and they work for HTTP/1.1 as well.
+/// Idle time before the kernel probes the peer. Unlike HTTP/2 pings, probes cost nothing per
+/// message, and they work for HTTP/1.1 as well.
 const KEEPALIVE_IDLE: Duration = Duration::from_secs(20);
 /// Time between probes.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(5);
 /// Unanswered probes before the connection is dropped.
 const KEEPALIVE_RETRIES: u32 = 2;
-/// How long sent data may stay unacknowledged before the connection is dropped.
+/// How long data may stay unacknowledged, or unsent because the peer does not read, before the
+/// connection is dropped. Longer than any time the services give a client to read. Other systems
+/// have no such option: there a peer that vanishes with data in flight is found by their own limit.
 #[cfg(target_os = "linux")]
-const UNACKNOWLEDGED_LIMIT: Duration = Duration::from_secs(30);
+const UNACKNOWLEDGED_LIMIT: Duration = Duration::from_secs(90);
 
 /// Limits of connections.
 #[derive(Debug, Clone, Copy)]
@@ -152,6 +154,7 @@ mod tests {
 
     use super::*;
 
+    #[cfg(unix)]
     #[tokio::test]
     async fn an_accepted_connection_is_probed_by_the_kernel() {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");

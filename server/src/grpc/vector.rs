@@ -15,7 +15,7 @@ use chefshat_proto::v1::{
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto};
 use chefshat_simulation::vector::{
-    Batch, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
+    Batch, Decisions, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
 };
 use prost::Message as _;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
@@ -42,7 +42,7 @@ use chefshat_room::ids::random_bytes;
 const SEND_AHEAD: usize = 4;
 /// Most games that are stepped without the thread pool if the client plays all seats.
 const MAX_GAMES_IN_PLACE: u32 = 16;
-/// Most games that are stepped without the thread pool if built-in agents without a network play.
+/// Most games that are stepped without the thread pool if fast built-in agents play.
 const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
 /// Size from which a part of a record is sent, bytes.
 const RECORD_PART_BYTES: usize = 512 * 1024;
@@ -313,11 +313,19 @@ impl Runner {
 
 /// Whether a step of these games takes less time than waking a thread of the pool.
 fn steps_in_place(setup: &VectorSetup) -> bool {
-    let built_in: Vec<_> = setup.agents().values().flatten().collect();
-    let most = if built_in.is_empty() {
-        MAX_GAMES_IN_PLACE
-    } else if built_in.contains(&&AgentKind::Trained) {
+    let others = match setup.decisions() {
+        Decisions::Turns { others } => others,
+        Decisions::All => None,
+    };
+    let built_in: Vec<_> = (setup.agents().values().copied().chain([others]))
+        .flatten()
+        .collect();
+    // A network takes long for a decision, and an agent that may pass at any time for a Shift.
+    let slow = [AgentKind::Trained, AgentKind::RandomUnmasked];
+    let most = if built_in.iter().any(|agent| slow.contains(agent)) {
         0
+    } else if built_in.is_empty() {
+        MAX_GAMES_IN_PLACE
     } else {
         MAX_GAMES_IN_PLACE_WITH_BUILT_IN
     };
@@ -523,6 +531,8 @@ fn too_late(reason: &str, what: &str, limit: Duration, advice: &str) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use chefshat_simulation::vector::Seeds;
+
     use crate::grpc::vector::*;
 
     #[tokio::test]
@@ -531,5 +541,33 @@ mod tests {
         let failed = on_pool(&pool, || -> u32 { panic!("on purpose") }).await;
         assert_eq!(failed.unwrap_err().code(), Code::Internal);
         assert_eq!(on_pool(&pool, || 7).await.unwrap(), 7);
+    }
+
+    #[test]
+    fn only_short_steps_are_made_in_place() {
+        let spec = chefshat_engine::RuleSetSpec::default();
+        let rules = spec.validate().expect("a valid rule set");
+        let random = Some(AgentKind::Random);
+        let trained = Some(AgentKind::Trained);
+        let unmasked = Some(AgentKind::RandomUnmasked);
+        let turns = |others| Decisions::Turns { others };
+        let cases = [
+            (16, [None; 4], Decisions::All, true),
+            (17, [None; 4], Decisions::All, false),
+            (16, [None; 4], turns(None), true),
+            (2, [None; 4], turns(random), true),
+            (3, [None; 4], turns(random), false),
+            (1, [None; 4], turns(trained), false),
+            (2, [None, random, random, random], Decisions::All, true),
+            (3, [None, random, random, random], Decisions::All, false),
+            (1, [None, random, trained, random], Decisions::All, false),
+            (1, [None, random, unmasked, random], Decisions::All, false),
+        ];
+        for (games, agents, decisions, expected) in cases {
+            let setup = VectorSetup::new(rules, games, &agents, Seeds::Base(1))
+                .expect("a valid setup")
+                .with_decisions(decisions);
+            assert_eq!(steps_in_place(&setup), expected, "{games} {agents:?}");
+        }
     }
 }

@@ -1,11 +1,13 @@
 //! The task of a room: receives from a bounded mailbox, sets one timer, and for every batch of
-//! inputs lets the core apply them, commits the changes and only then publishes them. While the task
-//! waits, the reader of a stream may handle an answer in the same way. The core makes all decisions.
+//! inputs lets the core apply them, commits the changes and only then publishes them. While the
+//! task waits, the reader of a stream may handle an answer in the same way. The core makes all
+//! decisions.
 
 use std::future::{Future as _, poll_fn};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::Poll;
 use std::time::Duration;
 
@@ -161,8 +163,9 @@ pub(super) struct Resting(Mutex<Option<Box<Room>>>);
 
 impl Resting {
     fn lock(&self) -> MutexGuard<'_, Option<Box<Room>>> {
-        // A holder of the lock that panicked had taken the room out.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0
+            .lock()
+            .expect("nothing that holds this lock can panic")
     }
 
     /// Handles an answer in place and returns whether the task must be woken. Returns the answer if
@@ -182,9 +185,21 @@ impl Resting {
         let Some(mut room) = resting.take_if(|room| is_first && room.answers_in_place) else {
             return Err(answer);
         };
-        let needs_task = room.answer_in_place(seat, connection, answer, arrived);
-        *resting = Some(room);
-        Ok(needs_task)
+        // A panic ends the room, but not the stream of a reader that may have seats in other rooms.
+        let answered = catch_unwind(AssertUnwindSafe(move || {
+            let needs_task = room.answer_in_place(seat, connection, answer, arrived);
+            (room, needs_task)
+        }));
+        match answered {
+            Ok((room, needs_task)) => {
+                *resting = Some(room);
+                Ok(needs_task)
+            }
+            Err(_) => {
+                error!("a room panicked and is gone");
+                Ok(true)
+            }
+        }
     }
 }
 
@@ -254,8 +269,7 @@ impl Room {
             SeatAction::Answer(answer),
             arrived,
         ));
-        let stored = self.core.pending().is_empty() || self.journal.append_now(self.core.pending());
-        if !stored || self.core.state().is_over() {
+        if !self.commit_now() || self.core.state().is_over() {
             return true;
         }
         self.publish();
@@ -494,11 +508,15 @@ impl Room {
         Ok(())
     }
 
+    /// Commits new changes if this takes no time.
+    fn commit_now(&mut self) -> bool {
+        self.core.pending().is_empty() || self.journal.append_now(self.core.pending())
+    }
+
     /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
     /// must stop.
     async fn commit_and_publish(&mut self) -> bool {
-        let stored = self.core.pending().is_empty() || self.journal.append_now(self.core.pending());
-        if !stored {
+        if !self.commit_now() {
             if let Err(error) = self.journal.append(self.core.pending()).await {
                 self.fail(&error);
                 return false;

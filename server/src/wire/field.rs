@@ -1,4 +1,4 @@
-//! Writes fields of messages directly. Numbers are nearly always small and messages short, so most lengths and numbers take one byte.
+//! Writes fields of messages directly. Most numbers and lengths are small and take one byte.
 
 use prost::encoding::{WireType, encode_key, encode_varint};
 
@@ -25,19 +25,20 @@ pub(super) fn put_bytes(
     }
 }
 
-/// Writes a message of at most 16 KiB with the fields that `content` writes.
+/// Writes a message of less than 16 KiB with the fields that `content` writes.
 pub(super) fn put_message(out: &mut Vec<u8>, field: u32, content: impl FnOnce(&mut Vec<u8>)) {
     put_key(out, field, WireType::LengthDelimited, 0);
     let start = out.len();
     content(out);
     let length = out.len() - start;
+    assert!(length < 1 << 14, "a message of {length} bytes");
     // The length is known only now; it nearly always fits the byte reserved for it.
     let low = u8::try_from(length & 0x7f).expect("seven bits");
     if length < 0x80 {
         out[start - 1] = low;
     } else {
         out[start - 1] = low | 0x80;
-        let high = u8::try_from(length >> 7).expect("it is at most 16 KiB");
+        let high = u8::try_from(length >> 7).expect("seven bits");
         out.insert(start, high);
     }
 }

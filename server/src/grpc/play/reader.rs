@@ -45,16 +45,12 @@ impl BoundSeat {
     /// Passes an answer to the room, `in_place` or through its mailbox. Returns the answer if the room
     /// cannot accept it now.
     fn answer_now(&self, answer: Answer, arrived: Instant, in_place: bool) -> Result<(), Answer> {
-        let answer = match in_place {
-            true => {
-                match (self.room).answer_in_place(self.seat, self.connection, answer, arrived) {
-                    Ok(()) => return Ok(()),
-                    Err(answer) => answer,
-                }
-            }
-            false => answer,
-        };
-        (self.room).send_answer(self.seat, self.connection, answer, arrived)
+        if !in_place {
+            return (self.room).send_answer(self.seat, self.connection, answer, arrived);
+        }
+        let given_back = (self.room).answer_in_place(self.seat, self.connection, answer, arrived);
+        given_back
+            .or_else(|answer| (self.room).send_answer(self.seat, self.connection, answer, arrived))
     }
 }
 
@@ -142,23 +138,7 @@ impl Reader {
                         [("field", "commands")],
                     ));
                 }
-                Ok(Some(request)) => {
-                    // The rooms of a message for several seats work in parallel instead.
-                    let in_place = request.commands.len() == 1;
-                    for v1::SeatCommand { handle, command } in request.commands {
-                        match (command, self.seats.get(&handle)) {
-                            (Some(Command::Answer(answer)), Some(bound)) => {
-                                let answer = convert::answer_from_proto(answer);
-                                if let Err(answer) = bound.answer_now(answer, arrived, in_place) {
-                                    let action = SeatAction::Answer(answer);
-                                    Box::pin(self.perform(handle, action, arrived)).await;
-                                }
-                            }
-                            // Boxed because it is rare: the future of a stream stays small.
-                            (command, _) => Box::pin(self.obey(handle, command, arrived)).await,
-                        }
-                    }
-                }
+                Ok(Some(request)) => self.execute(request, arrived).await,
                 Ok(None) => break Ok(()),
                 Err(status) => break Err(status),
             }
@@ -173,7 +153,27 @@ impl Reader {
         });
     }
 
-    async fn obey(&mut self, handle: u32, command: Option<Command>, arrived: Instant) {
+    async fn execute(&mut self, request: v1::PlayRequest, arrived: Instant) {
+        // The rooms of a message for several seats work in parallel instead.
+        let in_place = request.commands.len() == 1;
+        for v1::SeatCommand { handle, command } in request.commands {
+            // A flood of answers, which are handled without waiting, must not hold the thread.
+            tokio::task::consume_budget().await;
+            match (command, self.seats.get(&handle)) {
+                (Some(Command::Answer(answer)), Some(bound)) => {
+                    let answer = convert::answer_from_proto(answer);
+                    if let Err(answer) = bound.answer_now(answer, arrived, in_place) {
+                        let action = SeatAction::Answer(answer);
+                        Box::pin(self.perform(handle, action, arrived)).await;
+                    }
+                }
+                // Boxed because it is rare: the future of a stream stays small.
+                (command, _) => Box::pin(self.execute_command(handle, command, arrived)).await,
+            }
+        }
+    }
+
+    async fn execute_command(&mut self, handle: u32, command: Option<Command>, arrived: Instant) {
         let action = match command {
             Some(Command::Attach(attach)) => return self.attach(attach).await,
             Some(Command::Detach(_)) => return self.detach(handle).await,
@@ -476,4 +476,38 @@ pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, 
         record_only: expression.record_only,
         expression: convert::expression_from_proto(expression)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio_util::task::TaskTracker;
+
+    use super::*;
+    use crate::config::ServerConfig;
+    use crate::store::MemoryStore;
+
+    #[tokio::test]
+    async fn a_flood_of_commands_yields_to_other_tasks() {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        let (outbox, _updates) = Outbox::new();
+        let mut reader = Reader::new(&rooms, &tournaments, &outbox, true);
+        let flood = tokio::spawn(async move {
+            for _ in 0..10_000 {
+                let command = v1::SeatCommand {
+                    handle: 7,
+                    command: Some(Command::Answer(v1::Answer::default())),
+                };
+                let commands = vec![command];
+                reader
+                    .execute(v1::PlayRequest { commands }, Instant::now())
+                    .await;
+            }
+        });
+        // The only thread runs the flood until it yields.
+        tokio::task::yield_now().await;
+        assert!(!flood.is_finished());
+        flood.abort();
+    }
 }
