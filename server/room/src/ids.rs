@@ -126,7 +126,7 @@ impl Token {
     }
 
     /// The token as text, for the client.
-    pub fn word(&self) -> String {
+    pub fn to_text(&self) -> String {
         hex::encode([self.room.0.as_slice(), &self.secret].concat())
     }
 
@@ -219,11 +219,11 @@ mod tests {
         assert_eq!(Id::parse(&id.to_string()), Some(id));
         assert_eq!(Id::parse("12"), None);
         let token = Token::random(id);
-        assert_eq!(Token::parse(&token.word()), Some(token));
-        assert_eq!(Token::parse(&token.word()[1..]), None);
+        assert_eq!(Token::parse(&token.to_text()), Some(token));
+        assert_eq!(Token::parse(&token.to_text()[1..]), None);
         assert!(token.hash().matches(&token.secret));
         assert!(!token.hash().matches(&Token::random(id).secret));
-        assert!(!format!("{token:?}").contains(&token.word()));
+        assert!(!format!("{token:?}").contains(&token.to_text()));
     }
 
     #[test]

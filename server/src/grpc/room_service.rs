@@ -87,7 +87,7 @@ impl RoomService for RoomCalls {
         Ok(Response::new(v1::CreateRoomResponse {
             room: Some(room),
             join_code: created.join_code,
-            owner_token: created.owner.word(),
+            owner_token: created.owner.to_text(),
         }))
     }
 
@@ -174,7 +174,7 @@ impl RoomService for RoomCalls {
         Ok(Response::new(v1::JoinRoomResponse {
             room: Some(*joined.room),
             seat: seat_number(joined.seat),
-            ticket: joined.ticket.word(),
+            ticket: joined.ticket.to_text(),
         }))
     }
 

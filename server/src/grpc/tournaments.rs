@@ -131,7 +131,7 @@ impl TournamentService for TournamentCalls {
         Ok(Response::new(v1::CreateTournamentResponse {
             tournament: Some(handle.describe()),
             join_code: handle.join_code().to_owned(),
-            owner_token: owner.word(),
+            owner_token: owner.to_text(),
         }))
     }
 
@@ -207,7 +207,7 @@ impl TournamentService for TournamentCalls {
         Ok(Response::new(v1::JoinTournamentResponse {
             tournament: Some(handle.describe()),
             participant: convert::number(participant),
-            ticket: ticket.word(),
+            ticket: ticket.to_text(),
         }))
     }
 

@@ -451,7 +451,7 @@ fn step_refused(error: &StepError) -> Status {
         StepError::NoGame { .. } | StepError::Order { .. } => {
             field("RESET_REFUSED", &FieldProblem::new("games", words))
         }
-        StepError::Kept => status(
+        StepError::RecordsTooLong => status(
             Code::ResourceExhausted,
             "RECORDS_TOO_LONG",
             words,

@@ -208,7 +208,7 @@ impl Subscriber {
                 Some(_) => convert::tournament_id(header),
                 None => String::new(),
             },
-            ticket: ticket.map_or_else(String::new, |ticket| ticket.word()),
+            ticket: ticket.map_or_else(String::new, |ticket| ticket.to_text()),
         };
         self.pending.add(handle, Update::Attached(attached));
         if options.snapshot {

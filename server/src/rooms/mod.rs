@@ -145,8 +145,8 @@ impl Rooms {
         }
         // Runs to completion even if the caller is cancelled: a half-created room would be stored
         // and belong to nobody.
-        let making = self.context.tracker.spawn(reservation.make(new));
-        making
+        let creating = self.context.tracker.spawn(reservation.create(new));
+        creating
             .await
             .map_err(|error| StoreError::Failed(format!("creating a room failed: {error}")))?
     }
@@ -374,7 +374,7 @@ impl Reservation {
         Ok(Claim::Reserved(Self { rooms, owner }))
     }
 
-    async fn make(self, new: NewRoom) -> Result<Created, CreateError> {
+    async fn create(self, new: NewRoom) -> Result<Created, CreateError> {
         let rooms = &self.rooms;
         let seating = new.seating.as_ref();
         let server_seed = seating.and_then(|seating| seating.server_seed);

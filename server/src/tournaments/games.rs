@@ -123,12 +123,12 @@ impl Task {
         }
         self.retry = None;
         let without_room: Vec<usize> = self.without_room.iter().copied().collect();
-        let making = without_room.iter().map(|game| {
+        let creating = without_room.iter().map(|game| {
             let new = self.new_room(*game);
             let rooms = &self.rooms;
             async move { (*game, rooms.create(new).await) }
         });
-        for (game, made) in join_all(making).await {
+        for (game, made) in join_all(creating).await {
             match made {
                 Ok(_) => {
                     self.without_room.remove(&game);

@@ -115,10 +115,10 @@ impl Tournaments {
         };
         // Runs to completion even if the caller is cancelled: a half-created tournament would be
         // stored and restored with the server.
-        let making = self
+        let creating = self
             .tracker
             .spawn(reservation.make(name.to_owned(), plan, core));
-        making
+        creating
             .await
             .map_err(|error| StoreError::Failed(format!("creating a tournament failed: {error}")))?
     }

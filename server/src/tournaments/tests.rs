@@ -210,7 +210,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
         .create("Coppa", plan(), Some(request))
         .await
         .expect("there");
-    assert!(again == owner && handle.is_owner(&owner.word()));
+    assert!(again == owner && handle.is_owner(&owner.to_text()));
     assert_eq!(tournaments.newest(None, None, 9).len(), 1);
     assert_eq!(handle.join(ada()).await.expect("the task runs"), Ok(joined));
     assert_eq!(handle.participant_of(&joined.1.secret), Some(joined.0));

@@ -20,9 +20,9 @@ use slot::Slot;
 /// games: about a second. Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
 /// Maximum number of decisions and invalid attempts kept for records of running games: about 64 MB.
-pub const MAX_KEPT: u64 = 2_000_000;
+pub const MAX_RECORDED: u64 = 2_000_000;
 
-/// Why a step fails. Except for `Kept`, the games are unchanged.
+/// Why a step fails. Except for `RecordsTooLong`, the games are unchanged.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum StepError {
     /// The number of actions is not the number of rows.
@@ -65,9 +65,9 @@ pub enum StepError {
     /// Records of running games exceed the limit. The games have advanced and cannot be used any
     /// more.
     #[error(
-        "the records of running games exceed {MAX_KEPT} decisions and invalid attempts: play fewer or shorter games at a time, or without records"
+        "the records of running games exceed {MAX_RECORDED} decisions and invalid attempts: play fewer or shorter games at a time, or without records"
     )]
-    Kept,
+    RecordsTooLong,
 }
 
 /// The games of one client.
@@ -130,8 +130,10 @@ impl VectorGames {
         }
         drop(answers);
         self.open = open;
-        if self.setup.keeps_records() && self.slots.iter().map(Slot::kept).sum::<u64>() > MAX_KEPT {
-            return Err(StepError::Kept);
+        if self.setup.keeps_records()
+            && self.slots.iter().map(Slot::kept).sum::<u64>() > MAX_RECORDED
+        {
+            return Err(StepError::RecordsTooLong);
         }
         Ok(self.finished(batch))
     }

@@ -401,12 +401,12 @@ impl Reader {
             attach,
         };
         self.participants.insert(handle, bound);
-        let way = Connection {
+        let stream = Connection {
             handle,
             calls: self.calls.clone(),
             outbox: Arc::clone(&self.outbox),
         };
-        tournament.enter(participant, connection, way).await;
+        tournament.enter(participant, connection, stream).await;
     }
 
     /// Executes a call of a tournament.
@@ -428,7 +428,7 @@ impl Reader {
         };
         let ticket = Token { room, ..token };
         let attach = v1::Attach {
-            ticket: ticket.word(),
+            ticket: ticket.to_text(),
             request_id: 0,
             ..bound.attach.clone()
         };

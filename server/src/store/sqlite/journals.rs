@@ -50,7 +50,7 @@ pub(super) struct DurableJournal {
     pub(super) position: i64,
     /// Its last row so far.
     pub(super) last_row: Option<i64>,
-    pub(super) orders: WriteQueue,
+    pub(super) queue: WriteQueue,
 }
 
 impl DurableJournal {
@@ -60,7 +60,7 @@ impl DurableJournal {
         header: &GameHeader,
         entries: &mut Vec<Entry>,
     ) -> Result<(), StoreError> {
-        let first_row = self.orders.first_row();
+        let first_row = self.queue.first_row();
         let first = (!entries.is_empty()).then(|| self.next_row(entries));
         let create = WriteCommand::Create {
             number: self.number,
@@ -69,12 +69,12 @@ impl DurableJournal {
             first_row,
             first,
         };
-        self.orders.send(create).await
+        self.queue.send(create).await
     }
 
     /// Its next row.
     fn next_row(&mut self, entries: &mut Vec<Entry>) -> Row {
-        let number = self.orders.new_row();
+        let number = self.queue.new_row();
         let row = Row {
             number,
             game: self.number,
@@ -94,14 +94,14 @@ impl Journal for DurableJournal {
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         let row = self.next_row(entries);
-        self.orders.send(WriteCommand::Append(row)).boxed()
+        self.queue.send(WriteCommand::Append(row)).boxed()
     }
 
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.orders
+        self.queue
             .send(WriteCommand::Finish {
                 number: self.number,
                 // Only an aborted game can end before the deal.
@@ -118,7 +118,7 @@ pub(super) struct EphemeralJournal {
     pub(super) number: i64,
     pub(super) header: Arc<GameHeader>,
     pub(super) entries: Vec<Entry>,
-    pub(super) orders: WriteQueue,
+    pub(super) queue: WriteQueue,
     pub(super) codec: Codec,
 }
 
@@ -154,11 +154,11 @@ impl Journal for EphemeralJournal {
                 number: self.number,
                 game_id,
                 header,
-                row: self.orders.new_row(),
+                row: self.queue.new_row(),
                 entries,
                 summary,
             };
-            match self.orders.send(game).await {
+            match self.queue.send(game).await {
                 // The game was played anyway; the record that was stored first stays.
                 Err(StoreError::Taken(_)) => {
                     error!(game = %game_id, "another record has the id of this game; the game is not stored");

@@ -48,7 +48,7 @@ pub struct SqliteStore {
     data_dir: PathBuf,
     reader: Reader,
     codec: Codec,
-    orders: WriteQueue,
+    commands: WriteQueue,
     failed: watch::Receiver<Option<StoreError>>,
     numbers: Arc<AtomicI64>,
     writing: Mutex<Option<JoinHandle<()>>>,
@@ -72,7 +72,7 @@ impl SqliteStore {
         .fetch_one(&opened.readers)
         .await
         .map_err(|error| OpenError::Other(data_dir.join(errors::FILE), explain(&error)))?;
-        let (orders, queue) = mpsc::channel(writer::QUEUE);
+        let (commands, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let codec = Codec::new();
         let writing = tokio::spawn(writer::run(opened.writer, last_listed, queue, has_failed));
@@ -83,8 +83,8 @@ impl SqliteStore {
                 codec: codec.clone(),
             },
             codec,
-            orders: WriteQueue {
-                queue: orders,
+            commands: WriteQueue {
+                queue: commands,
                 next_row: Arc::new(AtomicI64::new(last_row + 1)),
             },
             failed,
@@ -118,13 +118,13 @@ impl Store for SqliteStore {
         mut entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
-        let orders = self.orders.clone();
+        let commands = self.commands.clone();
         if header.policy.durability == Durability::Ephemeral {
             let journal = EphemeralJournal {
                 number,
                 header,
                 entries,
-                orders,
+                queue: commands,
                 codec: self.codec.clone(),
             };
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
@@ -134,7 +134,7 @@ impl Store for SqliteStore {
                 number,
                 position: 0,
                 last_row: None,
-                orders,
+                queue: commands,
             };
             journal.begin(&header, &mut entries).await?;
             Ok(Box::new(journal) as Box<dyn Journal>)
@@ -147,7 +147,7 @@ impl Store for SqliteStore {
         ended_since_ms: u64,
     ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
         self.reader
-            .resumable_games(ended_since_ms, &self.orders)
+            .resumable_games(ended_since_ms, &self.commands)
             .boxed()
     }
 
@@ -182,7 +182,7 @@ impl Store for SqliteStore {
                 record,
                 summary: Box::new(summary),
             };
-            match self.orders.send(import).await {
+            match self.commands.send(import).await {
                 Ok(()) => Ok(true),
                 Err(StoreError::Taken(_)) => Ok(false),
                 Err(error) => Err(error),
@@ -196,7 +196,7 @@ impl Store for SqliteStore {
     }
 
     fn mark_record_written(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.orders
+        self.commands
             .send(WriteCommand::RecordWritten { game_id })
             .boxed()
     }
@@ -210,7 +210,7 @@ impl Store for SqliteStore {
             header: form::tournament_to_bytes(&header),
             first: TournamentRow::new(header.id, 0, &entries),
         };
-        self.orders.send(order).boxed()
+        self.commands.send(order).boxed()
     }
 
     fn append_tournament(
@@ -220,7 +220,7 @@ impl Store for SqliteStore {
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let row = TournamentRow::new(tournament, row, &entries);
-        self.orders
+        self.commands
             .send(WriteCommand::TournamentEntries(row))
             .boxed()
     }
@@ -256,7 +256,7 @@ impl Store for SqliteStore {
             self.closed.store(true, Ordering::Release);
             self.reader.pool.close().await;
             // A failed writer is reported elsewhere; here it is only awaited.
-            let _ = self.orders.send(WriteCommand::Close).await;
+            let _ = self.commands.send(WriteCommand::Close).await;
             let writing = self
                 .writing
                 .lock()

@@ -53,7 +53,7 @@ impl Reader {
     pub(super) async fn resumable_games(
         &self,
         ended_since_ms: u64,
-        orders: &WriteQueue,
+        commands: &WriteQueue,
     ) -> Result<Vec<ResumableGame>, StoreError> {
         let games = sqlx::query(
             "SELECT number, form, header, state, last_row FROM games WHERE number IN (
@@ -87,7 +87,7 @@ impl Reader {
                         number,
                         position: read.rows,
                         last_row: read.last_row,
-                        orders: orders.clone(),
+                        queue: commands.clone(),
                     }),
                     entries: read.entries,
                     concluded,

@@ -121,13 +121,13 @@ pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>
 pub(super) async fn run(
     mut connection: SqliteConnection,
     mut last_listed: i64,
-    mut orders: mpsc::Receiver<Pending>,
+    mut commands: mpsc::Receiver<Pending>,
     failed: watch::Sender<Option<StoreError>>,
 ) {
     let mut pending = Vec::new();
     let mut open = true;
     while open
-        && orders
+        && commands
             .recv_many(&mut pending, MAX_COMMANDS_PER_TRANSACTION)
             .await
             > 0

@@ -5,7 +5,7 @@ use std::num::{NonZeroU32, NonZeroU64};
 use chefshat_agents::{AgentKind, game_seed};
 use chefshat_engine::{DecisionKind, Game, RewardScheme, RuleSetSpec, Script, Seat, Stop};
 use chefshat_simulation::vector::{
-    Decisions, InvalidActions, MAX_KEPT, Seeds, SetupError, Start, StepError, VectorGames,
+    Decisions, InvalidActions, MAX_RECORDED, Seeds, SetupError, Start, StepError, VectorGames,
     VectorSetup,
 };
 
@@ -226,10 +226,10 @@ fn records_in_memory_are_bounded() {
             Err(error) => break error,
         }
         steps += 1;
-        assert!(2 * steps <= MAX_KEPT, "no limit was reached");
+        assert!(2 * steps <= MAX_RECORDED, "no limit was reached");
     };
-    assert_eq!(error, StepError::Kept);
-    assert_eq!(2 * (steps + 1), MAX_KEPT + 2);
+    assert_eq!(error, StepError::RecordsTooLong);
+    assert_eq!(2 * (steps + 1), MAX_RECORDED + 2);
 }
 
 #[test]
