@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=../proto/chefshat");
-    // A release embeds the built page. Cargo does not notice new files there by itself. Other builds read
-    // the page on each request.
+    // A release embeds the built page. Cargo does not notice new files there by itself. Other
+    // builds read the page on each request.
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         println!("cargo::rerun-if-changed=../clients/web/dist");
     }

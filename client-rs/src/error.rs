@@ -186,7 +186,8 @@ pub enum PlayError {
 }
 
 impl PlayError {
-    /// The reason in UPPER_SNAKE: the server's, or `SUPERSEDED`, `DETACHED`, `ENDING_UNKNOWN`, `CONNECTION_LOST`.
+    /// The reason in UPPER_SNAKE: the server's, or `SUPERSEDED`, `DETACHED`, `ENDING_UNKNOWN`,
+    /// `CONNECTION_LOST`.
     pub fn reason(&self) -> Option<&str> {
         match self {
             Self::Refused(error) => error.reason(),

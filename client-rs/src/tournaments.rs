@@ -72,8 +72,9 @@ impl Client {
     /// and adds no second participant.
     ///
     /// # Errors
-    /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_NOT_ADMITTED`, `KIND_REFUSED`,
-    /// `NOT_STATELESS`, `MAX_GAMES_REFUSED`, `TOURNAMENT_UNKNOWN`.
+    /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`,
+    /// `KIND_NOT_ADMITTED`, `KIND_REFUSED`, `NOT_STATELESS`, `MAX_GAMES_REFUSED`,
+    /// `TOURNAMENT_UNKNOWN`.
     pub async fn join_tournament(
         &self,
         mut request: v1::JoinTournamentRequest,

@@ -1,5 +1,6 @@
-//! The `chefshat.v1` protocol: messages, service traits and clients, generated from the `.proto` files beside this crate, with the
-//! canonical JSON form of every message (serde). The documentation of each item is the comment in its `.proto` file.
+//! The `chefshat.v1` protocol: messages, service traits and clients, generated from the `.proto`
+//! files beside this crate, with the canonical JSON form of every message (serde). The
+//! documentation of each item is the comment in its `.proto` file.
 
 /// Everything of package `chefshat.v1`.
 #[allow(

@@ -27,7 +27,8 @@ pub const MESSAGE_CAPACITY: usize = 4_096;
 #[derive(Debug)]
 pub struct HandStamp {
     clock: RoomClock,
-    /// Microseconds since the room was created, plus one; 0 while the request has not been handed over.
+    /// Microseconds since the room was created, plus one; 0 while the request has not been handed
+    /// over.
     micros: AtomicU64,
 }
 

@@ -2,8 +2,9 @@
 
 use chefshat_engine::{Action, ActionId, ActionSpace, Mask, Observation, Role};
 
-/// Prefers, in this order: plays without jokers, the highest face, many cards. Passes only if nothing can be played, gives its highest
-/// face, and declares the special action only in roles that an exchange costs cards.
+/// Prefers, in this order: plays without jokers, the highest face, many cards. Passes only if
+/// nothing can be played, gives its highest face, and declares the special action only in roles
+/// that an exchange costs cards.
 ///
 /// # Panics
 /// If `legal` is empty.

@@ -1,4 +1,5 @@
-//! Plays one game offline, from its deal to its end. Batches of games and their metrics are in `chefshat-simulation`.
+//! Plays one game offline, from its deal to its end. Batches of games and their metrics are in
+//! `chefshat-simulation`.
 
 use std::num::NonZeroU32;
 
@@ -7,7 +8,8 @@ use chefshat_engine::{
     Standings, Viewer,
 };
 
-/// Receives everything that happens in a game, private events included. Each method does nothing by default.
+/// Receives everything that happens in a game, private events included. Each method does nothing by
+/// default.
 pub trait Listener {
     /// Called for every event.
     fn on_event(&mut self, event: &Event) {
@@ -25,8 +27,9 @@ pub trait Listener {
     }
 }
 
-/// Plays a game to its end and returns the final standings. `decide` answers for every seat. An illegal action is reported and the
-/// decision asked again; after `max_invalid_attempts` of them, if there is a limit, the default action is taken.
+/// Plays a game to its end and returns the final standings. `decide` answers for every seat. An
+/// illegal action is reported and the decision asked again; after `max_invalid_attempts` of them,
+/// if there is a limit, the default action is taken.
 ///
 /// Never returns if there is no limit and `decide` never returns a legal action.
 pub fn play(
@@ -64,8 +67,9 @@ pub struct Answer {
     pub by_default: bool,
 }
 
-/// Asks for the open decision of `seat` until the answer is one of the `legal` actions. After `max_invalid_attempts`, if there is a
-/// limit, takes the default action. `on_invalid` receives each illegal action.
+/// Asks for the open decision of `seat` until the answer is one of the `legal` actions. After
+/// `max_invalid_attempts`, if there is a limit, takes the default action. `on_invalid` receives
+/// each illegal action.
 ///
 /// # Panics
 /// If no decision is open and the limit is reached.
@@ -100,7 +104,8 @@ pub fn ask(
     }
 }
 
-/// Whether an invalid attempt at this decision counts as a wrong action. Only attempts at turns are counted and rewarded.
+/// Whether an invalid attempt at this decision counts as a wrong action. Only attempts at turns are
+/// counted and rewarded.
 pub fn is_wrong_action(decision: Decision) -> bool {
     decision.kind == DecisionKind::Turn
 }

@@ -13,8 +13,8 @@ use chefshat_engine::{
 ///   decisions of a game apart. So in its own game it repeats itself from any point on, also after
 ///   the game has deviated and returned to a known situation.
 /// - Otherwise it repeats the most similar recorded decision of the same kind whose action is legal
-///   now, the earliest of equals, among the first [`MAX_MODELS`] decisions. Actions are translated by
-///   meaning, because their indices depend on the deck.
+///   now, the earliest of equals, among the first [`MAX_MODELS`] decisions. Actions are translated
+///   by meaning, because their indices depend on the deck.
 /// - If there is none, it takes the default decision.
 ///
 /// The difference of two decisions, from 0 (equal) to 14, is the weighted sum of the following,

@@ -27,7 +27,8 @@ use chefshat_server::convert::recorded_player;
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// The agent: random, random_unmasked, greedy, trained, or replay (imitates the player of a record).
+    /// The agent: random, random_unmasked, greedy, trained, or replay (imitates the player of a
+    /// record).
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]

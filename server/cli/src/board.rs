@@ -1,4 +1,5 @@
-//! A leaderboard as a table, as JSON and as CSV, for boards from a server and boards recomputed from records.
+//! A leaderboard as a table, as JSON and as CSV, for boards from a server and boards recomputed
+//! from records.
 
 use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1;

@@ -1,4 +1,5 @@
-//! `chefshat check-agent`: tests an agent and prints the result. The crate `chefshat-examiner` has the cases and judges them.
+//! `chefshat check-agent`: tests an agent and prints the result. The crate `chefshat-examiner` has
+//! the cases and judges them.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -20,7 +21,8 @@ const BY_HAND: Duration = Duration::from_secs(600);
 /// Exit code after Ctrl-C, as shells use it.
 const INTERRUPTED: u8 = 130;
 
-/// Test whether an agent, in any language, plays correctly, even when a move is rejected or the connection drops.
+/// Test whether an agent, in any language, plays correctly, even when a move is rejected or the
+/// connection drops.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat check-agent -- python agent.py --server {address} --code {code}\n  \
@@ -45,19 +47,22 @@ pub(super) struct CheckAgent {
     /// Seconds the agent has to start and take its seat. Default: 30, or 600 if a person starts it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     start: Option<f64>,
-    /// Address to listen on, for agents with a fixed server address. Default: a free port of 127.0.0.1 for each case.
+    /// Address to listen on, for agents with a fixed server address. Default: a free port of
+    /// 127.0.0.1 for each case.
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
     /// Directory for the agent's output, one file per case.
     #[arg(long, value_name = "FOLDER")]
     logs: Option<PathBuf>,
-    /// Shell command that starts the agent for a tournament. Without it the case many-seats is skipped.
+    /// Shell command that starts the agent for a tournament. Without it the case many-seats is
+    /// skipped.
     #[arg(long, value_name = "COMMAND LINE")]
     many: Option<String>,
     /// Print one JSON line per case, and a summary.
     #[arg(long)]
     json: bool,
-    /// Command that starts the agent. Without it, the address and join code of each case are printed.
+    /// Command that starts the agent. Without it, the address and join code of each case are
+    /// printed.
     #[arg(last = true, value_name = "COMMAND")]
     command: Vec<String>,
 }

@@ -1,5 +1,5 @@
-//! `chefshat compare A B`: compares two agents on duplicate deals, which `chefshat-simulation` plays. The output depends only on what is
-//! compared, not on time or the number of threads.
+//! `chefshat compare A B`: compares two agents on duplicate deals, which `chefshat-simulation`
+//! plays. The output depends only on what is compared, not on time or the number of threads.
 
 use std::io::Write as _;
 use std::num::NonZeroU32;

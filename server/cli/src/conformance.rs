@@ -1,4 +1,5 @@
-//! `chefshat conformance FILE`: checks the engine against test vectors. `chefshat-simulation` replays them.
+//! `chefshat conformance FILE`: checks the engine against test vectors. `chefshat-simulation`
+//! replays them.
 
 use std::fs::File;
 use std::io::{BufReader, Write};

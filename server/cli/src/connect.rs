@@ -1,4 +1,5 @@
-//! Connecting to a server: its address, waiting for a server that is starting or for a file with a join code.
+//! Connecting to a server: its address, waiting for a server that is starting or for a file with a
+//! join code.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -31,7 +31,8 @@ pub(super) struct RecordsArg {
     /// Records (GAME-ID.jsonl) or directories of them. Default: the records of the data directory.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
+    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's
+    /// data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
 }

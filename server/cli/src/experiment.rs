@@ -1,5 +1,5 @@
-//! `chefshat experiment`: the paper's Experiment 1, its table next to ours. `chefshat-simulation` plays the Shifts; the experiments with
-//! learning agents are in the Python package.
+//! `chefshat experiment`: the paper's Experiment 1, its table next to ours. `chefshat-simulation`
+//! plays the Shifts; the experiments with learning agents are in the Python package.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -55,8 +55,9 @@ impl ExperimentCommand {
     }
 }
 
-/// Experiment 1 of the paper: four random agents play with all mechanics, without jokers, without the exchange, and without special
-/// actions. Prints how often the starter wins the Shift and how many laps a Shift has.
+/// Experiment 1 of the paper: four random agents play with all mechanics, without jokers, without
+/// the exchange, and without special actions. Prints how often the starter wins the Shift and how
+/// many laps a Shift has.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 struct Mechanics {

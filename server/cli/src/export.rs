@@ -37,7 +37,8 @@ pub(super) struct Export {
     /// Replace an earlier dataset in that directory. A directory with other files is never changed.
     #[arg(long)]
     force: bool,
-    /// Layout: two tables over all games, or the columns of the package chefshatgym, one CSV file per game.
+    /// Layout: two tables over all games, or the columns of the package chefshatgym, one CSV file
+    /// per game.
     #[arg(long, value_enum, default_value_t)]
     layout: LayoutName,
     /// Formats of the tables, separated by commas. Default: parquet.

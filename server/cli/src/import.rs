@@ -1,5 +1,5 @@
-//! `chefshat import`: adds the record of another server, or the transcript of a game at a physical table, to the records of a data
-//! directory. `chefshat-record` reads and verifies them.
+//! `chefshat import`: adds the record of another server, or the transcript of a game at a physical
+//! table, to the records of a data directory. `chefshat-record` reads and verifies them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -35,10 +35,12 @@ pub(super) struct Import {
     /// A record (.jsonl) or a transcript (.csv).
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where to write the record: a file that ends in .jsonl, or a directory. Default: the records of the data directory.
+    /// Where to write the record: a file that ends in .jsonl, or a directory. Default: the records
+    /// of the data directory.
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Data directory to write to (records/GAME-ID.jsonl) if --out is not given. Default: chefshat in the user's data directory.
+    /// Data directory to write to (records/GAME-ID.jsonl) if --out is not given. Default: chefshat
+    /// in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Print one JSON object.

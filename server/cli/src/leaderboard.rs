@@ -1,4 +1,5 @@
-//! `chefshat leaderboard`: shows the ratings of a server's participants. docs/ratings.md explains them.
+//! `chefshat leaderboard`: shows the ratings of a server's participants. docs/ratings.md explains
+//! them.
 
 use std::io::Write as _;
 use std::process::ExitCode;

@@ -1,5 +1,5 @@
-//! Output for people: headings, lines and tables of at most 100 columns, and rule sets in words. The commands decide the content;
-//! `numbers` has numbers in words.
+//! Output for people: headings, lines and tables of at most 100 columns, and rule sets in words.
+//! The commands decide the content; `numbers` has numbers in words.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,8 @@ pub(super) fn line(text: &mut String, words: &str) {
     writeln!(text, "  {words}").expect("a String takes everything");
 }
 
-/// Adds an indented table. The columns in `words` are aligned left; the others hold numbers and are aligned right.
+/// Adds an indented table. The columns in `words` are aligned left; the others hold numbers and are
+/// aligned right.
 pub(super) fn table(
     text: &mut String,
     header: &[&str],

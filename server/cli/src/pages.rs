@@ -10,7 +10,8 @@ use super::{CommandError, say};
 /// Page size of the lists that `print` prints.
 pub(super) const PAGE: u32 = 100;
 
-/// Calls `each` with every item. `fetch` requests the page with a token and returns its items and the token of the next page.
+/// Calls `each` with every item. `fetch` requests the page with a token and returns its items and
+/// the token of the next page.
 pub(super) async fn for_each<T>(
     mut fetch: impl AsyncFnMut(String) -> Result<(Vec<T>, String), Error>,
     mut each: impl FnMut(T) -> Result<(), CommandError>,

@@ -18,20 +18,24 @@ pub(super) struct PolicyArgs {
     /// Milliseconds for each decision. Default: 10000, for people 60000.
     #[arg(long, value_name = "MS")]
     decision_time_ms: Option<u32>,
-    /// Time bank of each seat for the whole game, in milliseconds. Default: 60000, for people 300000.
+    /// Time bank of each seat for the whole game, in milliseconds. Default: 60000, for people
+    /// 300000.
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
-    /// Times for one kind of participant: milliseconds per decision and, after another colon, the time bank, for example human:60000
-    /// or robot:30000:120000. Repeatable. People have their default times unless --decision-time-ms or --bank-ms is given.
+    /// Times for one kind of participant: milliseconds per decision and, after another colon, the
+    /// time bank, for example human:60000 or robot:30000:120000. Repeatable. People have their
+    /// default times unless --decision-time-ms or --bank-ms is given.
     #[arg(long = "clock", value_name = "KIND:MS[:MS]", value_parser = clock)]
     clocks: Vec<v1::KindClock>,
-    /// Invalid attempts at one decision before the default action is taken, 0 for no limit. Default: 10.
+    /// Invalid attempts at one decision before the default action is taken, 0 for no limit.
+    /// Default: 10.
     #[arg(long, value_name = "N")]
     max_invalid_attempts: Option<u32>,
     /// Consecutive timeouts before a seat is substituted. Default: 3.
     #[arg(long, value_name = "N")]
     max_timeouts: Option<u32>,
-    /// Milliseconds that built-in agents wait before a decision. Default: 1000 if a person plays, else 0.
+    /// Milliseconds that built-in agents wait before a decision. Default: 1000 if a person plays,
+    /// else 0.
     #[arg(long, value_name = "MS")]
     pace_ms: Option<u32>,
     /// Reward scheme for the seats.

@@ -1,5 +1,5 @@
-//! `chefshat ratings`: recomputes the leaderboard from record files. `chefshat-record` decides which games count, `chefshat-tournament`
-//! updates the ratings.
+//! `chefshat ratings`: recomputes the leaderboard from record files. `chefshat-record` decides
+//! which games count, `chefshat-tournament` updates the ratings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;

@@ -1,5 +1,5 @@
-//! A built-in agent as a remote client: converts a decision request to the engine's observation, so that the agent decides as it would
-//! inside the server.
+//! A built-in agent as a remote client: converts a decision request to the engine's observation, so
+//! that the agent decides as it would inside the server.
 
 use std::time::Duration;
 
@@ -86,7 +86,8 @@ impl Agent for RemoteAgent {
     }
 }
 
-/// Derives a seed for one purpose from the user's number: SHA-256(purpose ‖ number, 8 bytes little-endian); random without a number.
+/// Derives a seed for one purpose from the user's number: SHA-256(purpose ‖ number, 8 bytes
+/// little-endian); random without a number.
 pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
     match number {
         Some(number) => Sha256::new()

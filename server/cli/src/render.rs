@@ -1,5 +1,5 @@
-//! `chefshat render`: draws a record as a picture or an animation. `chefshat-render` draws the frames; the module below writes them to
-//! a file.
+//! `chefshat render`: draws a record as a picture or an animation. `chefshat-render` draws the
+//! frames; the module below writes them to a file.
 
 mod reel;
 
@@ -52,7 +52,8 @@ pub(super) struct Render {
     /// What to draw.
     #[arg(long, value_enum, default_value_t = Drawn::Table)]
     figure: Drawn,
-    /// Picture: the open decision, or `end`. Default: the end of the game, or of the Shift given by --shift.
+    /// Picture: the open decision, or `end`. Default: the end of the game, or of the Shift given by
+    /// --shift.
     #[arg(long, value_name = "DECISION", value_parser = moment, conflicts_with_all = ["from", "to"])]
     at: Option<At>,
     /// Animation: first decision. Default: the first of the game.

@@ -1,4 +1,5 @@
-//! Flags for a rule set: a preset and one flag per field that overrides it. The engine validates the result.
+//! Flags for a rule set: a preset and one flag per field that overrides it. The engine validates
+//! the result.
 
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_proto::v1;
@@ -12,8 +13,9 @@ use super::CommandError;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Rules")]
 pub(super) struct RulesArgs {
-    /// Preset; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the Golden 11 opens.
-    /// rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens, the opener may pass and a pass binds for one turn.
+    /// Preset; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the
+    /// Golden 11 opens. rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens,
+    /// the opener may pass and a pass binds for one turn.
     #[arg(long, default_value = "paper", value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS))]
     preset: String,
     /// Seats, 2 to 6. Default: 4.

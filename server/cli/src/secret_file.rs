@@ -1,4 +1,5 @@
-//! Writes a secret to a file for another program: the join code of a room or tournament, or its owner token.
+//! Writes a secret to a file for another program: the join code of a room or tournament, or its
+//! owner token.
 
 use std::fs::File;
 use std::io::{self, Write as _};
@@ -16,7 +17,8 @@ pub(super) struct SecretFile<'a> {
 }
 
 impl<'a> SecretFile<'a> {
-    /// Opens a temporary file beside `file`. `flag` named it; `what` is the secret, as in "a join code".
+    /// Opens a temporary file beside `file`. `flag` named it; `what` is the secret, as in "a join
+    /// code".
     ///
     /// # Errors
     /// It cannot be written.

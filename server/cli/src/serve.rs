@@ -18,17 +18,19 @@ use chefshat_server::serve::Server;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_server::web;
 
-/// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the web page.
+/// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the
+/// web page.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
 )]
 pub(super) struct Serve {
-    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 selects a free port.
+    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 selects a
+    /// free port.
     #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
     listen: String,
-    /// Data directory: the database (games.sqlite3) and the records of finished games (records/GAME-ID.jsonl). Default:
-    /// chefshat in the user's data directory.
+    /// Data directory: the database (games.sqlite3) and the records of finished games
+    /// (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Keep games only in memory: no database, no records.
@@ -46,7 +48,8 @@ pub(super) struct Serve {
     /// Seconds that games in progress may continue after the server is asked to stop.
     #[arg(long, env = "CHEFSHAT_GRACE", default_value_t = 30)]
     grace: u64,
-    /// Web origin whose pages may call the server, such as https://example.org; * allows all. Repeatable.
+    /// Web origin whose pages may call the server, such as https://example.org; * allows all.
+    /// Repeatable.
     #[arg(
         long = "allow-origin",
         env = "CHEFSHAT_ALLOW_ORIGIN",
@@ -55,7 +58,8 @@ pub(super) struct Serve {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
-    /// Stop when standard input ends: for a program that starts its own server and may die at any time.
+    /// Stop when standard input ends: for a program that starts its own server and may die at any
+    /// time.
     #[arg(long)]
     until_stdin_closes: bool,
     /// Print the server's address as a JSON line on standard output.
@@ -146,7 +150,8 @@ impl Serve {
     }
 }
 
-/// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own at shutdown.
+/// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own
+/// at shutdown.
 fn end_of_input() -> oneshot::Receiver<()> {
     let (sender, closed) = oneshot::channel();
     std::thread::spawn(move || {
@@ -166,7 +171,8 @@ fn host_and_port(text: &str) -> Result<String, String> {
     }
 }
 
-/// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means none.
+/// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means
+/// none.
 fn origin(text: &str) -> Result<String, String> {
     if text.is_empty() || text == "*" {
         return Ok(text.to_owned());

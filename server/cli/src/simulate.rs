@@ -1,5 +1,5 @@
-//! `chefshat simulate`: plays a batch of games offline on all cores and prints statistics. `chefshat-simulation` plays, `report` prints,
-//! `records` writes records.
+//! `chefshat simulate`: plays a batch of games offline on all cores and prints statistics.
+//! `chefshat-simulation` plays, `report` prints, `records` writes records.
 
 mod records;
 mod report;

@@ -1,5 +1,6 @@
-//! `chefshat verify`: verifies records by replaying them and reports the first wrong line. `chefshat-record` checks a record; this module
-//! finds the files, checks them on all cores and prints the results.
+//! `chefshat verify`: verifies records by replaying them and reports the first wrong line.
+//! `chefshat-record` checks a record; this module finds the files, checks them on all cores and
+//! prints the results.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

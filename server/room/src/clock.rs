@@ -252,7 +252,8 @@ impl Core {
         self.advance(now);
     }
 
-    /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a substitute.
+    /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a
+    /// substitute.
     fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let seat = open.decision.seat;

@@ -80,7 +80,8 @@ pub struct Core {
     log: Log,
     /// Length of the log before the first deal.
     log_before_deal: usize,
-    /// Length of the log after the deal and after each decision. Empty unless spectators are delayed.
+    /// Length of the log after the deal and after each decision. Empty unless spectators are
+    /// delayed.
     log_after_decision: Vec<u32>,
     changes: u64,
     decisions: u64,

@@ -93,7 +93,8 @@ impl Policy {
         (self.clock_of(kind).and_then(|clock| clock.bank)).unwrap_or(self.bank)
     }
 
-    /// How long a built-in agent or substitute waits before it decides. `with_people`: whether people play.
+    /// How long a built-in agent or substitute waits before it decides. `with_people`: whether
+    /// people play.
     pub fn pace_of(&self, with_people: bool) -> Duration {
         let standard = match with_people {
             true => PACE_WITH_PEOPLE,

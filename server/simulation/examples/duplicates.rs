@@ -1,5 +1,5 @@
-//! How many fewer games tell two agents apart when both are dealt the same cards? docs/ratings.md shows the result; the Python package
-//! draws its figure from the JSON form.
+//! How many fewer games tell two agents apart when both are dealt the same cards? docs/ratings.md
+//! shows the result; the Python package draws its figure from the JSON form.
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
@@ -9,11 +9,14 @@ use serde_json::{Value, json};
 
 /// Measure how many fewer games tell two agents apart when both are dealt the same cards.
 ///
-/// Each of the two sits in the same seats among three greedy agents, like participants of a tournament who never meet. A game is worth 5,
-/// 3, 1, 0 points by place. The standard error of the difference is measured twice: on the same deals, and on independent deals.
-/// `trained, slips` is `trained` with a random legal action at one decision of twenty: a different agent, but a similar one.
+/// Each of the two sits in the same seats among three greedy agents, like participants of a
+/// tournament who never meet. A game is worth 5, 3, 1, 0 points by place. The standard error of the
+/// difference is measured twice: on the same deals, and on independent deals. `trained, slips` is
+/// `trained` with a random legal action at one decision of twenty: a different agent, but a similar
+/// one.
 ///
-/// The same seed gives the same output on any number of threads (set RAYON_NUM_THREADS to limit them).
+/// The same seed gives the same output on any number of threads (set RAYON_NUM_THREADS to limit
+/// them).
 #[derive(Debug, Parser)]
 #[command(
     after_help = "Example:\n  cargo run --release -p chefshat-simulation --example duplicates -- --json > duplicates.json"

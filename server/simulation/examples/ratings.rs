@@ -1,5 +1,5 @@
-//! Do ratings claim what is true? Rates fields of made-up participants with known skills and counts how often the stated uncertainty
-//! covers them. docs/ratings.md shows the result.
+//! Do ratings claim what is true? Rates fields of made-up participants with known skills and counts
+//! how often the stated uncertainty covers them. docs/ratings.md shows the result.
 
 use chefshat_simulation::calibration::{Calibration, Fields, calibration};
 use chefshat_tournament::ratings::after_game;
@@ -8,11 +8,14 @@ use serde_json::{Value, json};
 
 /// Rate fields of known skills and count how often the stated uncertainty covers them.
 ///
-/// In each round everyone plays one game, at tables drawn again. Skills are normally distributed with the spread of the row; a lead of 5.9
-/// wins 73 % of two-player games. Covered: how often a skill lies within 1.96 deviations of the rating's mean, relative to the field, and
-/// the difference of two skills within 1.96 deviations of theirs. Calibrated ratings reach 95 % or slightly more.
+/// In each round everyone plays one game, at tables drawn again. Skills are normally distributed
+/// with the spread of the row; a lead of 5.9 wins 73 % of two-player games. Covered: how often a
+/// skill lies within 1.96 deviations of the rating's mean, relative to the field, and the
+/// difference of two skills within 1.96 deviations of theirs. Calibrated ratings reach 95 % or
+/// slightly more.
 ///
-/// The same seed gives the same output on any number of threads (set RAYON_NUM_THREADS to limit them).
+/// The same seed gives the same output on any number of threads (set RAYON_NUM_THREADS to limit
+/// them).
 #[derive(Debug, Parser)]
 #[command(
     after_help = "Example:\n  cargo run --release -p chefshat-simulation --example ratings -- --players 6"
@@ -34,7 +37,8 @@ struct Arguments {
 
 /// Sizes of the fields.
 const SIZES: [usize; 3] = [8, 16, 40];
-/// Spreads of their skills: from one at which the best of sixteen wins 64 % of two-player games against the middle to one of 93 %.
+/// Spreads of their skills: from one at which the best of sixteen wins 64 % of two-player games
+/// against the middle to one of 93 %.
 const SPREADS: [f64; 3] = [2.0, 4.0, 8.0];
 /// Games of each participant after which the ratings are measured.
 const ROUNDS: [u32; 4] = [10, 50, 200, 1000];

@@ -1,4 +1,5 @@
-//! Ratings as messages. `chefshat-tournament` computes them; `chefshat-record` says which games count.
+//! Ratings as messages. `chefshat-tournament` computes them; `chefshat-record` says which games
+//! count.
 
 use chefshat_proto::v1;
 use chefshat_record::outcome::Identity;

@@ -96,8 +96,8 @@ impl Handle {
             .await;
     }
 
-    /// Handles an answer in the calling task if the room is resting; the result is sent on the stream
-    /// of its seat. Otherwise returns the answer.
+    /// Handles an answer in the calling task if the room is resting; the result is sent on the
+    /// stream of its seat. Otherwise returns the answer.
     pub fn answer_in_place(
         &self,
         seat: Seat,
@@ -114,8 +114,8 @@ impl Handle {
         Ok(())
     }
 
-    /// Sends an answer to the mailbox; the result is sent on the stream of its seat. Returns the answer
-    /// if the mailbox is full or the room is gone.
+    /// Sends an answer to the mailbox; the result is sent on the stream of its seat. Returns the
+    /// answer if the mailbox is full or the room is gone.
     pub fn send_answer(
         &self,
         seat: Seat,

@@ -155,8 +155,8 @@ impl std::fmt::Debug for dyn Store {
 
 /// The journal of a running game.
 pub trait Journal: Send + 'static {
-    /// Commits entries and leaves `entries` empty, if this takes no time. Otherwise returns `false` and
-    /// changes nothing.
+    /// Commits entries and leaves `entries` empty, if this takes no time. Otherwise returns `false`
+    /// and changes nothing.
     fn append_now(&mut self, _entries: &mut Vec<Entry>) -> bool {
         false
     }

@@ -244,7 +244,8 @@ struct Reservation {
 }
 
 impl Reservation {
-    /// Reserves space for the tournament of this owner token; `None` if it is being created or has just been.
+    /// Reserves space for the tournament of this owner token; `None` if it is being created or has
+    /// just been.
     fn of(tournaments: &Arc<Tournaments>, owner: Token) -> Result<Option<Self>, CreateProblem> {
         let mut table = tournaments.lock();
         if table.is_in_creation(owner.room) || table.get(owner.room).is_some() {

@@ -26,7 +26,8 @@ const MESSAGES_AT_A_TIME: usize = 64;
 /// Stops the tournaments of a server.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stop {
-    /// Cancelled when no more games are called or counted. Participants are still seated in running games.
+    /// Cancelled when no more games are called or counted. Participants are still seated in running
+    /// games.
     pub(super) no_more_games: CancellationToken,
     /// Cancelled when the tasks of tournaments end.
     pub(super) end: CancellationToken,

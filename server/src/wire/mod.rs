@@ -50,8 +50,8 @@ const UPDATE_RESULT: u32 = 5;
 /// Field of the events in an `EventBatch`.
 const BATCH_EVENTS: u32 = 1;
 
-/// A codec with small buffers, for streams of small messages. Successive messages fill a buffer from
-/// end to end: with many streams, the default of 8 KiB each does not fit the caches.
+/// A codec with small buffers, for streams of small messages. Successive messages fill a buffer
+/// from end to end: with many streams, the default of 8 KiB each does not fit the caches.
 #[derive(Debug)]
 pub struct SmallBuffers<T, U>(PhantomData<(T, U)>);
 
@@ -292,7 +292,8 @@ impl Events {
     }
 }
 
-/// Encodes one event into a batch. Plays and passes, by far the most frequent, are written directly.
+/// Encodes one event into a batch. Plays and passes, by far the most frequent, are written
+/// directly.
 pub fn put_event(batch: &mut Vec<u8>, event: &v1::GameEvent) {
     let common = |out: &mut Vec<u8>| {
         put_number(out, 1, event.sequence);

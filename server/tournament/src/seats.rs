@@ -1,5 +1,6 @@
-//! Which seats the participants of a table take, so that everyone has each seat about equally often. Formats that pair round by round
-//! balance each round against the earlier ones; a round robin balances all rounds at once.
+//! Which seats the participants of a table take, so that everyone has each seat about equally
+//! often. Formats that pair round by round balance each round against the earlier ones; a round
+//! robin balances all rounds at once.
 
 use super::chance::Chance;
 use super::state::TournamentState;
@@ -36,12 +37,15 @@ fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |a| (a + 1..n).map(move |b| (a, b)))
 }
 
-/// Orders the participants of all tables so that everyone has each seat equally often, or once more than another.
+/// Orders the participants of all tables so that everyone has each seat equally often, or once more
+/// than another.
 ///
-/// Take two seats. Each table is an edge between the participants who have them. Edges can be directed so that at every participant as
-/// many go out as come in, except for one where their number is odd: walk along edges until none is left, directing each the way of the
-/// walk, starting at participants with an odd number. This balances the two seats and leaves the others unchanged. Repeated for every
-/// two seats that differ by more than one it terminates, because the sum of the squares falls each time.
+/// Take two seats. Each table is an edge between the participants who have them. Edges can be
+/// directed so that at every participant as many go out as come in, except for one where their
+/// number is odd: walk along edges until none is left, directing each the way of the walk, starting
+/// at participants with an odd number. This balances the two seats and leaves the others unchanged.
+/// Repeated for every two seats that differ by more than one it terminates, because the sum of the
+/// squares falls each time.
 pub(super) fn spread_plan(mut tables: Vec<&mut Vec<usize>>, participants: usize, seats: usize) {
     loop {
         let mut is_even = true;

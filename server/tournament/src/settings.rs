@@ -1,4 +1,5 @@
-//! Settings of a tournament and their validation. Rules and clocks of its games, admission and ownership belong to the server.
+//! Settings of a tournament and their validation. Rules and clocks of its games, admission and
+//! ownership belong to the server.
 
 use thiserror::Error;
 

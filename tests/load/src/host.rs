@@ -1,4 +1,5 @@
-//! Creates rooms, joins their seats and attaches them to the streams. Follows each game that ends with the next one.
+//! Creates rooms, joins their seats and attaches them to the streams. Follows each game that ends
+//! with the next one.
 
 use std::sync::Arc;
 
@@ -86,7 +87,8 @@ impl Host {
         }
     }
 
-    /// Hosts until the segment stops and all games have ended. Returns the number of games, and the senders.
+    /// Hosts until the segment stops and all games have ended. Returns the number of games, and the
+    /// senders.
     pub(crate) async fn run(
         mut self,
         pulse: Arc<Pulse>,

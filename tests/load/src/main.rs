@@ -72,7 +72,8 @@ async fn measure(load: &Load) -> Result<(), LoadError> {
     Ok(())
 }
 
-/// The runtime of one side. With `--pin`, binds the process to its core before the first thread starts.
+/// The runtime of one side. With `--pin`, binds the process to its core before the first thread
+/// starts.
 fn runtime(place: Place, core: usize) -> Result<Runtime, LoadError> {
     let mut builder = if place.pin {
         gauge::bind_to_core(core).map_err(LoadError::io("binding to a core"))?;

@@ -67,7 +67,8 @@ pub(crate) struct Pulse {
     decisions: AtomicU64,
     open: AtomicBool,
     stopping: AtomicBool,
-    /// When each room's last answer was sent, nanoseconds after the epoch; 0: none since its game began.
+    /// When each room's last answer was sent, nanoseconds after the epoch; 0: none since its game
+    /// began.
     answered_ns: Vec<AtomicU64>,
 }
 

@@ -1,5 +1,6 @@
-//! Output: the figures of the outcomes as JSON and as tables. A scenario's figures are medians of its rounds; its ratios are medians of
-//! each round's ratio. `restart` and `vector` print their own.
+//! Output: the figures of the outcomes as JSON and as tables. A scenario's figures are medians of
+//! its rounds; its ratios are medians of each round's ratio. `restart` and `vector` print their
+//! own.
 
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
@@ -46,7 +47,8 @@ struct Figures {
     connections: usize,
     rounds: usize,
     server: Side,
-    /// Measured by the server: from handing a request to the transport until the answer has been read.
+    /// Measured by the server: from handing a request to the transport until the answer has been
+    /// read.
     decision_time_us: Quantiles,
     /// What the server is compared with.
     beside: &'static str,

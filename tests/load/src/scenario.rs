@@ -1,5 +1,5 @@
-//! Scenarios: rooms on streams, and the order of measurements. The sides of a comparison take turns within a round, each in a fresh
-//! process, so that a disturbance of the machine hits both.
+//! Scenarios: rooms on streams, and the order of measurements. The sides of a comparison take turns
+//! within a round, each in a fresh process, so that a disturbance of the machine hits both.
 
 use std::time::Duration;
 

@@ -1,5 +1,6 @@
-//! The measured servers: child processes that run this program, or another build of it, so that the CPU time and memory of both sides are
-//! counted separately. A child prints its address on standard output and ends when its standard input closes, so it never outlives the run.
+//! The measured servers: child processes that run this program, or another build of it, so that the
+//! CPU time and memory of both sides are counted separately. A child prints its address on standard
+//! output and ends when its standard input closes, so it never outlives the run.
 
 use std::io::Write as _;
 use std::net::SocketAddr;

@@ -1,4 +1,5 @@
-//! What happened in a segment, counted independently in several ways and compared; and the sizes of its messages.
+//! What happened in a segment, counted independently in several ways and compared; and the sizes of
+//! its messages.
 
 use serde::Serialize;
 

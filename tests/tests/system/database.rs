@@ -1,4 +1,5 @@
-//! A database written by an earlier version: it opens, what is unfinished resumes, and all records are as that version wrote them.
+//! A database written by an earlier version: it opens, what is unfinished resumes, and all records
+//! are as that version wrote them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

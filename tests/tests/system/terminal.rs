@@ -1,5 +1,5 @@
-//! `chefshat play` and `chefshat watch` in a real terminal (see `tmux`). The tests beside their code
-//! check the screens in detail.
+//! `chefshat play` and `chefshat watch` in a real terminal (see `tmux`). The tests beside their
+//! code check the screens in detail.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,4 +1,5 @@
-//! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, and builds the page.
+//! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, and builds the
+//! page.
 //!
 //! The command line is here; [`lint`], [`test`] and [`web`] are the tasks, [`setup`] prepares them.
 //! It depends on no crate of the project: it only starts other programs, and builds even if they do

@@ -1,5 +1,5 @@
-//! `cargo xtask test`: the tests of every language, with the paths of the others. The system tests, in
-//! Rust, start agents in Python and JavaScript; the tests of those start the server.
+//! `cargo xtask test`: the tests of every language, with the paths of the others. The system tests,
+//! in Rust, start agents in Python and JavaScript; the tests of those start the server.
 
 use std::process::Command;
 

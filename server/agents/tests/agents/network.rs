@@ -254,7 +254,8 @@ struct Fit {
     fits: bool,
 }
 
-/// Jokers matter only through the number of cards dealt: nothing else in the features depends on them.
+/// Jokers matter only through the number of cards dealt: nothing else in the features depends on
+/// them.
 #[test]
 fn a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() {
     let rows = std::fs::read_to_string(fixture("fits.json")).unwrap();

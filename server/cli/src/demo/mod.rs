@@ -1,5 +1,6 @@
-//! `chefshat demo`: runs a server, agents that connect to it, and a spectator that narrates the game; at the end prints the standings,
-//! whether the deals are verified, and where the record is. The game goes through the protocol like any other.
+//! `chefshat demo`: runs a server, agents that connect to it, and a spectator that narrates the
+//! game; at the end prints the standings, whether the deals are verified, and where the record is.
+//! The game goes through the protocol like any other.
 
 mod table;
 mod verify;
@@ -38,13 +39,15 @@ pub(super) struct Demo {
     /// Seed of the deals and the agents' choices, for a repeatable game.
     #[arg(long)]
     seed: Option<u64>,
-    /// The agents, seat by seat: random, random_unmasked, greedy, trained. Default: greedy and random in turn.
+    /// The agents, seat by seat: random, random_unmasked, greedy, trained. Default: greedy and
+    /// random in turn.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind)]
     agents: Vec<AgentKind>,
     /// Milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
     pace_ms: u64,
-    /// Data directory for the record (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
+    /// Data directory for the record (records/GAME-ID.jsonl). Default: chefshat in the user's data
+    /// directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Print JSON lines: the server's address, every event, the result.

@@ -1,5 +1,6 @@
-//! Verifies the deals of a finished game: the revealed seed matches the commitment made before the game (or the requested seed), it
-//! contains the agents' entropy, and each recorded hand follows from it.
+//! Verifies the deals of a finished game: the revealed seed matches the commitment made before the
+//! game (or the requested seed), it contains the agents' entropy, and each recorded hand follows
+//! from it.
 
 use chefshat_client::{Outcome, v1};
 use chefshat_engine::{Deal, RuleSet, Seed};

@@ -1,5 +1,5 @@
-//! The line of a pizza, which grows as the pizza is made: plays in order, then the cards left in each hand. Passes are shown only before a
-//! later play: at the end of a pizza everyone has passed.
+//! The line of a pizza, which grows as the pizza is made: plays in order, then the cards left in
+//! each hand. Passes are shown only before a later play: at the end of a pizza everyone has passed.
 
 use chefshat_client::v1;
 

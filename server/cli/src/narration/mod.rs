@@ -1,6 +1,8 @@
-//! A game in words. `view` reduces the events to a state, `story` turns each into sentences; both the terminal client and this narrator
-//! draw from them. The narrator writes text in the order of the events and without looking ahead, so that a game can be followed live: a
-//! heading for a Shift, a growing line for a pizza. The text always has colours; the caller prints it and may strip them.
+//! A game in words. `view` reduces the events to a state, `story` turns each into sentences; both
+//! the terminal client and this narrator draw from them. The narrator writes text in the order of
+//! the events and without looking ahead, so that a game can be followed live: a heading for a
+//! Shift, a growing line for a pizza. The text always has colours; the caller prints it and may
+//! strip them.
 
 mod chain;
 pub(crate) mod hand;

@@ -1,4 +1,5 @@
-//! The tables of a game: places and points of a Shift with bars of the totals, and the final standings.
+//! The tables of a game: places and points of a Shift with bars of the totals, and the final
+//! standings.
 
 use chefshat_client::v1;
 use chefshat_engine::Stop;

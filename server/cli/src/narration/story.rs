@@ -1,5 +1,5 @@
-//! The sentences of a game: each event as lines for a narrow column. A line keeps the seat it begins with, so that its name can be
-//! coloured.
+//! The sentences of a game: each event as lines for a narrow column. A line keeps the seat it
+//! begins with, so that its name can be coloured.
 
 use chefshat_client::v1::{self, game_event::Kind};
 

@@ -1,4 +1,5 @@
-//! A scripted game with its exact text, and generated games of every size that keep within the page width.
+//! A scripted game with its exact text, and generated games of every size that keep within the page
+//! width.
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_client::v1::{self, game_event::Kind};

@@ -1,5 +1,5 @@
-//! The state of a game as a viewer knows it from its events: seats, board, hands, turn. The narrator and the terminal client are drawn from
-//! it. Nothing here draws or decides.
+//! The state of a game as a viewer knows it from its events: seats, board, hands, turn. The
+//! narrator and the terminal client are drawn from it. Nothing here draws or decides.
 
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{PassScope, RuleSet};
@@ -306,8 +306,8 @@ impl GameView {
         self.turn = self.next_after(play.seat);
     }
 
-    /// Whether a play that comes next contains the Golden card: it opens a Shift if the rules say so; otherwise it is the last of its face to
-    /// be played, which only a known hand shows.
+    /// Whether a play that comes next contains the Golden card: it opens a Shift if the rules say
+    /// so; otherwise it is the last of its face to be played, which only a known hand shows.
     pub(super) fn plays_golden(&self, play: &v1::Play) -> bool {
         if play.face != self.faces() {
             return false;

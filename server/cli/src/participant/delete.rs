@@ -1,4 +1,5 @@
-//! `chefshat participant delete`: changes the database first, then the record files. Running it again completes an interrupted run.
+//! `chefshat participant delete`: changes the database first, then the record files. Running it
+//! again completes an interrupted run.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! `chefshat participant export`: writes a participant's data as JSON Lines, without what others did in the same games.
+//! `chefshat participant export`: writes a participant's data as JSON Lines, without what others
+//! did in the same games.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! `chefshat participant`: exports or deletes a participant's data in a data directory. The server must be stopped. `chefshat-record`
-//! changes the records, [`chefshat_server::store`] the database.
+//! `chefshat participant`: exports or deletes a participant's data in a data directory. The server
+//! must be stopped. `chefshat-record` changes the records, [`chefshat_server::store`] the database.
 
 mod delete;
 mod export;

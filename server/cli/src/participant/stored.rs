@@ -1,4 +1,5 @@
-//! Where a participant's data may be stored: the data directory, and the record files in which the name may occur.
+//! Where a participant's data may be stored: the data directory, and the record files in which the
+//! name may occur.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +17,8 @@ pub(super) struct Who {
     /// The exact name the participant played under.
     #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
     pub(super) name: String,
-    /// Data directory of the server, which must be stopped. Default: chefshat in the user's data directory.
+    /// Data directory of the server, which must be stopped. Default: chefshat in the user's data
+    /// directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
 }
@@ -48,7 +50,8 @@ pub(super) struct Candidate {
 #[derive(Default)]
 pub(super) struct Skipped(Vec<String>);
 
-/// The records in which a name may occur, by a search of their bytes: parsing each record would take long.
+/// The records in which a name may occur, by a search of their bytes: parsing each record would
+/// take long.
 pub(super) fn records_with(data_dir: &Path, name: &str) -> Result<Vec<Candidate>, CommandError> {
     let folder = data_dir.join("records");
     if !folder.is_dir() {

@@ -1,5 +1,5 @@
-//! `chefshat records`: lists, downloads and imports records of a server. `chefshat verify` checks a downloaded record; a server verifies an
-//! imported one.
+//! `chefshat records`: lists, downloads and imports records of a server. `chefshat verify` checks a
+//! downloaded record; a server verifies an imported one.
 
 mod filter;
 mod list;

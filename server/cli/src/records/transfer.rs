@@ -1,4 +1,5 @@
-//! `chefshat records get`, `stream` and `import`: transfers records between a server and files, which are written atomically.
+//! `chefshat records get`, `stream` and `import`: transfers records between a server and files,
+//! which are written atomically.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -50,13 +51,14 @@ pub(super) struct Stream {
     server: ServerArg,
     #[command(flatten)]
     filter: FilterArgs,
-    /// Directory to write to, one file GAME-ID.jsonl per record. Default: standard output, one record after the other.
+    /// Directory to write to, one file GAME-ID.jsonl per record. Default: standard output, one
+    /// record after the other.
     #[arg(long, value_name = "FOLDER")]
     out_dir: Option<PathBuf>,
 }
 
-/// Import records of games played elsewhere: on another server or at a physical table. The server verifies them first and must have been
-/// started with --allow-import.
+/// Import records of games played elsewhere: on another server or at a physical table. The server
+/// verifies them first and must have been started with --allow-import.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  chefshat records import ./game.jsonl ./games/*.jsonl")]
 pub(super) struct Import {

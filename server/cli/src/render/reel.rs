@@ -1,4 +1,5 @@
-//! Writes frames as an animation: painted on all cores, encoded in order as an animated GIF or, by ffmpeg, as an MP4.
+//! Writes frames as an animation: painted on all cores, encoded in order as an animated GIF or, by
+//! ffmpeg, as an MP4.
 
 use std::io::{self, Read as _, Write};
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! `chefshat room create`: creates a room and prints its secrets. `start` has the flags for the beginning of its game.
+//! `chefshat room create`: creates a room and prints its secrets. `start` has the flags for the
+//! beginning of its game.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,8 +32,9 @@ pub(super) struct Create {
     name: String,
     #[command(flatten)]
     server: ServerArg,
-    /// How to fill the next seat: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (imitates the player
-    /// who had that seat in a recorded game), each optionally with =NAME for another name; or open, agent, human or robot (who may join).
+    /// How to fill the next seat: random, random_unmasked, greedy or trained (played by the
+    /// server), replay:GAME-ID:SEAT (imitates the player who had that seat in a recorded game),
+    /// each optionally with =NAME for another name; or open, agent, human or robot (who may join).
     /// Repeatable; seats not listed are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
     seats: Vec<v1::SeatConfig>,

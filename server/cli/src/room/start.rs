@@ -13,14 +13,17 @@ use super::super::CommandError;
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Beginning")]
 pub(super) struct StartArgs {
-    /// Continue a recorded game of the server after this many of its decisions, with its rules; 0 keeps only its first deal.
+    /// Continue a recorded game of the server after this many of its decisions, with its rules; 0
+    /// keeps only its first deal.
     #[arg(long, value_name = "GAME-ID@DECISIONS", value_parser = branch_point, conflicts_with = "hands")]
     branch: Option<v1::BranchPoint>,
-    /// With --branch: deal later Shifts as in the recorded game. Anyone who knows its record then knows hidden cards.
+    /// With --branch: deal later Shifts as in the recorded game. Anyone who knows its record then
+    /// knows hidden cards.
     #[arg(long, requires = "branch")]
     same_deals: bool,
-    /// Start with the hands in this file: a ScriptedShift in canonical JSON, for example {"hands": [{"seat": 0, "cards": [1, 4, 12],
-    /// "golden": true}, ...]} with every seat's cards (a joker is the number of faces plus 1).
+    /// Start with the hands in this file: a ScriptedShift in canonical JSON, for example {"hands":
+    /// [{"seat": 0, "cards": [1, 4, 12], "golden": true}, ...]} with every seat's cards (a joker is
+    /// the number of faces plus 1).
     #[arg(long, value_name = "FILE")]
     hands: Option<PathBuf>,
 }

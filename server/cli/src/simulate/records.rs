@@ -1,5 +1,5 @@
-//! Records of simulated games: replays each game of a batch, notes its decisions and writes its record. `chefshat-record` decides the
-//! form.
+//! Records of simulated games: replays each game of a batch, notes its decisions and writes its
+//! record. `chefshat-record` decides the form.
 
 use std::path::Path;
 

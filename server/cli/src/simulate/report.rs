@@ -1,4 +1,5 @@
-//! The result of `chefshat simulate` as text and as JSON. Both depend only on the batch, not on time or the number of threads.
+//! The result of `chefshat simulate` as text and as JSON. Both depend only on the batch, not on
+//! time or the number of threads.
 
 use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable, RulesForm};

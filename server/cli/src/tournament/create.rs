@@ -36,17 +36,20 @@ pub(super) struct Create {
     format: FormatArg,
     #[command(flatten)]
     server: ServerArg,
-    /// Built-in participants: random, random_unmasked, greedy or trained, or several as in greedy*4, separated by commas, for example
-    /// greedy*4,trained. Repeatable.
+    /// Built-in participants: random, random_unmasked, greedy or trained, or several as in
+    /// greedy*4, separated by commas, for example greedy*4,trained. Repeatable.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in)]
     built_in: Vec<BuiltIn>,
-    /// Start when this many have joined, built-in agents included. Default: `chefshat tournament start` starts it.
+    /// Start when this many have joined, built-in agents included. Default: `chefshat tournament
+    /// start` starts it.
     #[arg(long, value_name = "N")]
     start_when: Option<u32>,
-    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to find a winner.
+    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to
+    /// find a winner.
     #[arg(long, value_name = "N")]
     rounds: Option<u32>,
-    /// Games of each table of a round, with seats rotated between games; with rotated deals: deals. Default: 1.
+    /// Games of each table of a round, with seats rotated between games; with rotated deals: deals.
+    /// Default: 1.
     #[arg(long, value_name = "N")]
     games_per_pairing: Option<u32>,
     /// How games are dealt.
@@ -71,10 +74,12 @@ pub(super) struct Create {
     /// on it.
     #[arg(long, value_name = "HEX", value_parser = seed)]
     draw_seed: Option<[u8; 32]>,
-    /// Seed of all deals, 64 hexadecimal digits, for experiments: anyone who knows it knows the cards, and games are not rated.
+    /// Seed of all deals, 64 hexadecimal digits, for experiments: anyone who knows it knows the
+    /// cards, and games are not rated.
     #[arg(long, value_name = "HEX", value_parser = seed)]
     deal_seed: Option<[u8; 32]>,
-    /// Built-in agent that fills up a knockout and plays for participants who forfeit. Default: random.
+    /// Built-in agent that fills up a knockout and plays for participants who forfeit. Default:
+    /// random.
     #[arg(long, value_name = "AGENT", value_parser = agent_name)]
     filler: Option<String>,
     /// Write the join code to this file, readable only by its owner; waits for the server to start.

@@ -1,4 +1,5 @@
-//! The results of a tournament as CSV: complete standings, and the columns of the reference implementation.
+//! The results of a tournament as CSV: complete standings, and the columns of the reference
+//! implementation.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +12,8 @@ use super::super::CommandError;
 use super::tables::Field;
 use crate::kind::kind_name;
 
-/// Header of FinalResultsComp.csv in the reference implementation (chefshatgym 2.4.0.4, `ChefsHatRoomTournament`).
+/// Header of FinalResultsComp.csv in the reference implementation (chefshatgym 2.4.0.4,
+/// `ChefsHatRoomTournament`).
 const FINAL_RESULTS: [&str; 4] = [
     "Position",
     "Player Name",

@@ -1,5 +1,5 @@
-//! `chefshat tournament follow`: shows how a tournament stands, after each change, until it is over: a bar and a table on a terminal,
-//! otherwise one line per change.
+//! `chefshat tournament follow`: shows how a tournament stands, after each change, until it is
+//! over: a bar and a table on a terminal, otherwise one line per change.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;

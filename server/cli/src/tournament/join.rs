@@ -1,4 +1,5 @@
-//! `chefshat tournament join`: takes part with a built-in agent, through the Rust SDK, until the tournament is over.
+//! `chefshat tournament join`: takes part with a built-in agent, through the Rust SDK, until the
+//! tournament is over.
 
 use std::process::ExitCode;
 use std::time::Duration;

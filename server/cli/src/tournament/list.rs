@@ -1,4 +1,5 @@
-//! `chefshat tournament list` and `chefshat tournament games`: list tournaments and games, one per line.
+//! `chefshat tournament list` and `chefshat tournament games`: list tournaments and games, one per
+//! line.
 
 use std::process::ExitCode;
 

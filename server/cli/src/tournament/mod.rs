@@ -1,5 +1,6 @@
-//! `chefshat tournament`: creates, joins, starts, follows and closes tournaments of a server, and shows results. Pairings and standings are
-//! those of `chefshat_tournament`, computed by the server.
+//! `chefshat tournament`: creates, joins, starts, follows and closes tournaments of a server, and
+//! shows results. Pairings and standings are those of `chefshat_tournament`, computed by the
+//! server.
 
 mod create;
 mod files;

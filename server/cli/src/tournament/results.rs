@@ -1,4 +1,5 @@
-//! `chefshat tournament results`: the standings, their confidence and statistics of play, as text, JSON or files.
+//! `chefshat tournament results`: the standings, their confidence and statistics of play, as text,
+//! JSON or files.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -17,7 +18,8 @@ use super::tables::{self, Field, NO_GAME_COUNTED};
 use super::words::{format_name, is_over, state};
 use crate::narration::clean;
 
-/// Show the standings of a tournament, their confidence, and statistics of play; final once it is over.
+/// Show the standings of a tournament, their confidence, and statistics of play; final once it is
+/// over.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament results 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n  \
@@ -36,7 +38,8 @@ pub(super) struct Results {
     /// Write complete standings to this CSV file, one line per participant.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the columns of the reference implementation's FinalResultsComp.csv to this file. The score is that of the last game played.
+    /// Write the columns of the reference implementation's FinalResultsComp.csv to this file. The
+    /// score is that of the last game played.
     #[arg(long, value_name = "FILE")]
     final_results: Option<PathBuf>,
 }

@@ -1,4 +1,5 @@
-//! `chefshat tournament simulate`: plays a tournament of built-in agents offline on all cores, with the pairings and standings of a server.
+//! `chefshat tournament simulate`: plays a tournament of built-in agents offline on all cores, with
+//! the pairings and standings of a server.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -31,7 +32,8 @@ use chefshat_server::convert;
 /// Maximum number of games at a time, which are played in parallel.
 const MAX_PARALLEL: usize = 256;
 
-/// Play a tournament of built-in agents offline on all cores; print the standings and their confidence.
+/// Play a tournament of built-in agents offline on all cores; print the standings and their
+/// confidence.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament simulate --format round_robin --agents greedy*4,trained*4,random*4 --games-per-pairing 100\n  \
@@ -43,14 +45,15 @@ pub(super) struct Simulate {
     /// Format of the tournament.
     #[arg(long, value_enum)]
     format: FormatArg,
-    /// Participants: random, random_unmasked, greedy or trained, or several as in greedy*4, separated by commas, for example
-    /// greedy*4,trained.
+    /// Participants: random, random_unmasked, greedy or trained, or several as in greedy*4,
+    /// separated by commas, for example greedy*4,trained.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in, required = true)]
     agents: Vec<BuiltIn>,
     /// Number of participants, 2 to 1024: the list of agents is repeated. Default: each once.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=MAX_PARTICIPANTS as i64))]
     participants: Option<u32>,
-    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to find a winner.
+    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to
+    /// find a winner.
     #[arg(long, value_name = "N")]
     rounds: Option<u32>,
     /// Games of each table of a round, with seats rotated between games; with rotated deals: deals.

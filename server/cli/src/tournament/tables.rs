@@ -1,4 +1,5 @@
-//! Tables of a tournament for people: standings, confidence, statistics of play. Each is at most 100 columns wide.
+//! Tables of a tournament for people: standings, confidence, statistics of play. Each is at most
+//! 100 columns wide.
 
 use chefshat_client::v1;
 

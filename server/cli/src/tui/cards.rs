@@ -1,4 +1,5 @@
-//! Cards as text: the stacks of a hand side by side, a play as a fan. The caller says which of them may be played.
+//! Cards as text: the stacks of a hand side by side, a play as a fan. The caller says which of them
+//! may be played.
 
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};

@@ -1,4 +1,5 @@
-//! The log: what happened, in sentences. The newest lines are drawn beside the seats; scrolled back, earlier ones replace seats and pizza.
+//! The log: what happened, in sentences. The newest lines are drawn beside the seats; scrolled
+//! back, earlier ones replace seats and pizza.
 
 use std::collections::VecDeque;
 
@@ -29,7 +30,8 @@ pub(crate) struct Log {
     lines: VecDeque<story::Line>,
     /// Number of lines so far, with those no longer in `lines`.
     count: usize,
-    /// Number of the line after the last shown one, of all lines so far; none while the newest are shown beside the seats.
+    /// Number of the line after the last shown one, of all lines so far; none while the newest are
+    /// shown beside the seats.
     end: Option<usize>,
 }
 
@@ -54,7 +56,8 @@ impl Log {
         self.end.is_some()
     }
 
-    /// Handles a key; false if it is not for the log. `PgUp` always is, all others only while earlier lines are shown.
+    /// Handles a key; false if it is not for the log. `PgUp` always is, all others only while
+    /// earlier lines are shown.
     pub(crate) fn key(&mut self, code: KeyCode) -> bool {
         // At least one page stays visible.
         let first = (self.dropped() + PAGE).min(self.count);

@@ -1,5 +1,6 @@
-//! The terminal client of `chefshat play` and `chefshat watch`, and what both share: the table (`view`), cards, story and theme as widgets,
-//! and the terminal itself (`screen`). The state they draw is that of `narration`; what a person may do is decided in `play` and `watch`.
+//! The terminal client of `chefshat play` and `chefshat watch`, and what both share: the table
+//! (`view`), cards, story and theme as widgets, and the terminal itself (`screen`). The state they
+//! draw is that of `narration`; what a person may do is decided in `play` and `watch`.
 
 pub(crate) mod cards;
 pub(crate) mod log;

@@ -1,5 +1,5 @@
-//! The terminal: opened and restored, with its keys, ticks and the signals that end the process. What a key means is decided in `play` and
-//! `watch`.
+//! The terminal: opened and restored, with its keys, ticks and the signals that end the process.
+//! What a key means is decided in `play` and `watch`.
 
 use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
@@ -50,8 +50,8 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Opens the screen; `tick` is the time between two ticks. Signals are caught from here on, so that none leaves the terminal in raw
-    /// mode.
+    /// Opens the screen; `tick` is the time between two ticks. Signals are caught from here on, so
+    /// that none leaves the terminal in raw mode.
     ///
     /// # Errors
     /// The terminal or the signals are unavailable.
@@ -103,14 +103,16 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // The panic hook has restored it already; a second restore would overwrite the panic message.
+        // The panic hook has restored it already; a second restore would overwrite the panic
+        // message.
         if is_raw_mode_enabled().unwrap_or(true) {
             ratatui::restore();
         }
     }
 }
 
-/// Prints an error and returns the exit code if there is no interactive terminal; `instead` names commands that work without one.
+/// Prints an error and returns the exit code if there is no interactive terminal; `instead` names
+/// commands that work without one.
 pub(crate) fn missing(instead: &str) -> Option<ExitCode> {
     if io::stdout().is_terminal() && io::stdin().is_terminal() {
         return None;

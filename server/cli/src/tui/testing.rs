@@ -1,4 +1,5 @@
-//! Shared by the tests of `play` and `watch`: screens as text, recorded games, and games played by the engine.
+//! Shared by the tests of `play` and `watch`: screens as text, recorded games, and games played by
+//! the engine.
 
 use std::path::Path;
 
@@ -26,7 +27,8 @@ pub(crate) fn text(columns: u16, rows: u16, picture: impl FnOnce(&mut Frame<'_>)
     text
 }
 
-/// Compares screens with the committed ones, by name; screens that differ are written to the directory for temporary files.
+/// Compares screens with the committed ones, by name; screens that differ are written to the
+/// directory for temporary files.
 pub(crate) fn assert_screens(screens: &[(&str, String, &str)]) {
     let differ = screens
         .iter()

@@ -1,4 +1,5 @@
-//! Colours and symbols. Every colour stands beside a number, a symbol or a word, so that none is needed; `NO_COLOR` turns them off.
+//! Colours and symbols. Every colour stands beside a number, a symbol or a word, so that none is
+//! needed; `NO_COLOR` turns them off.
 
 use chefshat_client::v1;
 use ratatui::style::{Color, Modifier, Style};

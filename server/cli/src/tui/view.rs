@@ -1,4 +1,5 @@
-//! Draws the table: header, seats, story, pizza, and popups. `play` and `watch` draw what is below it.
+//! Draws the table: header, seats, story, pizza, and popups. `play` and `watch` draw what is below
+//! it.
 
 use chefshat_client::v1;
 use ratatui::Frame;

@@ -1,5 +1,5 @@
-//! `chefshat serve`, `room` and `agent` as processes: a room, four agents that join it with the code
-//! from a file, and a spectator. All agree on the result.
+//! `chefshat serve`, `room` and `agent` as processes: a room, four agents that join it with the
+//! code from a file, and a spectator. All agree on the result.
 
 use std::io::{BufRead as _, BufReader};
 

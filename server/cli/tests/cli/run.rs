@@ -62,8 +62,8 @@ impl Ended {
         }
     }
 
-    /// Asserts that the output is a table of more than `more_than` lines that fits a page and has no
-    /// colours.
+    /// Asserts that the output is a table of more than `more_than` lines that fits a page and has
+    /// no colours.
     pub(super) fn assert_table_fits(&self, more_than: usize) {
         assert!(self.stdout.lines().count() > more_than, "{}", self.stdout);
         for line in self.stdout.lines() {
@@ -127,7 +127,8 @@ pub(super) fn chefshat(arguments: &[&str]) -> Ended {
     Ended::of(program().args(arguments).output().unwrap())
 }
 
-/// Runs `chefshat` with a command line as typed. Arguments are split at white space, paths included.
+/// Runs `chefshat` with a command line as typed. Arguments are split at white space, paths
+/// included.
 pub(super) fn typed(line: &str) -> Ended {
     chefshat(&line.split_whitespace().collect::<Vec<_>>())
 }

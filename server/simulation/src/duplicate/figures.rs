@@ -95,7 +95,8 @@ impl Figure {
         self.difference.mean()
     }
 
-    /// The 95 % interval of the difference: 1.96 standard errors to either side ([`Moments::interval95`]).
+    /// The 95 % interval of the difference: 1.96 standard errors to either side
+    /// ([`Moments::interval95`]).
     pub fn interval95(&self) -> Interval {
         self.difference.interval95()
     }

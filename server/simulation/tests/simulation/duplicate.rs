@@ -40,7 +40,8 @@ fn compared(a: AgentKind, b: AgentKind, plan: SeatPlan, players: u8, deals: u64)
         .run(|_| {})
 }
 
-/// A network that plays turns by a fixed order of preference: the highest action first, which sheds high faces and jokers.
+/// A network that plays turns by a fixed order of preference: the highest action first, which sheds
+/// high faces and jokers.
 fn careless() -> Contender {
     let metadata = [
         ("format", "chefshat-network-1"),

@@ -1,5 +1,5 @@
-//! Reads the requests of one stream of `PlayService` and executes them: seats attach, act and leave.
-//! Participants of tournaments attach once and are then seated in each of their games.
+//! Reads the requests of one stream of `PlayService` and executes them: seats attach, act and
+//! leave. Participants of tournaments attach once and are then seated in each of their games.
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;
@@ -42,8 +42,8 @@ impl BoundSeat {
         self.detached.load(Ordering::Relaxed)
     }
 
-    /// Passes an answer to the room, `in_place` or through its mailbox. Returns the answer if the room
-    /// cannot accept it now.
+    /// Passes an answer to the room, `in_place` or through its mailbox. Returns the answer if the
+    /// room cannot accept it now.
     fn answer_now(&self, answer: Answer, arrived: Instant, in_place: bool) -> Result<(), Answer> {
         if !in_place {
             return (self.room).send_answer(self.seat, self.connection, answer, arrived);
@@ -54,7 +54,8 @@ impl BoundSeat {
     }
 }
 
-/// Reads the requests of one stream, and attaches seats that participants of tournaments are called to.
+/// Reads the requests of one stream, and attaches seats that participants of tournaments are called
+/// to.
 pub(super) struct Reader {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,

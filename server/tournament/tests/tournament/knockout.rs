@@ -129,7 +129,8 @@ fn games_of_a_pairing_add_up() {
     assert_eq!(turned, [&seats[1..], &seats[..1]].concat());
     let table = [0, 1].map(|game| tournament.games()[game].table);
     assert_eq!(table, [1, 1]);
-    // 5 + 0, 3 + 5, 1 + 3, 0 + 1: the first seat's 5 is less than the 8 of the second and more than the 4 of the third.
+    // 5 + 0, 3 + 5, 1 + 3, 0 + 1: the first seat's 5 is less than the 8 of the second and more than
+    // the 4 of the third.
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
     follow(&mut tournament, 0);
     end(&mut tournament, 1, played(&[1, 2, 3, 4]));

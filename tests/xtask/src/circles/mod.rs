@@ -1,15 +1,15 @@
 //! Circles between the files of a crate.
 //!
 //! A file depends on another if its code, except tests, names an item that the other defines:
-//! - Every path that starts with `crate`, `self`, `super`, a child module or an imported name counts, in
-//!   `use` and elsewhere, macro arguments included.
-//! - Re-exports are followed: `crate::Item` is a dependency on the file that defines `Item`, not on the
-//!   `lib.rs` that re-exports it. Likewise a module in a path is not a dependency: `use super::child`
-//!   counts where `child::Item` is used.
-//! - So a `mod.rs` or `lib.rs` that declares and re-exports its children does not depend on them, unless
-//!   its own code uses one of the names.
-//! - Code under `#[cfg(test)]` and attributes, including doc comments, do not count; nor do methods and
-//!   trait implementations, whose file cannot be found without types.
+//! - Every path that starts with `crate`, `self`, `super`, a child module or an imported name
+//!   counts, in `use` and elsewhere, macro arguments included.
+//! - Re-exports are followed: `crate::Item` is a dependency on the file that defines `Item`, not on
+//!   the `lib.rs` that re-exports it. Likewise a module in a path is not a dependency: `use
+//!   super::child` counts where `child::Item` is used.
+//! - So a `mod.rs` or `lib.rs` that declares and re-exports its children does not depend on them,
+//!   unless its own code uses one of the names.
+//! - Code under `#[cfg(test)]` and attributes, including doc comments, do not count; nor do methods
+//!   and trait implementations, whose file cannot be found without types.
 
 mod files;
 mod names;

@@ -1,5 +1,5 @@
-//! The state of one game in `chefshat play`: takes keys and server messages, returns actions for the server. It has no terminal, connection
-//! or clock, so that tests play whole games with data.
+//! The state of one game in `chefshat play`: takes keys and server messages, returns actions for
+//! the server. It has no terminal, connection or clock, so that tests play whole games with data.
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use ratatui::crossterm::event::KeyCode;
@@ -203,7 +203,8 @@ impl App {
         None
     }
 
-    /// Closes the open decision after an event that shows it was decided: by a timeout or a substitute.
+    /// Closes the open decision after an event that shows it was decided: by a timeout or a
+    /// substitute.
     fn close_by(&mut self, event: &v1::GameEvent) {
         let moved = matches!(
             event.kind,

@@ -1,4 +1,5 @@
-//! The last lines of `chefshat play`: how the game or tournament ended, where to find more, and how to resume.
+//! The last lines of `chefshat play`: how the game or tournament ended, where to find more, and how
+//! to resume.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,5 @@
-//! Follows a tournament while the person plays in it, and finds the person's next game if the server's report lacks it.
+//! Follows a tournament while the person plays in it, and finds the person's next game if the
+//! server's report lacks it.
 
 use chefshat_client::{Client, Error, v1};
 use tokio::sync::mpsc;

@@ -1,4 +1,5 @@
-//! Gets a ticket: for a seat of a room, a place in a tournament, or a table created for this game. Refusals come with advice.
+//! Gets a ticket: for a seat of a room, a place in a tournament, or a table created for this game.
+//! Refusals come with advice.
 
 use chefshat_client::{Client, Error, v1};
 

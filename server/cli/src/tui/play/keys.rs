@@ -2,7 +2,8 @@
 
 use crate::narration::hand::Stack;
 
-/// Keys of the faces, from 1. Faces above 10 have letters without another meaning, which are drawn on the card.
+/// Keys of the faces, from 1. Faces above 10 have letters without another meaning, which are drawn
+/// on the card.
 const FACE_KEYS: [char; 15] = [
     '1', '2', '3', '4', '5', '6', '7', '8', '9', '0', 'a', 'b', 'c', 'f', 'g',
 ];

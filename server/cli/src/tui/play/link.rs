@@ -1,6 +1,7 @@
-//! The connection of a ticket: opened, restored after failures, given up in the end. A ticket is for a seat, or for a place in a tournament,
-//! whose games bring more seats. The agents of the SDK decide on the task of the connection; a person thinks longer and sees events
-//! meanwhile, so that messages and answers are independent here. `part` and `app` handle the messages.
+//! The connection of a ticket: opened, restored after failures, given up in the end. A ticket is
+//! for a seat, or for a place in a tournament, whose games bring more seats. The agents of the SDK
+//! decide on the task of the connection; a person thinks longer and sees events meanwhile, so that
+//! messages and answers are independent here. `part` and `app` handle the messages.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -34,7 +35,8 @@ pub(super) type Order = (String, Command);
 enum Stopped {
     /// The person has left.
     Left,
-    /// The game or tournament is over, or the ticket is in use elsewhere; with the reason if it has not ended.
+    /// The game or tournament is over, or the ticket is in use elsewhere; with the reason if it has
+    /// not ended.
     Over(Option<String>),
     /// It failed; whether the ticket had been attached for a while.
     Broken { status: Status, held: bool },
@@ -149,8 +151,8 @@ impl Connection {
         games.any(|game| game.ended && game.ticket == self.ticket)
     }
 
-    /// The first commands of a stream. Tournament games come before the place, each with its own ticket, so that only new events are
-    /// sent, and the end of a game that ended meanwhile.
+    /// The first commands of a stream. Tournament games come before the place, each with its own
+    /// ticket, so that only new events are sent, and the end of a game that ended meanwhile.
     fn attachments(&self, stream: &mut Stream) -> Vec<Command> {
         let attach = |ticket: &str, request_id, from_sequence| {
             Command::Attach(v1::Attach {
@@ -299,7 +301,8 @@ impl Connection {
         }
     }
 
-    /// A seat was attached. For a new game, requests its room, which lists the participants before the game starts.
+    /// A seat was attached. For a new game, requests its room, which lists the participants before
+    /// the game starts.
     async fn seated(
         &mut self,
         stream: &mut Stream,
@@ -352,7 +355,8 @@ fn why_detached(reason: v1::DetachReason) -> &'static str {
     }
 }
 
-/// Waits until no commands can come. Commands during an outage are dropped: the server sends the decision again.
+/// Waits until no commands can come. Commands during an outage are dropped: the server sends the
+/// decision again.
 async fn closed(orders: &mut mpsc::Receiver<Order>) {
     while orders.recv().await.is_some() {}
 }

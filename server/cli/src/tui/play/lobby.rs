@@ -1,4 +1,5 @@
-//! The lobby of a tournament, as values and words: the person's standing, the next game and what it waits for. `lobby_view` draws it.
+//! The lobby of a tournament, as values and words: the person's standing, the next game and what it
+//! waits for. `lobby_view` draws it.
 
 use chefshat_client::v1::{self, TournamentGameState as GameState};
 use ratatui::crossterm::event::KeyCode;
@@ -149,7 +150,8 @@ impl Lobby {
         };
     }
 
-    /// The sentences of the lobby, most important first; `ended`: no more games, whatever the last report says.
+    /// The sentences of the lobby, most important first; `ended`: no more games, whatever the last
+    /// report says.
     pub(super) fn words(&self, ended: bool) -> Vec<String> {
         let Some(report) = &self.report else {
             return vec!["Waiting for the state of the tournament.".to_owned()];

@@ -1,4 +1,5 @@
-//! Draws the lobby, between the games of a tournament: the person's standing and next game, and the standings.
+//! Draws the lobby, between the games of a tournament: the person's standing and next game, and the
+//! standings.
 
 use chefshat_client::v1;
 use ratatui::Frame;

@@ -1,5 +1,6 @@
-//! `chefshat play`: a person plays in a terminal: a seat of a server, a local game, or a tournament. This file has the arguments; `join`
-//! gets the ticket, `run` plays, `ending` prints the result.
+//! `chefshat play`: a person plays in a terminal: a seat of a server, a local game, or a
+//! tournament. This file has the arguments; `join` gets the ticket, `run` plays, `ending` prints
+//! the result.
 
 mod app;
 mod ending;
@@ -75,10 +76,12 @@ pub(crate) struct Play {
     /// With --local: milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 900, value_parser = clap::value_parser!(u32).range(0..=MAX_PACE_MS))]
     pace_ms: u32,
-    /// With --local: data directory for the record (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
+    /// With --local: data directory for the record (records/GAME-ID.jsonl). Default: chefshat in
+    /// the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Record with each decision how long it was on screen, as the annotation person_decision_time_ms.
+    /// Record with each decision how long it was on screen, as the annotation
+    /// person_decision_time_ms.
     #[arg(long)]
     times: bool,
     #[command(flatten)]

@@ -1,6 +1,7 @@
-//! The state of `chefshat play`: one game, or the games of a tournament with the lobby between them. If a ticket has several games at a time,
-//! one is on screen; another with an open decision replaces it once it has none. Takes keys, messages and the time, returns actions;
-//! `app` has one game, `lobby` the tournament. No terminal and no connection.
+//! The state of `chefshat play`: one game, or the games of a tournament with the lobby between
+//! them. If a ticket has several games at a time, one is on screen; another with an open decision
+//! replaces it once it has none. Takes keys, messages and the time, returns actions; `app` has one
+//! game, `lobby` the tournament. No terminal and no connection.
 
 use std::collections::VecDeque;
 
@@ -178,8 +179,8 @@ impl Part {
         }
     }
 
-    /// Replaces a finished game by the next game or the lobby after its result was shown, and a game without a decision by one that has
-    /// one.
+    /// Replaces a finished game by the next game or the lobby after its result was shown, and a
+    /// game without a decision by one that has one.
     fn show(&mut self, now_ms: u64) {
         let Some(game) = &self.game else {
             self.game = self.take_next();

@@ -1,5 +1,6 @@
-//! A person's selection for an open decision: a stack of the hand, a number of its cards, a number of jokers with them. Maps the selection
-//! to an action. What is legal, and what a play must be, comes from the request; this module only words the refusals.
+//! A person's selection for an open decision: a stack of the hand, a number of its cards, a number
+//! of jokers with them. Maps the selection to an action. What is legal, and what a play must be,
+//! comes from the request; this module only words the refusals.
 
 use chefshat_client::v1;
 use chefshat_engine::{Action, ActionId, ActionSpace, Face, Mask};
@@ -138,7 +139,8 @@ impl Decision {
         self.pick(at.unwrap_or(0));
     }
 
-    /// Moves the cursor to a stack and selects its smallest legal play, with as few jokers as possible.
+    /// Moves the cursor to a stack and selects its smallest legal play, with as few jokers as
+    /// possible.
     pub(super) fn pick(&mut self, at: usize) {
         if at >= self.choices() {
             return;
@@ -150,8 +152,8 @@ impl Decision {
         (self.quantity, self.jokers) = smallest.unwrap_or((1, 0));
     }
 
-    /// Handles the key of a stack: moves the cursor to it, or, if it is there already, selects one card more and after the last one
-    /// starts again with the smallest legal play.
+    /// Handles the key of a stack: moves the cursor to it, or, if it is there already, selects one
+    /// card more and after the last one starts again with the smallest legal play.
     pub(super) fn press(&mut self, at: usize) {
         let stack = self.stacks.get(at);
         let all = stack.is_none_or(|stack| stack.joker || self.quantity >= stack.count);
@@ -203,7 +205,8 @@ impl Decision {
         };
     }
 
-    /// Adds a joker to the selected cards, or removes all when none is left to add; in the exchange selects a joker. False if there is none.
+    /// Adds a joker to the selected cards, or removes all when none is left to add; in the exchange
+    /// selects a joker. False if there is none.
     pub(super) fn next_joker(&mut self) -> bool {
         let turn = self.kind() == v1::DecisionKind::Turn;
         let jokers = self.stacks.iter().position(|stack| stack.joker);

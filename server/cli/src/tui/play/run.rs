@@ -1,5 +1,5 @@
-//! The loop of `chefshat play`: passes keys, ticks and server messages to `part`, draws its state, and sends its commands. `link` holds the
-//! connection.
+//! The loop of `chefshat play`: passes keys, ticks and server messages to `part`, draws its state,
+//! and sends its commands. `link` holds the connection.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -33,7 +33,8 @@ pub(super) struct Taken {
     pub(super) game: Option<App>,
 }
 
-/// Plays until the person has seen the end or leaves. `times`: record how long each decision was on screen.
+/// Plays until the person has seen the end or leaves. `times`: record how long each decision was on
+/// screen.
 ///
 /// # Errors
 /// The terminal cannot be used.

@@ -1,4 +1,5 @@
-//! Draws a game of `chefshat play`: the table, the hand, the request and the keys. `lobby_view` draws the screen between tournament games.
+//! Draws a game of `chefshat play`: the table, the hand, the request and the keys. `lobby_view`
+//! draws the screen between tournament games.
 
 use chefshat_client::v1;
 use ratatui::Frame;

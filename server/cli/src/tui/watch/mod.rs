@@ -1,5 +1,5 @@
-//! `chefshat watch`: shows a room live, or a finished game, in a terminal. This file finds the game and runs the loop of events, keys and
-//! frames; `reel` moves through the game, `view` draws it.
+//! `chefshat watch`: shows a room live, or a finished game, in a terminal. This file finds the game
+//! and runs the loop of events, keys and frames; `reel` moves through the game, `view` draws it.
 
 mod reel;
 #[cfg(test)]
@@ -163,7 +163,8 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
 /// An event of a room, or why no more follow.
 type PartInput = Result<v1::GameEvent, chefshat_client::Error>;
 
-/// Follows the room in a separate task: keys and ticks would otherwise cancel its connection attempts.
+/// Follows the room in a separate task: keys and ticks would otherwise cancel its connection
+/// attempts.
 fn follow(mut spectator: Spectator) -> mpsc::Receiver<PartInput> {
     let (sender, heard) = mpsc::channel(EVENTS);
     tokio::spawn(async move {

@@ -1,4 +1,5 @@
-//! Steps through the events of a game, forwards and back: position, speed, visible hands. Takes events, keys and the time; `view` draws it.
+//! Steps through the events of a game, forwards and back: position, speed, visible hands. Takes
+//! events, keys and the time; `view` draws it.
 
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
