@@ -133,12 +133,17 @@ fn exchanged(view: &GameView, cards: &v1::CardsExchanged) -> String {
     let top = view.faces();
     let receiver = view.name(cards.receiver);
     if cards.cards.is_empty() {
-        return format!("gives {} to {receiver}", cards.count);
+        let noun = if cards.count == 1 { "card" } else { "cards" };
+        return format!("gives {} {noun} to {receiver}", cards.count);
     }
-    let named = cards.cards.iter().map(|card| {
+    // Of several cards of the top face, only one is the Golden card.
+    let golden = (cards.cards.iter())
+        .rposition(|card| *card == top)
+        .filter(|_| cards.golden);
+    let named = cards.cards.iter().enumerate().map(|(index, card)| {
         if *card > top {
             "J".to_owned()
-        } else if *card == top && cards.golden {
+        } else if golden == Some(index) {
             format!("★{card}")
         } else {
             card.to_string()
@@ -198,5 +203,34 @@ pub(crate) fn title(role: v1::Role) -> &'static str {
         v1::Role::Cook => "Cook",
         v1::Role::Waiter => "Waiter",
         v1::Role::Dishwasher => "Dishwasher",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gift_names_its_number_of_cards_or_the_cards() {
+        let gift = |count, cards: &[u32], golden| v1::CardsExchanged {
+            giver: 0,
+            receiver: 1,
+            count,
+            cards: cards.to_vec(),
+            golden,
+        };
+        let view = GameView::default();
+        let receiver = view.name(1);
+        for (gift, expected) in [
+            (gift(1, &[], false), "1 card"),
+            (gift(2, &[], false), "2 cards"),
+            (gift(2, &[3, 12], false), "3, J"),
+            (gift(2, &[11, 11], false), "11, 11"),
+            (gift(2, &[11, 11], true), "11, ★11"),
+            (gift(2, &[11, 12], true), "★11, J"),
+        ] {
+            let words = exchanged(&view, &gift);
+            assert_eq!(words, format!("gives {expected} to {receiver}"));
+        }
     }
 }

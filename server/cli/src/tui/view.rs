@@ -224,8 +224,8 @@ fn draw_pizza(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<
         }
         let words = match (table.started, table.turn) {
             (false, _) => waiting(table),
-            (true, Some(seat)) if me == Some(seat) => "The board is empty: you lead.".to_owned(),
-            (true, Some(seat)) => format!("The board is empty: {} leads.", table.name(seat)),
+            (true, Some(seat)) if me == Some(seat) => "The board is empty: you play.".to_owned(),
+            (true, Some(seat)) => format!("The board is empty: {} plays.", table.name(seat)),
             (true, None) => "The board is empty.".to_owned(),
         };
         let lines = vec![Line::default(), Line::from(format!("  {words}"))];
