@@ -263,18 +263,17 @@ impl Room {
         arrived: Instant,
     ) -> bool {
         self.now = self.now.max(self.clock.at(arrived));
-        self.receive(Message::Do(
-            seat,
-            connection,
-            SeatAction::Answer(answer),
-            arrived,
-        ));
+        self.execute(seat, connection, SeatAction::Answer(answer), arrived);
         if !self.commit_now() || self.core.state().is_over() {
             return true;
         }
         self.publish();
-        let deadline = self.core.deadline();
-        deadline.is_some_and(|deadline| self.timer_at.is_none_or(|at| at > deadline))
+        !self.timer_covers(self.core.deadline())
+    }
+
+    /// Whether the timer fires no later than a deadline, if there is one.
+    fn timer_covers(&self, deadline: Option<Duration>) -> bool {
+        deadline.is_none_or(|deadline| self.timer_at.is_some_and(|at| at <= deadline))
     }
 
     /// Handles the timer. Returns `false` when the room need not be listed any longer.
@@ -295,14 +294,12 @@ impl Room {
             Some(since) => Some(since + self.context.retention),
             None => self.core.deadline(),
         };
-        let is_early = |at: Duration| deadline.is_none_or(|deadline| at <= deadline);
-        if self.timer_at.is_some_and(is_early) {
-            return;
-        }
-        if let Some(deadline) = deadline {
+        if !self.timer_covers(deadline)
+            && let Some(deadline) = deadline
+        {
             timer.reset(self.clock.instant(deadline));
+            self.timer_at = Some(deadline);
         }
-        self.timer_at = deadline;
     }
 
     fn is_expired(&self) -> bool {
@@ -327,20 +324,7 @@ impl Room {
             Message::Attach(request, reply) => self.attach(request, reply),
             Message::Lost(seat, connection, reason) => self.lost(seat, connection, reason),
             Message::Do(seat, connection, action, arrived) => {
-                if self.is_current(seat, connection) {
-                    match self.perform(seat, action, arrived) {
-                        Ok(Some(result)) => {
-                            self.releases
-                                .push(Release::Result(seat, connection, result));
-                        }
-                        Ok(None) => {}
-                        Err(error) => {
-                            let refused = convert::express_refused(error);
-                            self.releases
-                                .push(Release::Refuse(seat, connection, refused));
-                        }
-                    }
-                }
+                self.execute(seat, connection, action, arrived);
             }
             Message::Act(secret, action, arrived, reply) => {
                 match self.core.seat_of_ticket(&secret) {
@@ -459,6 +443,26 @@ impl Room {
         self.connections[seat.index()]
             .as_ref()
             .is_some_and(|subscriber| is_connection(subscriber, connection))
+    }
+
+    /// Executes a command of a connection, unless a newer one has its seat. The result is released
+    /// once the changes are committed.
+    fn execute(
+        &mut self,
+        seat: Seat,
+        connection: ConnectionId,
+        action: SeatAction,
+        arrived: Instant,
+    ) {
+        if !self.is_current(seat, connection) {
+            return;
+        }
+        let release = match self.perform(seat, action, arrived) {
+            Ok(Some(result)) => Release::Result(seat, connection, result),
+            Ok(None) => return,
+            Err(error) => Release::Refuse(seat, connection, convert::express_refused(error)),
+        };
+        self.releases.push(release);
     }
 
     fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {

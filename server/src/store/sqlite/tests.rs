@@ -164,6 +164,15 @@ async fn opened(folder: &Path) -> SqliteStore {
     SqliteStore::open(folder).await.expect("a usable folder")
 }
 
+/// The journal of a hosted game that has ended.
+async fn finished_journal(store: &SqliteStore, game: Id) -> Vec<Entry> {
+    let stored = store.finished(game).await.expect("readable");
+    let Some(StoredGame::Hosted(_, journal)) = stored else {
+        panic!("not stored: {stored:?}");
+    };
+    journal.to_vec()
+}
+
 #[tokio::test]
 async fn an_unfinished_game_resumes_where_it_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -265,11 +274,8 @@ async fn a_game_is_created_with_its_first_entries() {
             .finish(Some(summary(&header)))
             .await
             .expect("committed");
-        let stored = store.finished(header.game_id).await.expect("readable");
-        let Some(StoredGame::Hosted(_, journal)) = stored else {
-            panic!("not stored: {stored:?}");
-        };
-        assert_eq!(shown(&journal.to_vec()), shown(&entries));
+        let journal = finished_journal(&store, header.game_id).await;
+        assert_eq!(shown(&journal), shown(&entries));
     }
 }
 
@@ -294,11 +300,8 @@ async fn an_ephemeral_game_is_stored_only_when_it_ends() {
         .finish(Some(summary(&header)))
         .await
         .expect("committed");
-    let stored = store.finished(header.game_id).await.expect("readable");
-    let Some(StoredGame::Hosted(_, journal)) = stored else {
-        panic!("not stored: {stored:?}");
-    };
-    assert_eq!(shown(&journal.to_vec()), shown(&entries()));
+    let journal = finished_journal(&store, header.game_id).await;
+    assert_eq!(shown(&journal), shown(&entries()));
 }
 
 #[tokio::test]
@@ -454,11 +457,8 @@ async fn a_missing_part_of_a_finished_game_is_detected() {
         let store = opened(folder.path()).await;
         let error = store.finished(headers[0].game_id).await.expect_err("a gap");
         assert!(error.to_string().contains("missing"), "{error}");
-        let stored = store.finished(headers[1].game_id).await.expect("readable");
-        let Some(StoredGame::Hosted(_, journal)) = stored else {
-            panic!("not stored: {stored:?}");
-        };
-        assert_eq!(shown(&journal.to_vec()), shown(&entries()));
+        let journal = finished_journal(&store, headers[1].game_id).await;
+        assert_eq!(shown(&journal), shown(&entries()));
     }
 }
 
