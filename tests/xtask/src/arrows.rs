@@ -30,7 +30,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "chefshat-simulation",
         &["chefshat-engine", "chefshat-agents", "chefshat-tournament"],
     ),
-    ("chefshat-record", &["chefshat-engine", "chefshat-proto"]),
+    (
+        "chefshat-record",
+        &["chefshat-engine", "chefshat-proto", "chefshat-referee"],
+    ),
     (
         "chefshat-dataset",
         &["chefshat-engine", "chefshat-proto", "chefshat-record"],

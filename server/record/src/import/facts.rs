@@ -1,83 +1,11 @@
-//! The stated facts of a Shift at a real table: hands, gifts and turns, each with its line. They
-//! come from the rows of a transcript or from the lines of an imported record.
+//! The facts of a Shift, from the rows of a transcript or from the lines of an imported record.
 
-use chefshat_engine::{Action, BySeat, Cards, RuleSet, Seat};
+use chefshat_engine::{Action, RuleSet};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_referee::{Fact, ShiftFacts};
 
-use super::counts::{Counts, NOTHING, add_action};
 use super::transcript::{Entry, Transcript, TranscriptError, wrong};
 use crate::convert::{action_id, cards_from_numbers, seat_from_number};
-
-/// A stated fact.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Fact {
-    /// A hand as dealt.
-    Hand(Seat, Cards),
-    /// A seat was dealt two jokers, and declared its special action or declined.
-    Special { seat: Seat, declared: bool },
-    /// A seat chose this card to give.
-    Gives(Seat, Action),
-    /// The complete gift of a seat, if known. Implies that the exchange is over.
-    Given(Seat, Option<Cards>),
-    /// A seat played or passed.
-    Turn(Seat, Action),
-}
-
-/// The facts of one Shift, in order.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct ShiftFacts {
-    /// Each with its line, from 1.
-    pub(crate) facts: Vec<(usize, Fact)>,
-}
-
-/// Facts, added up.
-#[derive(Debug, Clone)]
-pub(super) struct Tally {
-    pub(super) dealt: BySeat<Option<Cards>>,
-    /// The seat dealt two jokers, and whether it declared.
-    pub(super) special: Option<(Seat, bool)>,
-    /// Cards the seat chose to give, as far as stated.
-    pub(super) gives: BySeat<Counts>,
-    /// The complete gift of a seat.
-    pub(super) given: BySeat<Option<Cards>>,
-    /// Whether the exchange, if any, is over.
-    pub(super) exchanged: bool,
-    pub(super) played: BySeat<Counts>,
-    /// The seat that took the first turn.
-    pub(super) opener: Option<Seat>,
-}
-
-impl Tally {
-    pub(super) fn of(rules: &RuleSet, facts: &[(usize, Fact)]) -> Self {
-        let players = rules.players();
-        let mut tally = Self {
-            dealt: BySeat::filled(players, None),
-            special: None,
-            gives: BySeat::filled(players, NOTHING),
-            given: BySeat::filled(players, None),
-            exchanged: false,
-            played: BySeat::filled(players, NOTHING),
-            opener: None,
-        };
-        for (_, fact) in facts {
-            match *fact {
-                Fact::Hand(seat, cards) => tally.dealt[seat] = Some(cards),
-                Fact::Special { seat, declared } => tally.special = Some((seat, declared)),
-                Fact::Gives(seat, gift) => add_action(&mut tally.gives[seat], gift),
-                Fact::Given(seat, cards) => {
-                    tally.given[seat] = cards;
-                    tally.exchanged = true;
-                }
-                Fact::Turn(seat, turn) => {
-                    add_action(&mut tally.played[seat], turn);
-                    tally.opener.get_or_insert(seat);
-                    tally.exchanged = true;
-                }
-            }
-        }
-        tally
-    }
-}
 
 /// The facts of an imported record, by Shift. Invalid lines are skipped here; the replay rejects
 /// them.

@@ -1,21 +1,12 @@
 //! Import of games played with real cards: a transcript becomes a record.
 //!
-//! A transcript ([`transcript`]) states part of a game. The cards it does not state are filled in
-//! ([`complete`], [`search`]) so that the rule engine can play each Shift ([`game`]); the first
-//! row that no game can contain is reported. The record contains only what was stated or follows
-//! from it.
+//! A transcript ([`transcript`]) states part of a game. The cards it does not state are completed
+//! ([`PhysicalGame`]) so that the rule engine can play each Shift; the first row that no game can
+//! contain is reported. The record contains only what was stated or follows from it.
 
-mod candidates;
-mod complete;
-mod counts;
 mod facts;
-mod game;
-mod gifts;
-mod known;
 mod notation;
 mod notes;
-mod puzzle;
-mod search;
 mod start;
 mod transcript;
 
@@ -23,6 +14,7 @@ use chefshat_engine::{
     Action, ActionSpace, BySeat, DecisionKind, Event, Game, RULES_VERSION, Role, Seat,
 };
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_referee::{PhysicalGame, StartState};
 use sha2::{Digest as _, Sha256};
 
 use crate::convert::{
@@ -33,9 +25,9 @@ use crate::jsonl::FORMAT_VERSION;
 use crate::replay::{game_started, replay};
 pub(crate) use facts::facts_of_record;
 use facts::facts_of_transcript;
-pub(crate) use game::ImportedGame;
 use notes::RuledShifts;
-pub(crate) use start::StartState;
+pub(crate) use start::start_of_header;
+use start::start_of_transcript;
 use transcript::{Entry, Row, Transcript, read, wrong};
 pub use transcript::{MAX_TRANSCRIPT_BYTES, TranscriptError};
 
@@ -69,7 +61,7 @@ struct Importer {
     transcript: Transcript,
     header: v1::RecordHeader,
     start: StartState,
-    imported: ImportedGame,
+    imported: PhysicalGame,
     game: Option<Game>,
     lines: Vec<v1::RecordLine>,
     events: u64,
@@ -85,10 +77,10 @@ impl Importer {
     fn new(transcript: Transcript, game_id: &str) -> Result<Self, TranscriptError> {
         let rules = transcript.rules;
         let shifts = facts_of_transcript(&transcript)?;
-        let start = StartState::of_transcript(&transcript)?;
+        let start = start_of_transcript(&transcript)?;
         let header = header(&transcript, &start, game_id);
         Ok(Self {
-            imported: ImportedGame::new(rules, shifts),
+            imported: PhysicalGame::new(rules, shifts),
             decisions: BySeat::filled(rules.players(), 0),
             transcript,
             header,

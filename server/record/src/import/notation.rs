@@ -3,7 +3,7 @@
 use chefshat_engine::{Action, Cards, Face};
 use chefshat_proto::v1;
 
-use super::counts::{JOKER, NOTHING, index};
+use chefshat_referee::counts::{JOKER, NOTHING, index};
 
 /// Parses cards as faces, `None` for a joker: numbers, `J`, and `G` for the Golden card.
 pub(super) fn kinds(text: &str, faces: u8) -> Result<Vec<Option<Face>>, String> {

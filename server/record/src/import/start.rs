@@ -1,103 +1,88 @@
 //! The state of an imported game before its first stated Shift.
 
-use chefshat_engine::{BySeat, Deal, Role, RuleSet, Seat, SeatOrder, Seed};
+use chefshat_engine::{BySeat, Deal, Role, RuleSet, Seat, SeatOrder};
 use chefshat_proto::v1;
+use chefshat_referee::{NO_SEED, StartState};
 
 use super::transcript::{Entry, Transcript, TranscriptError, wrong};
 use crate::convert::{FieldProblem, script_from_proto, seat_cards, seat_number};
 
-/// The engine requires a seed, but deals nothing from it.
-pub(super) const NO_SEED: Seed = Seed([0; 32]);
-
-/// The state of a game before its first stated Shift.
-#[derive(Debug, Clone)]
-pub(crate) struct StartState {
-    /// Number of the first stated Shift.
-    pub(crate) shift: u32,
-    /// The order of the Shift before; `None` for the first.
-    pub(crate) last_order: Option<SeatOrder>,
-    /// Points before it.
-    pub(crate) scores: BySeat<u32>,
+/// Reads the header of an imported record: a scripted Shift without hands, or none.
+pub(crate) fn start_of_header(
+    scripted: Option<&v1::ScriptedShift>,
+    rules: &RuleSet,
+) -> Result<StartState, FieldProblem> {
+    let scripted = scripted.cloned().unwrap_or_default();
+    if !scripted.hands.is_empty() || scripted.drawn_seat.is_some() {
+        return Err(FieldProblem::new(
+            "hands",
+            "hands of an imported game are stated in its Shifts",
+        ));
+    }
+    let deal = Deal::new(rules, NO_SEED, 1);
+    let any_hands = v1::ScriptedShift {
+        hands: deal
+            .hands()
+            .iter()
+            .map(|(seat, &hand)| seat_cards(seat, hand, rules.faces()))
+            .collect(),
+        drawn_seat: deal.drawn().map(seat_number),
+        ..scripted
+    };
+    let script = script_from_proto(&any_hands, rules)?;
+    Ok(StartState {
+        shift: script.shift,
+        last_order: script.last_order,
+        scores: script.scores,
+    })
 }
 
-impl StartState {
-    /// Reads the header of an imported record: a scripted Shift without hands, or none.
-    pub(crate) fn of_header(
-        scripted: Option<&v1::ScriptedShift>,
-        rules: &RuleSet,
-    ) -> Result<Self, FieldProblem> {
-        let scripted = scripted.cloned().unwrap_or_default();
-        if !scripted.hands.is_empty() || scripted.drawn_seat.is_some() {
-            return Err(FieldProblem::new(
-                "hands",
-                "hands of an imported game are stated in its Shifts",
-            ));
-        }
-        let deal = Deal::new(rules, NO_SEED, 1);
-        let any_hands = v1::ScriptedShift {
-            hands: deal
-                .hands()
-                .iter()
-                .map(|(seat, &hand)| seat_cards(seat, hand, rules.faces()))
-                .collect(),
-            drawn_seat: deal.drawn().map(seat_number),
-            ..scripted
-        };
-        let script = script_from_proto(&any_hands, rules)?;
-        Ok(Self {
-            shift: script.shift,
-            last_order: script.last_order,
-            scores: script.scores,
-        })
-    }
-
-    /// Reads a transcript: the rows `role` and `points` of its first Shift, unless that is the
-    /// first of the game.
-    pub(super) fn of_transcript(transcript: &Transcript) -> Result<Self, TranscriptError> {
-        let players = transcript.rules.players();
-        let mut start = Self {
-            shift: 1,
-            last_order: None,
-            scores: BySeat::filled(players, 0),
-        };
-        let Some(first) = transcript.rows.first().filter(|row| row.shift > 1) else {
-            return Ok(start);
-        };
-        start.shift = first.shift;
-        let mut roles: BySeat<Option<&str>> = BySeat::filled(players, None);
-        for row in transcript.rows.iter().take_while(|row| {
-            row.shift == first.shift && !matches!(row.entry, Entry::Turn(_) | Entry::Special(_))
-        }) {
-            match &row.entry {
-                Entry::Role(name) => roles[row.seat] = Some(name),
-                Entry::Points(points) => {
-                    start.scores[row.seat] = u32::try_from(*points)
-                        .map_err(|_| wrong(row.line, "too many points".into()))?;
-                }
-                _ => {}
+/// Reads a transcript: the rows `role` and `points` of its first Shift, unless that is the
+/// first of the game.
+pub(super) fn start_of_transcript(transcript: &Transcript) -> Result<StartState, TranscriptError> {
+    let players = transcript.rules.players();
+    let mut start = StartState {
+        shift: 1,
+        last_order: None,
+        scores: BySeat::filled(players, 0),
+    };
+    let Some(first) = transcript.rows.first().filter(|row| row.shift > 1) else {
+        return Ok(start);
+    };
+    start.shift = first.shift;
+    let mut roles: BySeat<Option<&str>> = BySeat::filled(players, None);
+    for row in transcript.rows.iter().take_while(|row| {
+        row.shift == first.shift && !matches!(row.entry, Entry::Turn(_) | Entry::Special(_))
+    }) {
+        match &row.entry {
+            Entry::Role(name) => roles[row.seat] = Some(name),
+            Entry::Points(points) => {
+                start.scores[row.seat] = u32::try_from(*points)
+                    .map_err(|_| wrong(row.line, "too many points".into()))?;
             }
+            _ => {}
         }
-        let mut order: Vec<Seat> = Vec::new();
-        for role in Role::in_order(players) {
-            let next = roles
-                .seats()
-                .find(|seat| roles[*seat] == Some(role.name()) && !order.contains(seat));
-            order.extend(next);
-        }
-        let order = SeatOrder::from_slice(&order).filter(|order| order.len() == players);
-        start.last_order = Some(order.ok_or_else(|| {
-            wrong(
-                first.line,
-                format!(
-                    "the transcript begins with Shift {}, which needs a row `role` for each seat ({})",
-                    first.shift,
-                    Role::in_order(players)
-                        .map(Role::name)
-                        .collect::<Vec<_>>()
-                        .join(", ")
-                ),
-            )
-        })?);
-        Ok(start)
     }
+    let mut order: Vec<Seat> = Vec::new();
+    for role in Role::in_order(players) {
+        let next = roles
+            .seats()
+            .find(|seat| roles[*seat] == Some(role.name()) && !order.contains(seat));
+        order.extend(next);
+    }
+    let order = SeatOrder::from_slice(&order).filter(|order| order.len() == players);
+    start.last_order = Some(order.ok_or_else(|| {
+        wrong(
+            first.line,
+            format!(
+                "the transcript begins with Shift {}, which needs a row `role` for each seat ({})",
+                first.shift,
+                Role::in_order(players)
+                    .map(Role::name)
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+        )
+    })?);
+    Ok(start)
 }

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use chefshat_engine::{BySeat, Event, Game};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_referee::PhysicalGame;
 
 use super::decision::OpenDecision;
 use super::difference::{difference, kind_name, must_be};
@@ -13,7 +14,7 @@ use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
 use crate::convert::{By, LAST_MS, event_kind, final_table, with_rewards};
-use crate::import::{ImportedGame, facts_of_record};
+use crate::import::facts_of_record;
 
 /// The cause of the first deal, which follows from no decision.
 const NO_DECISION: By = By {
@@ -42,7 +43,7 @@ pub(super) struct Replay<'a> {
     pub(super) seats: Seats,
     seeds: Option<Seeds>,
     /// The Shifts of an imported game.
-    pub(super) imported: Option<ImportedGame>,
+    pub(super) imported: Option<PhysicalGame>,
     pub(super) game: Option<Game>,
     /// Events that must follow, with their rewards.
     expected: VecDeque<(Kind, Vec<v1::SeatReward>)>,
@@ -66,7 +67,7 @@ impl<'a> Replay<'a> {
             lines,
             seeds: None,
             imported: (setup.origin == v1::GameOrigin::Imported)
-                .then(|| ImportedGame::new(setup.rules, facts_of_record(&setup.rules, lines))),
+                .then(|| PhysicalGame::new(setup.rules, facts_of_record(&setup.rules, lines))),
             setup,
             game: None,
             expected: VecDeque::new(),

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use chefshat_engine::{RULES_VERSION, RewardScheme, RuleSet, Script};
 use chefshat_proto::v1;
+use chefshat_referee::StartState;
 
 use super::difference::{difference, must_be};
 use super::seed::Part;
@@ -12,7 +13,7 @@ use crate::convert::{
     LAST_MS, action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto,
     script_from_proto,
 };
-use crate::import::StartState;
+use crate::import::start_of_header;
 use crate::jsonl::FORMAT_VERSION;
 
 const COMMITMENT_BYTES: usize = 32;
@@ -83,7 +84,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         .as_ref()
         .and_then(|start| start.scripted.as_ref());
     let imported = imported
-        .then(|| StartState::of_header(scripted, &rules))
+        .then(|| start_of_header(scripted, &rules))
         .transpose()
         .map_err(|problem| format!("start.scripted.{problem}"))?;
     let (script, taken_over) = check_start(origin, header.start.as_ref(), &rules)?;

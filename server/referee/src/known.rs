@@ -4,33 +4,33 @@
 
 use chefshat_engine::{BySeat, Cards, Face, Opening, Seat};
 
-use super::counts::{Counts, size_of};
-use super::puzzle::{Kept, Puzzle};
+use crate::counts::{Counts, size_of};
+use crate::puzzle::{Kept, Puzzle};
 
 /// What is known of all hands at one moment.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
+pub(crate) struct Known {
     /// Whether each hand is known, as counts.
-    pub(super) hands: BySeat<bool>,
+    pub(crate) hands: BySeat<bool>,
     /// Whether the holder of the Golden card is known.
-    pub(super) golden: bool,
+    pub(crate) golden: bool,
 }
 
 /// Which cards are known, by seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct KnownCards {
+pub(crate) struct KnownCards {
     /// The hand as dealt.
-    pub(super) dealt: BySeat<bool>,
+    pub(crate) dealt: BySeat<bool>,
     /// The hand after the exchange.
-    pub(super) held: BySeat<bool>,
+    pub(crate) held: BySeat<bool>,
     /// The gift.
-    pub(super) given: BySeat<bool>,
+    pub(crate) given: BySeat<bool>,
 }
 
 impl Puzzle<'_> {
     /// What is known of the hands as dealt and after the exchange. Known hands are exact in the
     /// completed Shift.
-    pub(super) fn known(&self, dealt: &BySeat<Cards>, gifts: &BySeat<Counts>) -> (Known, Known) {
+    pub(crate) fn known(&self, dealt: &BySeat<Cards>, gifts: &BySeat<Counts>) -> (Known, Known) {
         let known = self.known_cards();
         let (golden_dealt, golden_held) = self.golden_known(&known, dealt, gifts);
         (
@@ -86,7 +86,7 @@ impl Puzzle<'_> {
 
 impl Puzzle<'_> {
     /// A seat that can be dealt the Golden card so that the opener holds it after the exchange.
-    pub(super) fn golden_dealt_to(
+    pub(crate) fn golden_dealt_to(
         &self,
         kept: &BySeat<Kept>,
         given: &BySeat<Counts>,
@@ -114,7 +114,7 @@ impl Puzzle<'_> {
     }
 
     /// Whether the holder of the Golden card is known, as dealt and after the exchange.
-    pub(super) fn golden_known(
+    pub(crate) fn golden_known(
         &self,
         known: &KnownCards,
         dealt: &BySeat<Cards>,

@@ -4,15 +4,15 @@
 use chefshat_engine::{Action, Cards, Face};
 
 /// Cards by kind: index f-1 counts face f, [`JOKER`] the jokers.
-pub(super) type Counts = [u8; JOKER + 1];
+pub type Counts = [u8; JOKER + 1];
 /// The index of the jokers.
-pub(super) const JOKER: usize = chefshat_engine::MAX_FACES as usize;
+pub const JOKER: usize = chefshat_engine::MAX_FACES as usize;
 
 /// No cards.
-pub(super) const NOTHING: Counts = [0; JOKER + 1];
+pub const NOTHING: Counts = [0; JOKER + 1];
 
 /// Adds the cards of an action; saturates far above any deck.
-pub(super) fn add_action(counts: &mut Counts, cards: Action) {
+pub(crate) fn add_action(counts: &mut Counts, cards: Action) {
     let (face, quantity, jokers) = match cards {
         Action::Play {
             face,
@@ -31,12 +31,12 @@ pub(super) fn add_action(counts: &mut Counts, cards: Action) {
 }
 
 /// The kind of a face.
-pub(super) fn index(face: Face) -> usize {
+pub fn index(face: Face) -> usize {
     usize::from(face.get()) - 1
 }
 
 /// Counts the cards by kind.
-pub(super) fn counts_of(cards: Cards, faces: u8) -> Counts {
+pub(crate) fn counts_of(cards: Cards, faces: u8) -> Counts {
     let mut counts = [0; JOKER + 1];
     for (slot, count) in counts.iter_mut().zip(cards.counts(faces)) {
         *slot = count;
@@ -47,19 +47,19 @@ pub(super) fn counts_of(cards: Cards, faces: u8) -> Counts {
 }
 
 /// Whether `all` contains every card of `some`.
-pub(super) fn contains(all: &Counts, some: &Counts) -> bool {
+pub(crate) fn contains(all: &Counts, some: &Counts) -> bool {
     all.iter().zip(some).all(|(all, some)| all >= some)
 }
 
 /// Adds cards; saturates far above any deck.
-pub(super) fn add(sum: &mut Counts, more: &Counts) {
+pub(crate) fn add(sum: &mut Counts, more: &Counts) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum = sum.saturating_add(*more);
     }
 }
 
 /// Removes cards; `None` if some are missing.
-pub(super) fn take(from: &mut Counts, cards: &Counts) -> Option<()> {
+pub(crate) fn take(from: &mut Counts, cards: &Counts) -> Option<()> {
     for (from, cards) in from.iter_mut().zip(cards) {
         *from = from.checked_sub(*cards)?;
     }
@@ -67,19 +67,19 @@ pub(super) fn take(from: &mut Counts, cards: &Counts) -> Option<()> {
 }
 
 /// Raises each count to at least that of `least`.
-pub(super) fn at_least(counts: &mut Counts, least: &Counts) {
+pub(crate) fn at_least(counts: &mut Counts, least: &Counts) {
     for (count, least) in counts.iter_mut().zip(least) {
         *count = (*count).max(*least);
     }
 }
 
 /// The index of the highest kind.
-pub(super) fn highest(gift: &Counts) -> Option<usize> {
+pub(crate) fn highest(gift: &Counts) -> Option<usize> {
     gift.iter().rposition(|&count| count > 0)
 }
 
 /// The number of cards.
-pub(super) fn size_of(counts: &Counts) -> u8 {
+pub(crate) fn size_of(counts: &Counts) -> u8 {
     counts
         .iter()
         .fold(0, |sum: u8, count| sum.saturating_add(*count))

@@ -6,16 +6,16 @@ use chefshat_engine::{
     Action, BySeat, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat, SeatOrder,
 };
 
-use super::complete::{Completer, Contradiction};
-use super::counts::{JOKER, index};
-use super::facts::{Fact, ShiftFacts};
-use super::known::Known;
-use super::search::Plan;
-use super::start::{NO_SEED, StartState};
+use crate::complete::{Completer, Contradiction};
+use crate::counts::{JOKER, index};
+use crate::facts::{Fact, ShiftFacts};
+use crate::known::Known;
+use crate::search::Plan;
+use crate::start::{NO_SEED, StartState};
 
-/// An imported game in progress.
+/// A game at a real table in progress.
 #[derive(Debug)]
-pub(crate) struct ImportedGame {
+pub struct PhysicalGame {
     rules: RuleSet,
     shifts: Vec<ShiftFacts>,
     completer: Completer,
@@ -44,8 +44,9 @@ impl PendingDecisions {
     }
 }
 
-impl ImportedGame {
-    pub(crate) fn new(rules: RuleSet, shifts: Vec<ShiftFacts>) -> Self {
+impl PhysicalGame {
+    /// Creates a game from the facts of its Shifts.
+    pub fn new(rules: RuleSet, shifts: Vec<ShiftFacts>) -> Self {
         Self {
             rules,
             shifts,
@@ -58,7 +59,10 @@ impl ImportedGame {
     }
 
     /// Starts the first stated Shift; `None` if there is none.
-    pub(crate) fn start(
+    ///
+    /// # Errors
+    /// The completed Shift cannot be played.
+    pub fn start(
         &mut self,
         start: &StartState,
         events: &mut Vec<Event>,
@@ -67,12 +71,12 @@ impl ImportedGame {
     }
 
     /// Whether a stated Shift is in progress.
-    pub(crate) fn is_open(&self) -> bool {
+    pub fn is_open(&self) -> bool {
         self.plan.is_some()
     }
 
     /// The reason why a line contradicts the facts before it.
-    pub(crate) fn contradiction(&self, line: usize) -> Option<&str> {
+    pub fn contradiction(&self, line: usize) -> Option<&str> {
         self.contradiction
             .as_ref()
             .filter(|found| found.line == line)
@@ -80,11 +84,10 @@ impl ImportedGame {
     }
 
     /// Continues after a decision: starts the next Shift or applies unstated decisions.
-    pub(crate) fn advance(
-        &mut self,
-        game: &mut Game,
-        events: &mut Vec<Event>,
-    ) -> Result<(), ScriptError> {
+    ///
+    /// # Errors
+    /// The completed Shift cannot be played.
+    pub fn advance(&mut self, game: &mut Game, events: &mut Vec<Event>) -> Result<(), ScriptError> {
         let ended = events.iter().find_map(|event| match event {
             Event::ShiftEnded(end) => Some((end.shift, end.order, end.scores)),
             _ => None,
@@ -106,20 +109,20 @@ impl ImportedGame {
     }
 
     /// Counts a stated decision as applied.
-    pub(crate) fn count_decision(&mut self, seat: Seat, kind: DecisionKind) {
+    pub fn count_decision(&mut self, seat: Seat, kind: DecisionKind) {
         if let Some(pending) = self.pending[seat].of_kind(kind) {
             *pending = pending.saturating_sub(1);
         }
     }
 
     /// Whether each hand is known as counts, not necessarily which top-face card is Golden.
-    pub(crate) fn hands_known(&self, game: &Game) -> BySeat<bool> {
+    pub fn hands_known(&self, game: &Game) -> BySeat<bool> {
         self.known(game)
             .map_or_else(|| self.all(false), |known| known.hands)
     }
 
     /// Whether each hand is known, including whether it contains the Golden card.
-    pub(crate) fn golden_known(&self, game: &Game) -> BySeat<bool> {
+    pub fn golden_known(&self, game: &Game) -> BySeat<bool> {
         let Some(known) = self.known(game) else {
             return self.all(false);
         };
@@ -145,7 +148,7 @@ impl ImportedGame {
     }
 
     /// Removes the cards that were not stated from an event.
-    pub(crate) fn redact(&self, event: Event) -> Event {
+    pub fn redact(&self, event: Event) -> Event {
         let facts = self.current().map_or(&[][..], |shift| &shift.facts);
         match event {
             Event::ShiftStarted { shift, hands } => Event::ShiftStarted {

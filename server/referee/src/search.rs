@@ -4,10 +4,10 @@
 
 use chefshat_engine::{BySeat, Cards, Opening, Seat};
 
-use super::candidates::{Candidate, Candidates, SearchBudget};
-use super::counts::{Counts, JOKER, NOTHING, add, contains, counts_of, size_of, take};
-use super::known::Known;
-use super::puzzle::{Kept, Puzzle};
+use crate::candidates::{Candidate, Candidates, SearchBudget};
+use crate::counts::{Counts, JOKER, NOTHING, add, contains, counts_of, size_of, take};
+use crate::known::Known;
+use crate::puzzle::{Kept, Puzzle};
 
 /// Search steps charged for filling the hands.
 const FILL_STEPS: usize = 20;
@@ -16,17 +16,17 @@ const FILL_STEPS: usize = 20;
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     /// The hands as dealt.
-    pub(super) dealt: BySeat<Cards>,
+    pub(crate) dealt: BySeat<Cards>,
     /// The gift of each seat.
-    pub(super) gifts: BySeat<Counts>,
+    pub(crate) gifts: BySeat<Counts>,
     /// Whether a seat chooses its gift.
-    pub(super) choosers: BySeat<bool>,
+    pub(crate) choosers: BySeat<bool>,
     /// The seat drawn at the deal, for the opening `any_top_face`.
-    pub(super) drawn: Option<Seat>,
+    pub(crate) drawn: Option<Seat>,
     /// What is known of the hands as dealt.
-    pub(super) dealt_known: Known,
+    pub(crate) dealt_known: Known,
     /// What is known of the hands after the exchange.
-    pub(super) held_known: Known,
+    pub(crate) held_known: Known,
 }
 
 impl Puzzle<'_> {
@@ -34,7 +34,7 @@ impl Puzzle<'_> {
     ///
     /// # Errors
     /// Why none fit, or that the budget is exhausted.
-    pub(super) fn solve(&self, budget: &mut SearchBudget) -> Result<Plan, String> {
+    pub(crate) fn solve(&self, budget: &mut SearchBudget) -> Result<Plan, String> {
         self.check_basic()?;
         self.search(budget).ok_or_else(|| {
             if budget.exhausted {

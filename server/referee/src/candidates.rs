@@ -4,9 +4,9 @@
 
 use chefshat_engine::ExchangePair;
 
-use super::counts::{Counts, JOKER, NOTHING, add};
-use super::gifts::{Gifts, possible_gifts};
-use super::puzzle::{Kept, OpeningCard, Puzzle};
+use crate::counts::{Counts, JOKER, NOTHING, add};
+use crate::gifts::{Gifts, possible_gifts};
+use crate::puzzle::{Kept, OpeningCard, Puzzle};
 
 /// Counts packed into one integer, a byte per kind, to add and compare them at once. No count
 /// exceeds 127.
@@ -30,9 +30,9 @@ fn total(counts: Packed) -> u32 {
 
 /// Possible gifts of a pair, with the cards its hands need.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
-    pub(super) gifts: Gifts,
-    pub(super) opening: OpeningCard,
+pub(crate) struct Candidate {
+    pub(crate) gifts: Gifts,
+    pub(crate) opening: OpeningCard,
     /// The cards the pair certainly holds.
     certain: Packed,
     chooser: Need,
@@ -111,7 +111,7 @@ impl Candidate {
 
     /// Whether `room` suffices for both pairs. Only forced givers and seats without the top face
     /// restrict the kinds, so no other subset of hands can run short.
-    pub(super) fn fits_beside(&self, other: &Candidate, room: &Counts) -> bool {
+    pub(crate) fn fits_beside(&self, other: &Candidate, room: &Counts) -> bool {
         let (certain, room) = (self.certain + other.certain, packed(room));
         covers(room, certain) && {
             let left = room - certain;
@@ -125,14 +125,14 @@ impl Candidate {
 
 /// The search steps left.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SearchBudget {
-    pub(super) left: usize,
+pub(crate) struct SearchBudget {
+    pub(crate) left: usize,
     /// Whether more steps were requested than left.
-    pub(super) exhausted: bool,
+    pub(crate) exhausted: bool,
 }
 
 impl SearchBudget {
-    pub(super) fn new(left: usize) -> Self {
+    pub(crate) fn new(left: usize) -> Self {
         Self {
             left,
             exhausted: false,
@@ -140,7 +140,7 @@ impl SearchBudget {
     }
 
     /// Uses steps; `None` if not enough are left.
-    pub(super) fn spend(&mut self, count: usize) -> Option<()> {
+    pub(crate) fn spend(&mut self, count: usize) -> Option<()> {
         match self.left.checked_sub(count) {
             Some(left) => self.left = left,
             None => {
@@ -153,7 +153,7 @@ impl SearchBudget {
 }
 
 /// The candidates of a pair, found lazily.
-pub(super) struct Candidates<'a> {
+pub(crate) struct Candidates<'a> {
     puzzle: &'a Puzzle<'a>,
     pair: ExchangePair,
     room: Packed,
@@ -163,7 +163,7 @@ pub(super) struct Candidates<'a> {
 
 impl<'a> Candidates<'a> {
     /// `room` contains the cards not certainly held outside the pair.
-    pub(super) fn new(puzzle: &'a Puzzle<'a>, pair: ExchangePair, room: &Counts) -> Self {
+    pub(crate) fn new(puzzle: &'a Puzzle<'a>, pair: ExchangePair, room: &Counts) -> Self {
         let opens = [pair.chooser, pair.forced]
             .into_iter()
             .any(|seat| puzzle.tally.opener == Some(seat));
@@ -186,7 +186,7 @@ impl<'a> Candidates<'a> {
 
     /// The candidate with this index; each gift examined costs a step. `None` if there is none or
     /// the budget is exhausted.
-    pub(super) fn get(&mut self, index: usize, budget: &mut SearchBudget) -> Option<Candidate> {
+    pub(crate) fn get(&mut self, index: usize, budget: &mut SearchBudget) -> Option<Candidate> {
         while self.found.len() <= index {
             budget.spend(1)?;
             let (gifts, opening) = self.unexplored.next()?;

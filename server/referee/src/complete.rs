@@ -4,10 +4,10 @@
 
 use chefshat_engine::{RuleSet, SeatOrder};
 
-use super::candidates::SearchBudget;
-use super::facts::{Fact, Tally};
-use super::puzzle::Puzzle;
-use super::search::Plan;
+use crate::candidates::SearchBudget;
+use crate::facts::{Fact, Tally};
+use crate::puzzle::Puzzle;
+use crate::search::Plan;
 
 /// Search steps per Shift: gifts and pairs of gifts. Usually one of the first fits; the bound
 /// keeps a made-up record from occupying the server.
@@ -25,7 +25,7 @@ pub(crate) struct Contradiction {
 
 /// Completes the Shifts of a game in order.
 #[derive(Debug)]
-pub(super) struct Completer {
+pub(crate) struct Completer {
     /// Steps left for the game.
     left: usize,
     /// Steps per Shift.
@@ -44,7 +44,7 @@ impl Default for Completer {
 impl Completer {
     /// Completes a Shift from the longest prefix of facts that fits, and returns the first fact
     /// that does not.
-    pub(super) fn complete(
+    pub(crate) fn complete(
         &mut self,
         rules: &RuleSet,
         order: Option<SeatOrder>,
@@ -86,7 +86,7 @@ impl Completer {
 mod tests {
     use chefshat_engine::{Action, Face, RuleSetSpec, Seat};
 
-    use crate::import::complete::*;
+    use super::*;
 
     #[test]
     fn an_exhausted_search_is_reported_at_its_line() {

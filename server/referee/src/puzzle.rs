@@ -3,45 +3,45 @@
 
 use chefshat_engine::{BySeat, ExchangePair, Opening, RuleSet, Seat, SeatOrder};
 
-use super::counts::{
+use crate::counts::{
     Counts, JOKER, NOTHING, add, at_least, contains, counts_of, highest, size_of, take,
 };
-use super::facts::Tally;
-use super::gifts::{Gifts, pairs};
+use crate::facts::Tally;
+use crate::gifts::{Gifts, pairs};
 
 /// A Shift to complete.
-pub(super) struct Puzzle<'a> {
-    pub(super) rules: &'a RuleSet,
-    pub(super) tally: Tally,
-    pub(super) pairs: Vec<ExchangePair>,
-    pub(super) deck: Counts,
+pub(crate) struct Puzzle<'a> {
+    pub(crate) rules: &'a RuleSet,
+    pub(crate) tally: Tally,
+    pub(crate) pairs: Vec<ExchangePair>,
+    pub(crate) deck: Counts,
     /// The index of the top face.
-    pub(super) top: usize,
+    pub(crate) top: usize,
     /// The seats that may have been dealt the Golden card.
-    pub(super) golden: BySeat<bool>,
+    pub(crate) golden: BySeat<bool>,
 }
 
 /// The origin of the card that makes a seat the opener: the Golden card, or any of the top face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum OpeningCard {
+pub(crate) enum OpeningCard {
     Kept,
     Received,
 }
 
 /// The dealt cards that a seat keeps, as far as determined, and what may be added.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Kept {
-    pub(super) counts: Counts,
+pub(crate) struct Kept {
+    pub(crate) counts: Counts,
     /// The number of cards to add.
-    pub(super) missing: u8,
+    pub(crate) missing: u8,
     /// No kind below this index may be added.
-    pub(super) floor: usize,
+    pub(crate) floor: usize,
     /// Whether the top face may not be added.
-    pub(super) no_top: bool,
+    pub(crate) no_top: bool,
 }
 
 impl<'a> Puzzle<'a> {
-    pub(super) fn new(rules: &'a RuleSet, order: Option<SeatOrder>, tally: Tally) -> Self {
+    pub(crate) fn new(rules: &'a RuleSet, order: Option<SeatOrder>, tally: Tally) -> Self {
         let mut deck = NOTHING;
         for (count, face) in deck.iter_mut().zip(1..=rules.faces()) {
             *count = face;
@@ -60,7 +60,7 @@ impl<'a> Puzzle<'a> {
     }
 
     /// The cards a pair certainly holds together, before and after the exchange.
-    pub(super) fn certain_cards(&self, pair: &ExchangePair) -> Counts {
+    pub(crate) fn certain_cards(&self, pair: &ExchangePair) -> Counts {
         let tally = &self.tally;
         let (mut dealt, mut held) = (NOTHING, NOTHING);
         for seat in [pair.chooser, pair.forced] {
@@ -82,7 +82,7 @@ impl<'a> Puzzle<'a> {
     }
 
     /// What the seats of a pair keep; `None` if the gifts do not fit the facts.
-    pub(super) fn kept_by_pair(
+    pub(crate) fn kept_by_pair(
         &self,
         pair: &ExchangePair,
         gifts: &Gifts,
@@ -114,7 +114,7 @@ impl<'a> Puzzle<'a> {
     }
 
     /// What a seat outside the exchange holds.
-    pub(super) fn kept_alone(&self, seat: Seat) -> Option<Kept> {
+    pub(crate) fn kept_alone(&self, seat: Seat) -> Option<Kept> {
         self.kept(seat, &NOTHING, &NOTHING, None, OpeningCard::Kept)
     }
 
@@ -181,12 +181,12 @@ impl<'a> Puzzle<'a> {
     }
 
     /// The partner of a seat in a completed exchange.
-    pub(super) fn gives_to(&self, seat: Seat) -> Option<Seat> {
+    pub(crate) fn gives_to(&self, seat: Seat) -> Option<Seat> {
         self.partner(seat).filter(|_| self.tally.exchanged)
     }
 
     /// The partner of a seat in the exchange.
-    pub(super) fn partner(&self, seat: Seat) -> Option<Seat> {
+    pub(crate) fn partner(&self, seat: Seat) -> Option<Seat> {
         self.pairs.iter().find_map(|pair| match seat {
             seat if seat == pair.chooser => Some(pair.forced),
             seat if seat == pair.forced => Some(pair.chooser),

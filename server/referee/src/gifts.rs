@@ -3,20 +3,20 @@
 
 use chefshat_engine::{ExchangePair, RuleSet, Seat, SeatOrder, SpecialAction};
 
-use super::counts::{Counts, JOKER, NOTHING, contains, counts_of, highest, size_of};
-use super::facts::Tally;
+use crate::counts::{Counts, JOKER, NOTHING, contains, counts_of, highest, size_of};
+use crate::facts::Tally;
 
 /// The gifts of a pair.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Gifts {
-    pub(super) chosen: Counts,
-    pub(super) forced: Counts,
+pub(crate) struct Gifts {
+    pub(crate) chosen: Counts,
+    pub(crate) forced: Counts,
     /// Whether the forced giver had no further ingredient cards.
-    pub(super) short: bool,
+    pub(crate) short: bool,
 }
 
 /// The pairs that exchange cards in a Shift, given the order of the last one.
-pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) -> Vec<ExchangePair> {
+pub(crate) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) -> Vec<ExchangePair> {
     let Some(mut ranking) = order.filter(|_| rules.exchange()) else {
         return Vec::new();
     };
@@ -31,7 +31,7 @@ pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) ->
 
 /// All gifts that fit the facts about the pair, those first that least restrict what the forced
 /// giver keeps. `room` contains the cards not certainly held outside the pair.
-pub(super) fn possible_gifts(
+pub(crate) fn possible_gifts(
     rules: &RuleSet,
     tally: &Tally,
     pair: &ExchangePair,
