@@ -12,9 +12,13 @@ mod game;
 mod gifts;
 mod known;
 mod puzzle;
+mod report;
 mod search;
 mod start;
 
 pub use facts::{Fact, ShiftFacts};
 pub use game::PhysicalGame;
+pub use report::{
+    Corrected, Question, Report, Ruling, SeenCards, Stage, ToLay, Verdict, ViolatedRule, Violation,
+};
 pub use start::{NO_SEED, StartState};
