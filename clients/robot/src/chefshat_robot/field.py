@@ -60,3 +60,22 @@ def corner_tags() -> list[tuple[float, float]]:
     """The centres of the four corner tags, clockwise from the top left."""
     inset = 24.0
     return [(inset, inset), (WIDTH - inset, inset), (WIDTH - inset, HEIGHT - inset), (inset, HEIGHT - inset)]
+
+
+HAND_WIDTH = 520.0
+HAND_HEIGHT = 104.0
+"""Size of the strip behind a robot's own hand of cards, in mm. Its origin is its top left corner."""
+HAND_CARDS = 17
+"""Cards that a row in front of the strip holds, each with its left 25 mm to be seen."""
+
+
+def hand_tags() -> list[tuple[float, float]]:
+    """The centres of the strip's four corner tags, of `CARD_TAG_SIZE`, clockwise from the top left."""
+    inset = 14.0
+    return [(inset, inset), (HAND_WIDTH - inset, inset), (HAND_WIDTH - inset, HAND_HEIGHT - inset), (inset, HAND_HEIGHT - inset)]
+
+
+def hand_places() -> list[Place]:
+    """The places of the cards before the strip, named `hand 1` on. Each card lies over the right part of the one before it."""
+    first, step, middle = 60.0, 25.0, HAND_HEIGHT / 2
+    return [Place(f"hand {number + 1}", first + step * number, middle) for number in range(HAND_CARDS)]

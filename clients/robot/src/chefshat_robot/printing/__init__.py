@@ -1,0 +1,1 @@
+"""The printable game: cards, the playing field, and sheets for cameras, as a PDF in real millimetres."""

@@ -1,0 +1,143 @@
+"""Every printed page is rasterised and decoded again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chefshat_robot.cli import main
+from chefshat_robot.deck import DECKS, Piece, PieceKind, piece_of_tag
+from chefshat_robot.field import CARD_HEIGHT, CARD_TAG_CENTRE, CARD_TAG_SIZE, CARD_WIDTH
+from chefshat_robot.printing.canvas import ASSETS, PAPERS
+from chefshat_robot.printing.command import SECTIONS, print_game
+
+from .pages import MM, Page, Tag, pages_of
+
+SIZES = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
+PIECES = {"cards": (PieceKind.CARD, 68), "roles": (PieceKind.ROLE, 6), "passes": (PieceKind.PASS, 6)}
+
+
+@pytest.fixture(scope="module", params=list(PAPERS))
+def paper(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def printed(paper: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Page]]:
+    """The pages of each part, with backs."""
+    folder = tmp_path_factory.mktemp("printed")
+    return {part: pages_of(print_game(PAPERS[paper], 3, [part], backs=True), folder) for part in SECTIONS}
+
+
+def close(tag: Tag, number: int, x: float, y: float, angle: float, size: float) -> bool:
+    """Whether a tag was found where it should be, to a quarter of a millimetre and a degree."""
+    turned = (tag.angle - angle + 180) % 360 - 180
+    return tag.number == number and np.hypot(tag.x - x, tag.y - y) < 0.25 and abs(turned) < 1 and abs(tag.size - size) < 0.25
+
+
+def check_pieces(pages: Sequence[Page], size: tuple[float, float], pieces: Sequence[Piece]) -> None:
+    """Checks the tags and QR codes of sheets with nine pieces each."""
+    left, top = (size[0] - 3 * CARD_WIDTH) / 2, (size[1] - 3 * CARD_HEIGHT) / 2
+    assert len(pages) == -(-len(pieces) // 9)
+    for number, page in enumerate(pages):
+        sheet = pieces[9 * number : 9 * number + 9]
+        tags, codes = page.tags(), page.qr_codes()
+        assert set(codes) == {piece.qr_text for piece in sheet}
+        assert len(tags) == 2 * len(sheet)
+        for slot, piece in enumerate(sheet):
+            x, y = left + slot % 3 * CARD_WIDTH, top + slot // 3 * CARD_HEIGHT
+            upper, lower = tags[2 * slot : 2 * slot + 2]
+            inset_x, inset_y = CARD_TAG_CENTRE
+            assert close(upper, piece.tag, x + inset_x, y + inset_y, 0, CARD_TAG_SIZE), upper
+            assert close(lower, piece.tag, x + CARD_WIDTH - inset_x, y + CARD_HEIGHT - inset_y, 180, CARD_TAG_SIZE), lower
+            assert piece_of_tag(upper.number) == piece
+            code_x, code_y = codes[piece.qr_text]
+            assert np.hypot(code_x - x - 11.0, code_y - y - 77.0) < 0.5
+
+
+@pytest.mark.parametrize("part", PIECES)
+def test_every_piece_is_read_back(printed: dict[str, list[Page]], paper: str, part: str) -> None:
+    kind, count = PIECES[part]
+    check_pieces(printed[part][0::2], SIZES[paper], [Piece(kind, 3, number) for number in range(count)])
+
+
+def test_backs_lie_behind_their_cards(printed: dict[str, list[Page]], paper: str) -> None:
+    width, height = SIZES[paper]
+    left, top = (width - 3 * CARD_WIDTH) / 2, (height - 3 * CARD_HEIGHT) / 2
+    backs = printed["cards"][1::2]
+    for number, page in enumerate(backs):
+        assert page.tags() == []
+        assert page.qr_codes() == {}
+        cards = min(9, 68 - 9 * number)
+        # Of a sheet turned over on its long edge, the left column is the right one.
+        expected = {(2 - slot % 3, slot // 3) for slot in range(cards)}
+        # The bottom of a card shows nothing but the colour of the back.
+        found = {
+            (column, row)
+            for column in range(3)
+            for row in range(3)
+            if page.colour(left + (column + 0.5) * CARD_WIDTH, top + (row + 1) * CARD_HEIGHT - 3) == (0x1F, 0x5F, 0x5B)
+        }
+        assert found == expected
+
+
+def test_pages_have_the_size_of_the_paper(printed: dict[str, list[Page]], paper: str) -> None:
+    for part, pages in printed.items():
+        for page in pages:
+            size = page.size if page.size[0] < page.size[1] else page.size[::-1]
+            assert np.allclose(size, SIZES[paper], atol=0.1), part
+
+
+def test_nothing_lies_within_the_margins(printed: dict[str, list[Page]]) -> None:
+    for part, pages in printed.items():
+        for number, page in enumerate(pages):
+            outside = np.ones(page.grey.shape, dtype=bool)
+            edge = int(5 * MM)
+            outside[edge:-edge, edge:-edge] = False
+            assert (page.grey[outside] == 255).all(), (part, number)
+            assert (page.grey[~outside] < 255).any(), (part, number)
+
+
+def test_decks_are_told_apart(tmp_path: Path) -> None:
+    for deck in range(DECKS):
+        (page,) = pages_of(print_game(PAPERS["a4"], deck, ["passes"]), tmp_path)
+        assert {piece_of_tag(tag.number) for tag in page.tags()} == {Piece(PieceKind.PASS, deck, seat) for seat in range(6)}
+        assert set(page.qr_codes()) == {f"CHEFSHAT/1/{deck}/P{seat}" for seat in range(6)}
+
+
+def test_the_drawings_are_those_of_the_project() -> None:
+    for copy in ASSETS.iterdir():
+        folder = "symbols" if copy.suffix == ".svg" else "font"
+        original = Path(__file__).parents[3] / "server/assets" / folder / copy.name
+        assert copy.read_bytes() == original.read_bytes(), copy.name
+
+
+def test_the_command_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "roles.pdf"
+    assert main(["print", "--only", "passes,roles", "--paper", "letter", "--backs", "--out", str(file)]) == 0
+    assert f"{file}: 4 pages" in capsys.readouterr().out
+    assert file.read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--paper", "a3"], "invalid choice: 'a3'"),
+        (["--deck", "7"], "invalid choice: 7"),
+        (["--only", "cards,dice"], "'dice' is not one of cards,"),
+        (["--only", ""], "'' is not one of cards,"),
+    ],
+)
+def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        main(["print", *arguments])
+    assert exit_info.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["print", "--only", "roles", "--out", str(tmp_path / "no" / "roles.pdf")]) == 1
+    assert f"cannot write {tmp_path / 'no' / 'roles.pdf'}: No such file or directory" in capsys.readouterr().err
