@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pypdfium2
 import zxingcpp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chefshat_robot.printing.canvas import Canvas
 
 DPI = 150
 MM = DPI / 25.4
-"""Pixels of a millimetre."""
+"""Pixels of a millimetre, nearly: see `Page.pixels_per_mm`."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Page:
         self.image = image
         self.size = size
         """Width and height, in mm."""
+        self.pixels_per_mm: NDArray[np.float64] = np.array([image.shape[1] / size[0], image.shape[0] / size[1]])
+        """Along x and y: a page is stretched to whole pixels."""
         self.grey: NDArray[np.uint8] = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
     def tags(self) -> list[Tag]:
@@ -54,8 +56,7 @@ class Page:
         corners, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(self.grey)
         found = []
         for number, quad in zip([] if numbers is None else np.ravel(numbers), corners, strict=True):
-            # A pixel's coordinates are those of its centre.
-            points = (np.asarray(quad).reshape(4, 2) + 0.5) / MM
+            points = self.points(quad)
             x, y = points.mean(axis=0)
             right, down = points[1] - points[0]
             edges = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1)
@@ -69,12 +70,18 @@ class Page:
         found = {}
         for code in zxingcpp.read_barcodes(self.grey, formats=zxingcpp.BarcodeFormats([zxingcpp.BarcodeFormat.QRCode])):
             corners = [code.position.top_left, code.position.top_right, code.position.bottom_right, code.position.bottom_left]
-            found[code.text] = (sum(point.x for point in corners) / 4 / MM, sum(point.y for point in corners) / 4 / MM)
+            x, y = self.points([(point.x, point.y) for point in corners]).mean(axis=0)
+            found[code.text] = (float(x), float(y))
         return found
+
+    def points(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Points in mm, shape (n, 2), of points in pixels, whose coordinates are those of their centres."""
+        return (np.asarray(pixels, dtype=np.float64).reshape(-1, 2) + 0.5) / self.pixels_per_mm
 
     def colour(self, x: float, y: float) -> tuple[int, int, int]:
         """The colour at a point in mm."""
-        red, green, blue = self.image[int(y * MM), int(x * MM)]
+        column, row = (np.array([x, y]) * self.pixels_per_mm).astype(int)
+        red, green, blue = self.image[row, column]
         return int(red), int(green), int(blue)
 
 

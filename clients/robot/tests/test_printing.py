@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from chefshat_robot import charuco, field
 from chefshat_robot.cli import main
-from chefshat_robot.deck import DECKS, Piece, PieceKind, piece_of_tag
+from chefshat_robot.deck import DECKS, FIELD_TAGS, HAND_TAGS, Piece, PieceKind, piece_of_tag
 from chefshat_robot.field import CARD_HEIGHT, CARD_TAG_CENTRE, CARD_TAG_SIZE, CARD_WIDTH
 from chefshat_robot.printing.canvas import ASSETS, PAPERS
 from chefshat_robot.printing.command import SECTIONS, print_game
+from chefshat_robot.printing.surfaces import FIELD, HAND
+from chefshat_robot.printing.tiles import FLAP, TOP, Tiling
 
 from .pages import MM, Page, Tag, pages_of
 
@@ -33,9 +38,9 @@ def printed(paper: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, l
 
 
 def close(tag: Tag, number: int, x: float, y: float, angle: float, size: float) -> bool:
-    """Whether a tag was found where it should be, to a quarter of a millimetre and a degree."""
+    """Whether a tag was found where it should be, to 0.15 mm and a degree."""
     turned = (tag.angle - angle + 180) % 360 - 180
-    return tag.number == number and np.hypot(tag.x - x, tag.y - y) < 0.25 and abs(turned) < 1 and abs(tag.size - size) < 0.25
+    return tag.number == number and np.hypot(tag.x - x, tag.y - y) < 0.15 and abs(turned) < 1 and abs(tag.size - size) < 0.15
 
 
 def check_pieces(pages: Sequence[Page], size: tuple[float, float], pieces: Sequence[Piece]) -> None:
@@ -82,6 +87,95 @@ def test_backs_lie_behind_their_cards(printed: dict[str, list[Page]], paper: str
             if page.colour(left + (column + 0.5) * CARD_WIDTH, top + (row + 1) * CARD_HEIGHT - 3) == (0x1F, 0x5F, 0x5B)
         }
         assert found == expected
+
+
+def assembled(pages: Sequence[Page], tiling: Tiling) -> Page:
+    """The sheets of a tiling cut and glued together: its part of each page, without flaps."""
+    width, height = tiling.tile
+    size = (round(tiling.width * MM), round(tiling.height * MM))
+    whole = np.full((size[1], size[0], 3), 255, dtype=np.uint8)
+    for number, page in enumerate(pages):
+        row, column = divmod(number, tiling.columns)
+        # A whole pixel of the result is a part of a pixel of the page.
+        left, top = column * width, row * height
+        page_left = (page.size[0] - width - FLAP) / 2
+        scale_x, scale_y = MM / page.pixels_per_mm
+        shift = np.array([[scale_x, 0.0, (left - page_left) * MM], [0.0, scale_y, (top - TOP) * MM]])
+        moved = cv2.warpAffine(page.image, shift, size)
+        x, y = slice(round(left * MM), round((left + width) * MM)), slice(round(top * MM), round((top + height) * MM))
+        whole[y, x] = moved[y, x]
+    return Page(whole, (tiling.width, tiling.height))
+
+
+def test_the_sheets_of_the_field_make_the_field(printed: dict[str, list[Page]]) -> None:
+    pages = printed["field"]
+    assert len(pages) == 6
+    whole = assembled(pages, FIELD)
+    tags = whole.tags()
+    assert len(tags) == 4
+    for number, (tag, (x, y)) in enumerate(zip(tags, field.corner_tags(), strict=True)):
+        assert close(tag, FIELD_TAGS + number, x, y, 0, field.FIELD_TAG_SIZE), tag
+    for place in field.places() + field.pass_places():
+        drawn, inside = outline(whole, place, 0.0), outline(whole, place, -1.5)
+        # The outline is dashed.
+        assert 0.4 < drawn < 0.9, (place, drawn)
+        assert inside < 0.1, (place, inside)
+
+
+def outline(page: Page, place: field.Place, wider: float) -> float:
+    """The part of a place's outline that is drawn; of an outline `wider` mm further out."""
+    width, height = extent(place)
+    half_x, half_y = width / 2 + wider, height / 2 + wider
+    # Without the rounded corners.
+    along_x, along_y = np.arange(-half_x + 6, half_x - 6, 0.2), np.arange(-half_y + 6, half_y - 6, 0.2)
+    points = [(x, side * half_y) for x in along_x for side in (-1, 1)] + [(side * half_x, y) for y in along_y for side in (-1, 1)]
+    return float(np.mean([sum(page.colour(place.x + x, place.y + y)) < 640 for x, y in points]))
+
+
+def test_the_sheets_of_the_hand_strip_make_the_strip(printed: dict[str, list[Page]]) -> None:
+    pages = printed["hand"]
+    assert len(pages) == 2
+    tags = assembled(pages, HAND).tags()
+    assert len(tags) == 4
+    for number, (tag, (x, y)) in enumerate(zip(tags, field.hand_tags(), strict=True)):
+        assert close(tag, HAND_TAGS + number, x, y, 0, CARD_TAG_SIZE), tag
+
+
+def test_cards_cover_neither_each_other_nor_codes() -> None:
+    """The geometry that is printed: places apart from each other, the tags of a hand's cards to be seen."""
+    boxes = [(place.x, place.y, *extent(place)) for place in field.places() + field.pass_places()]
+    tag = field.FIELD_TAG_SIZE * 10 / 8
+    boxes += [(x, y, tag, tag) for x, y in field.corner_tags()]
+    for number, (x, y, width, height) in enumerate(boxes):
+        assert width / 2 <= x <= field.WIDTH - width / 2
+        assert height / 2 <= y <= field.HEIGHT - height / 2
+        for other_x, other_y, other_width, other_height in boxes[:number]:
+            gap = max(abs(x - other_x) - (width + other_width) / 2, abs(y - other_y) - (height + other_height) / 2)
+            assert gap >= 3, (x, y, other_x, other_y)
+    hand = field.hand_places()
+    assert len(hand) == field.HAND_CARDS
+    quiet = CARD_TAG_CENTRE[0] + CARD_TAG_SIZE * 5 / 8
+    for place, following in pairwise(hand):
+        assert following.x - place.x >= quiet
+    (left, _), (right, _), _, _ = field.hand_tags()
+    assert hand[0].x - CARD_WIDTH / 2 >= left + CARD_TAG_SIZE * 5 / 8
+    assert hand[-1].x + CARD_WIDTH / 2 <= right - CARD_TAG_SIZE * 5 / 8
+
+
+def extent(place: field.Place) -> tuple[float, float]:
+    """Width and height of a card on a place, in mm."""
+    return (CARD_WIDTH, CARD_HEIGHT) if place.angle == 0 else (CARD_HEIGHT, CARD_WIDTH)
+
+
+def test_the_calibration_sheet_is_the_board_of_the_calibration(printed: dict[str, list[Page]]) -> None:
+    (page,) = printed["calibration"]
+    corners, numbers, _, markers = cv2.aruco.CharucoDetector(charuco.board()).detectBoard(page.grey)
+    assert np.ravel(numbers).tolist() == list(range((charuco.COLUMNS - 1) * (charuco.ROWS - 1)))
+    assert sorted(np.ravel(markers).tolist()) == list(range(35))
+    found = page.points(corners)
+    expected = np.asarray(charuco.board().getChessboardCorners())[:, :2] + [(page.size[0] - 260) / 2, 6.5]
+    assert np.abs(found - expected).max() < 0.1
+    assert page.tags() == []
 
 
 def test_pages_have_the_size_of_the_paper(printed: dict[str, list[Page]], paper: str) -> None:

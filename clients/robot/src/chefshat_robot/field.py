@@ -50,9 +50,9 @@ def pass_places() -> list[Place]:
     """The place of each seat's pass card, index = seat: bottom, left, top, right."""
     return [
         Place("pass 0", 280.0, 348.0, 90.0),
-        Place("pass 1", 45.0, 249.0, 0.0),
+        Place("pass 1", 45.0, 256.0, 0.0),
         Place("pass 2", 280.0, 52.0, 90.0),
-        Place("pass 3", 515.0, 249.0, 0.0),
+        Place("pass 3", 515.0, 256.0, 0.0),
     ]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chefshat_robot.cli import CommandError
 from chefshat_robot.deck import DECKS
-from chefshat_robot.printing import sheets
+from chefshat_robot.printing import sheets, surfaces
 from chefshat_robot.printing.canvas import PAPERS, Canvas, Paper
 
 EXAMPLE = """\
@@ -24,6 +24,9 @@ SECTIONS: dict[str, Callable[[Canvas, int, bool], None]] = {
     "cards": lambda canvas, deck, backs: sheets.draw_pieces(canvas, sheets.cards(deck), "cards", backs=backs),
     "roles": lambda canvas, deck, backs: sheets.draw_pieces(canvas, sheets.roles(deck), "role cards", backs=backs),
     "passes": lambda canvas, deck, backs: sheets.draw_pieces(canvas, sheets.passes(deck), "pass cards", backs=backs),
+    "field": lambda canvas, deck, backs: surfaces.draw_field(canvas),
+    "hand": lambda canvas, deck, backs: surfaces.draw_hand(canvas),
+    "calibration": lambda canvas, deck, backs: surfaces.draw_calibration(canvas),
 }
 """What can be printed, in the order of the pages: functions of the canvas, the number of the deck, and whether to add backs."""
 
