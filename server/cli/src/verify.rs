@@ -130,10 +130,10 @@ fn check(file: &Path) -> Result<Fits, Problem> {
 
 /// How the deals of a record were verified, in words.
 pub(super) fn deals(header: &v1::RecordHeader) -> &'static str {
-    use v1::GameOrigin::{Branched, Imported, Scripted};
+    use v1::GameOrigin::{Branched, Imported, Physical, Scripted};
     let committed = !header.seed_commitment.is_empty();
     match (header.origin(), committed) {
-        (Imported, _) => "cards of a real table, as far as they are known",
+        (Imported | Physical, _) => "cards of a real table, as far as they are known",
         (Scripted, true) => "first hands scripted, then a committed seed",
         (Scripted, false) => "first hands scripted, then a fixed seed",
         (Branched, true) => "branched from a record, then a committed seed",

@@ -110,7 +110,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "origin",
         Type::Text,
-        "Origin of the game: `dealt`, `fixed_seed`, `scripted`, `branched` or `imported`.",
+        "Origin of the game: `dealt`, `fixed_seed`, `scripted`, `branched`, `imported` or `physical`.",
         |row| row.game.origin.into(),
     ),
     Column::new(
@@ -342,7 +342,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "source",
         Type::Text,
-        "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, with its reason), `recorded` (taken over from the parent game of a branch).",
+        "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, with its reason), `recorded` (taken over from the parent game of a branch), `table` (reported from a physical table).",
         |row| row.source.into(),
     ),
     Column::new(

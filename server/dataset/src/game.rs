@@ -5,10 +5,10 @@ use std::sync::Arc;
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, record_line::Line};
 
-use chefshat_record::convert::{kind_name, rules_from_proto};
+use chefshat_record::convert::{has_real_cards, kind_name, rules_from_proto};
 use chefshat_record::replay::{ReplayError, replay};
 
-/// The origin of games of real tables.
+/// The origin of imported games.
 pub(super) const IMPORTED: &str = "imported";
 
 /// The values shared by all rows of a game.
@@ -17,6 +17,8 @@ pub(super) struct GameInfo {
     pub(super) game_id: String,
     pub(super) room_name: String,
     pub(super) origin: &'static str,
+    /// Whether it was played with real cards, so that some may be unknown.
+    pub(super) real_cards: bool,
     pub(super) rules: String,
     pub(super) rule_set: RuleSet,
     pub(super) rules_version: u32,
@@ -97,7 +99,9 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
             v1::GameOrigin::Scripted => "scripted",
             v1::GameOrigin::Branched => "branched",
             v1::GameOrigin::Imported => IMPORTED,
+            v1::GameOrigin::Physical => "physical",
         },
+        real_cards: has_real_cards(header.origin()),
         rules: serde_json::to_string(rules).map_err(|error| at_header(error.to_string()))?,
         rules_version: header.rules_version,
         created_at: i64::try_from(header.created_at_ms)

@@ -94,8 +94,8 @@ impl Gatherer {
                 }
                 Some(Kind::Vacated(vacated)) => self.set_participant(vacated.seat, None),
                 Some(Kind::ShiftStarted(_)) => {
-                    // Only imported records lack cards.
-                    let all = self.rows.game.origin != IMPORTED;
+                    // Only records of games with real cards lack some.
+                    let all = !self.rows.game.real_cards;
                     let known_gifts = KnownGifts {
                         gave: all,
                         received: all,
@@ -294,5 +294,6 @@ fn source_name(source: DecisionSource) -> &'static str {
         DecisionSource::Disconnected => "disconnected",
         DecisionSource::Substitute => "substitute",
         DecisionSource::Recorded => RECORDED,
+        DecisionSource::Table => "table",
     }
 }

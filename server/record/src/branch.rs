@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use chefshat_engine::{ActionId, Game, RuleSet, Script, Seed, TakenOver};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-use crate::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_cards};
+use crate::convert::{
+    FieldProblem, has_real_cards, rules_from_proto, script_from_proto, seat_cards,
+};
 use crate::replay::{Moment, ReplayError, reveal, walk};
 
 /// The beginning of a recorded game up to a branch point, sufficient to replay it
@@ -47,15 +49,15 @@ pub enum BranchError {
     /// The game was over at the point.
     #[error("after {0} decisions the recorded game was over; take over fewer")]
     Over(u64),
-    /// An imported game with unknown hands.
+    /// A game with real cards and unknown hands.
     #[error("some hands of the recorded game are unknown")]
     HandsUnknown,
-    /// An imported game has no seed for later Shifts.
+    /// A game with real cards has no seed for later Shifts.
     #[error(
         "the recorded game was played with real cards: it can only be branched in its first Shift"
     )]
     RealCards,
-    /// An imported game with unknown decisions.
+    /// A game with real cards and unknown decisions.
     #[error("some decisions of the recorded game before this point are unknown")]
     DecisionsUnknown,
 }
@@ -105,7 +107,7 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
         .and_then(|start| start.scripted.clone());
     let shifts = collector.shifts.iter().copied();
     let seeds = Seeds::of(header, lines);
-    let (script, later_deals) = if header.origin() == v1::GameOrigin::Imported {
+    let (script, later_deals) = if has_real_cards(header.origin()) {
         if !first_deal.known {
             return Err(BranchError::HandsUnknown);
         }
@@ -130,7 +132,7 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
         taken_over: seeds.parts(&collector.actions),
         later_deals,
     };
-    // Without its missing decisions, an imported game continues differently.
+    // Without its missing decisions, a game with real cards continues differently.
     let any = Seed([0; 32]);
     let same = collector.at_point.is_some_and(|mut game| {
         game.reseed(any);

@@ -103,8 +103,10 @@ impl SeatOutcome {
 /// Why a finished game is unrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Unrated {
-    /// The deals came from a given seed or hands.
-    #[error("the deals did not come from a seed committed by the server")]
+    /// The deals came from a given seed or hands, or the game was imported.
+    #[error(
+        "the deals came neither from a seed committed by the server nor from the cards of a physical room"
+    )]
     NotDealt,
     /// A substitute played for a participant.
     #[error("a substitute played")]
@@ -291,7 +293,7 @@ fn place(seats: &mut [SeatOutcome], standings: &[v1::Standing]) -> Option<()> {
 
 fn unrated(origin: GameOrigin, seats: &[SeatOutcome]) -> Option<Unrated> {
     let known: BTreeSet<Identity> = seats.iter().map(SeatOutcome::identity).collect();
-    if origin != GameOrigin::Dealt {
+    if !matches!(origin, GameOrigin::Dealt | GameOrigin::Physical) {
         Some(Unrated::NotDealt)
     } else if seats.iter().any(|seat| seat.statistics.substituted) {
         Some(Unrated::Substituted)

@@ -338,6 +338,7 @@ fn cause(source: v1::DecisionSource) -> Option<&'static str> {
         v1::DecisionSource::Substitute => Some("substitute"),
         v1::DecisionSource::Unspecified
         | v1::DecisionSource::Agent
-        | v1::DecisionSource::Recorded => None,
+        | v1::DecisionSource::Recorded
+        | v1::DecisionSource::Table => None,
     }
 }

@@ -44,6 +44,10 @@ pub fn fills_from_proto(
                 reserved_for: kind_from_proto("seats", *kind)?,
             }),
             Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
+            Some(FilledBy::AtTable(_)) => Err(FieldProblem::new(
+                "seats",
+                "only a physical room has players at the table",
+            )),
             Some(FilledBy::BuiltInAgent(name)) => agent("seats", name)?
                 .map(Fill::BuiltIn)
                 .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
@@ -215,6 +219,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                     Fill::Replay(player) => Some(player_to_proto(player)),
                     _ => None,
                 },
+                at_table: false,
             }
         })
         .collect()

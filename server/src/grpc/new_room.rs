@@ -34,6 +34,13 @@ pub(super) async fn new_room(
 ) -> Result<NewRoom, Status> {
     let request_id = request_id(&std::mem::take(&mut request.request_id))?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
+    if request.physical {
+        let problem = "this server does not host physical rooms yet";
+        return Err(field(
+            "SEATS_REFUSED",
+            &FieldProblem::new("physical", problem),
+        ));
+    }
     let name = convert::checked_name("name", &request.name, 0)
         .map_err(|problem| field("NAME_REFUSED", &problem))?;
     let policy = supported_policy(recorded, &request.policy.unwrap_or_default())

@@ -88,6 +88,7 @@ impl RoomService for RoomCalls {
             room: Some(room),
             join_code: created.join_code,
             owner_token: created.owner.to_text(),
+            table_ticket: String::new(),
         }))
     }
 

@@ -8,6 +8,9 @@ use super::view::GameView;
 use crate::kind::kind_name;
 use crate::numbers::ordinal;
 
+/// Longest text of a referee, characters.
+const MAX_TEXT: usize = 200;
+
 /// A line of the story.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Line {
@@ -84,6 +87,16 @@ fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
             let label = shown.expression.as_ref().map_or("", |it| &it.label);
             about(shown.seat, format!("shows {}", clean(label, 40)))
         }
+        Kind::HandReported(reported) => {
+            let seat = reported.hand.as_ref().map_or(0, |hand| hand.seat);
+            about(seat, "has a known hand".into())
+        }
+        Kind::Violation(violation) => plain(format!("⚠ {}", clean(&violation.text, MAX_TEXT))),
+        Kind::Correction(correction) => {
+            plain(format!("corrected: {}", clean(&correction.text, MAX_TEXT)))
+        }
+        Kind::TablePaused(table) if table.paused => heading("the game is paused".into()),
+        Kind::TablePaused(_) => heading("the game is resumed".into()),
     };
     vec![line]
 }
@@ -172,6 +185,7 @@ pub(super) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
         v1::DecisionSource::Agent
         | v1::DecisionSource::Substitute
         | v1::DecisionSource::Recorded
+        | v1::DecisionSource::Table
         | v1::DecisionSource::Unspecified => None,
     }
 }

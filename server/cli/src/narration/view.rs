@@ -195,7 +195,11 @@ impl GameView {
             }
             Kind::SpecialActionDeclared(_)
             | Kind::ExpressionShown(_)
-            | Kind::ServerRestarted(_) => {}
+            | Kind::ServerRestarted(_)
+            | Kind::HandReported(_)
+            | Kind::Violation(_)
+            | Kind::Correction(_)
+            | Kind::TablePaused(_) => {}
         }
     }
 

@@ -73,8 +73,10 @@ enum OriginArg {
     Scripted,
     /// Branched from another record.
     Branched,
-    /// Played with physical cards and imported.
+    /// Played with real cards elsewhere and imported.
     Imported,
+    /// Played with real cards in a physical room.
+    Physical,
 }
 
 impl FilterArgs {
@@ -92,6 +94,7 @@ impl FilterArgs {
             Some(OriginArg::Scripted) => v1::GameOrigin::Scripted,
             Some(OriginArg::Branched) => v1::GameOrigin::Branched,
             Some(OriginArg::Imported) => v1::GameOrigin::Imported,
+            Some(OriginArg::Physical) => v1::GameOrigin::Physical,
         };
         v1::RecordFilter {
             state: state.into(),

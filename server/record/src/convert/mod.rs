@@ -12,7 +12,7 @@ mod start;
 pub use events::{By, event_kind, final_table, seat_cards, seat_number, special_to_proto};
 pub(crate) use expression::LAST_MS;
 pub use expression::check_expression;
-pub use kind::{kind_from_name, kind_name};
+pub use kind::{has_real_cards, kind_from_name, kind_name};
 pub use observation::{
     decision_kind, observation_from_proto, observation_to_proto, put_requirement,
 };

@@ -87,6 +87,7 @@ fn of_event(kind: &Kind) -> Option<Excess> {
         Kind::GameEnded(ended) => first([("standings", ended.standings.len(), MAX_SEATS)])
             .or_else(|| of_reveal(ended.reveal.as_ref())),
         Kind::GameAborted(aborted) => of_reveal(aborted.reveal.as_ref()),
+        Kind::HandReported(reported) => of_hands(reported.hand.as_slice()),
         // No lists.
         Kind::Seated(_)
         | Kind::Vacated(_)
@@ -99,7 +100,10 @@ fn of_event(kind: &Kind) -> Option<Excess> {
         | Kind::Pass(_)
         | Kind::PizzaDone(_)
         | Kind::SeatFinished(_)
-        | Kind::ExpressionShown(_) => None,
+        | Kind::ExpressionShown(_)
+        | Kind::Violation(_)
+        | Kind::Correction(_)
+        | Kind::TablePaused(_) => None,
     }
 }
 

@@ -5,7 +5,7 @@ use chefshat_proto::v1::{self, DecisionSource as Source};
 
 use super::difference::must_be;
 use super::header::Setup;
-use crate::convert::{action_id, decision_kind, invalid_reward, seat_number};
+use crate::convert::{action_id, decision_kind, has_real_cards, invalid_reward, seat_number};
 
 /// Invalid attempts before the default decision, even if the policy sets no limit.
 const MAX_ATTEMPTS: u32 = 10_000;
@@ -21,6 +21,8 @@ pub(super) struct SeatClock {
     pub(super) bank_ms: u32,
     /// Whether the seat is a built-in agent's.
     pub(super) built_in: bool,
+    /// Whether its player sits at the physical table.
+    pub(super) at_table: bool,
     /// Whether a substitute plays for the seat.
     pub(super) substituted: bool,
 }
@@ -132,23 +134,26 @@ impl OpenDecision<'_> {
         }
         let SeatClock {
             built_in,
+            at_table,
             substituted,
             ..
         } = *self.clock;
-        let by_server = substituted || built_in;
+        let by_server = substituted || built_in || at_table;
         let possible = match source {
             Source::Unspecified => false,
-            Source::Agent => !substituted,
+            Source::Agent => !substituted && !at_table,
             Source::Timeout | Source::Disconnected => !by_server,
             Source::Substitute => substituted,
-            Source::Invalid | Source::Recorded => true,
+            Source::Invalid | Source::Recorded => !at_table,
+            Source::Table => self.setup.origin == v1::GameOrigin::Physical,
         };
-        let real_table = self.setup.origin == v1::GameOrigin::Imported;
-        if !possible || (real_table && source != Source::Agent) {
-            let whose = match (real_table, built_in, substituted) {
+        let imported = self.setup.origin == v1::GameOrigin::Imported;
+        if !possible || (imported && source != Source::Agent) {
+            let whose = match (imported, at_table, built_in, substituted) {
                 (true, ..) => "every player of a real table decides",
-                (_, true, _) => "the seat is a built-in agent's",
-                (_, _, true) => "a substitute plays for the seat",
+                (_, true, ..) => "the seat's player sits at the table",
+                (_, _, true, _) => "the seat is a built-in agent's",
+                (_, _, _, true) => "a substitute plays for the seat",
                 _ => "the seat's own agent plays",
             };
             return Err(format!("source is {name}, but {whose}"));
@@ -183,24 +188,40 @@ impl OpenDecision<'_> {
         let time = record.decision_time_us;
         let timed = matches!(
             record.source(),
-            Source::Agent | Source::Timeout | Source::Disconnected | Source::Invalid
+            Source::Agent
+                | Source::Timeout
+                | Source::Disconnected
+                | Source::Invalid
+                | Source::Table
         );
-        if time > 0 && (!timed || self.clock.built_in) {
+        if time > 0 && (!timed || (self.clock.built_in && record.source() != Source::Table)) {
             return Err(must_be("decisionTimeUs", time, 0));
         }
         // Both ends of the span are truncated to milliseconds.
         let most = self.since_last_ms.saturating_add(1).saturating_mul(1000);
-        if time > most && self.setup.origin != v1::GameOrigin::Imported {
+        if time > most && !has_real_cards(self.setup.origin) {
             return Err(format!(
                 "decisionTimeUs is {time}, but only {} ms passed since the previous decision",
                 self.since_last_ms
             ));
         }
+        let bank_ms = self.clock.bank_ms;
+        if record.source() == Source::Table {
+            // No clock runs for a player at the table.
+            return match record.bank_left_ms == bank_ms {
+                true => Ok(()),
+                false => Err(must_be("bankLeftMs", record.bank_left_ms, bank_ms)),
+            };
+        }
         let beyond_us = time.saturating_sub(u64::from(self.clock.decision_time_ms) * 1000);
-        let bank_us = u64::from(self.clock.bank_ms) * 1000;
+        let bank_us = u64::from(bank_ms) * 1000;
         let left = bank_us.saturating_sub(beyond_us) / 1000;
         // The time was truncated to microseconds after the bank was charged.
-        let least = bank_us.saturating_sub(beyond_us + u64::from(beyond_us > 0)) / 1000;
+        let least = match self.setup.origin {
+            // Decisions that a correction voided took their time too.
+            v1::GameOrigin::Physical => 0,
+            _ => bank_us.saturating_sub(beyond_us + u64::from(beyond_us > 0)) / 1000,
+        };
         if (least..=left).contains(&record.bank_left_ms.into()) {
             Ok(())
         } else {

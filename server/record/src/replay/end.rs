@@ -89,7 +89,7 @@ impl Replay<'_> {
     }
 
     fn check_reveal(&self, reveal: Option<&v1::SeedReveal>) -> Result<(), Fault> {
-        if self.imported.is_some() {
+        if self.physical.is_some() {
             return match reveal {
                 Some(_) => Err("reveal is present, but a real table has no seed".into()),
                 None => Ok(()),

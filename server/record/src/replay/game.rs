@@ -42,8 +42,8 @@ pub(super) struct Replay<'a> {
     pub(super) setup: Setup,
     pub(super) seats: Seats,
     seeds: Option<Seeds>,
-    /// The Shifts of an imported game.
-    pub(super) imported: Option<PhysicalGame>,
+    /// The Shifts of a game with real cards.
+    pub(super) physical: Option<PhysicalGame>,
     pub(super) game: Option<Game>,
     /// Events that must follow, with their rewards.
     expected: VecDeque<(Kind, Vec<v1::SeatReward>)>,
@@ -66,7 +66,9 @@ impl<'a> Replay<'a> {
             header,
             lines,
             seeds: None,
-            imported: (setup.origin == v1::GameOrigin::Imported)
+            physical: setup
+                .physical
+                .is_some()
                 .then(|| PhysicalGame::new(setup.rules, facts_of_record(&setup.rules, lines))),
             setup,
             game: None,
@@ -86,12 +88,12 @@ impl<'a> Replay<'a> {
 
     /// Whether each hand is known, and whether it is known to contain the Golden card or not.
     pub(super) fn known(&self) -> (BySeat<bool>, BySeat<bool>) {
-        match (&self.imported, &self.game) {
-            (Some(imported), Some(game)) => {
-                (imported.hands_known(game), imported.golden_known(game))
+        match (&self.physical, &self.game) {
+            (Some(physical), Some(game)) => {
+                (physical.hands_known(game), physical.golden_known(game))
             }
-            (imported, _) => {
-                let all = BySeat::filled(self.setup.rules.players(), imported.is_none());
+            (physical, _) => {
+                let all = BySeat::filled(self.setup.rules.players(), physical.is_none());
                 (all, all)
             }
         }
@@ -144,9 +146,9 @@ impl<'a> Replay<'a> {
             .as_mut()
             .ok_or("a decision, but the game has not started")?;
         if self
-            .imported
+            .physical
             .as_ref()
-            .is_some_and(|imported| !imported.is_open())
+            .is_some_and(|physical| !physical.is_open())
         {
             return Err("a decision, but its Shift has not started".into());
         }
@@ -176,9 +178,9 @@ impl<'a> Replay<'a> {
         let mut events = Vec::new();
         game.apply(action, |event| events.push(event))
             .map_err(|error| error.to_string())?;
-        if let Some(imported) = &mut self.imported {
-            imported.count_decision(open.seat, open.kind);
-            imported
+        if let Some(physical) = &mut self.physical {
+            physical.count_decision(open.seat, open.kind);
+            physical
                 .advance(game, &mut events)
                 .map_err(|error| error.to_string())?;
         }
@@ -198,8 +200,8 @@ impl<'a> Replay<'a> {
     fn expect(&mut self, events: &[Event], by: By) {
         let space = self.setup.rules.actions();
         for (event, rewards) in with_rewards(events, &self.setup.rules, self.setup.scheme) {
-            let event = match &self.imported {
-                Some(imported) => imported.redact(event.clone()),
+            let event = match &self.physical {
+                Some(physical) => physical.redact(event.clone()),
                 None => event.clone(),
             };
             if let Some(kind) = event_kind(&event, space, by) {
@@ -283,9 +285,9 @@ impl<'a> Replay<'a> {
         }
         self.seats.begin(started, self.header, &self.setup.rules)?;
         self.last_decision_ms = self.elapsed_ms;
-        if let (Some(imported), Some(start)) = (&mut self.imported, &self.setup.imported) {
+        if let (Some(physical), Some(start)) = (&mut self.physical, &self.setup.physical) {
             let mut events = Vec::new();
-            self.game = imported
+            self.game = physical
                 .start(start, &mut events)
                 .map_err(|error| error.to_string())?;
             self.expect(&events, NO_DECISION);
@@ -330,12 +332,12 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
-    /// Checks a line of an imported game against the facts before it.
+    /// Checks a line of a game with real cards against the facts before it.
     fn check_facts(&self, line: usize) -> Result<(), Fault> {
         match self
-            .imported
+            .physical
             .as_ref()
-            .and_then(|imported| imported.contradiction(line))
+            .and_then(|physical| physical.contradiction(line))
         {
             Some(problem) => Err(problem.into()),
             None => Ok(()),

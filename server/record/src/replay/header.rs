@@ -10,8 +10,8 @@ use chefshat_referee::StartState;
 use super::difference::{difference, must_be};
 use super::seed::Part;
 use crate::convert::{
-    LAST_MS, action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto,
-    script_from_proto,
+    LAST_MS, action_space, has_real_cards, reward_scheme_from_proto, rules_from_proto,
+    rules_to_proto, script_from_proto,
 };
 use crate::import::start_of_header;
 use crate::jsonl::FORMAT_VERSION;
@@ -31,8 +31,8 @@ pub(super) struct Setup {
     pub(super) max_invalid_attempts: u32,
     /// The first Shift, if its hands were given.
     pub(super) script: Option<Script>,
-    /// The start of an imported game.
-    pub(super) imported: Option<StartState>,
+    /// The start of a game with real cards.
+    pub(super) physical: Option<StartState>,
     /// The decisions taken over from the parent game.
     pub(super) taken_over: Vec<Part>,
 }
@@ -78,12 +78,11 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         .filter(|origin| *origin != v1::GameOrigin::Unspecified)
         .ok_or("origin is missing or unknown")?;
     check_commitment(origin, header.seed_commitment.len())?;
-    let imported = origin == v1::GameOrigin::Imported;
     let scripted = header
         .start
         .as_ref()
         .and_then(|start| start.scripted.as_ref());
-    let imported = imported
+    let physical = has_real_cards(origin)
         .then(|| start_of_header(scripted, &rules))
         .transpose()
         .map_err(|problem| format!("start.scripted.{problem}"))?;
@@ -95,7 +94,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         origin,
         max_invalid_attempts: policy.max_invalid_attempts(),
         script,
-        imported,
+        physical,
         taken_over,
     })
 }
@@ -194,7 +193,9 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
 fn check_commitment(origin: v1::GameOrigin, bytes: usize) -> Result<(), String> {
     let (committed, fixed) = match origin {
         v1::GameOrigin::Dealt => (true, false),
-        v1::GameOrigin::FixedSeed | v1::GameOrigin::Imported => (false, true),
+        v1::GameOrigin::FixedSeed | v1::GameOrigin::Imported | v1::GameOrigin::Physical => {
+            (false, true)
+        }
         _ => (true, true),
     };
     match bytes {
@@ -254,7 +255,7 @@ fn check_start(
     let script = start
         .scripted
         .as_ref()
-        .filter(|_| origin != Imported)
+        .filter(|_| !has_real_cards(origin))
         .map(|script| script_from_proto(script, rules))
         .transpose()
         .map_err(|problem| format!("start.scripted.{problem}"))?;

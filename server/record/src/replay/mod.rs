@@ -1,6 +1,6 @@
 //! Verifies a record by replaying it: the rule engine applies its decisions again, and every line
 //! must be exactly what follows. The first line that does not is reported. Files are read in
-//! [`crate::jsonl`]; imported games are completed in [`crate::import`].
+//! [`crate::jsonl`]; games with real cards are completed by `chefshat-referee`.
 
 mod decision;
 mod difference;
@@ -31,7 +31,7 @@ pub struct Moment<'a> {
     /// The game before a decision, or after the decision whose events follow. `None` before the
     /// start.
     pub game: Option<&'a Game>,
-    /// Whether each hand is known; only imported games have unknown hands. `game` then has a
+    /// Whether each hand is known; only games with real cards have unknown hands. `game` then has a
     /// possible hand.
     pub hands_known: BySeat<bool>,
     /// Whether it is also known if each hand contains the Golden card. If not, `game` may have the

@@ -1,5 +1,5 @@
-//! Checks the events of the room: seating, connections, substitution and expressions. They do not
-//! affect the game.
+//! Checks the events of the room: seating, connections, substitution, expressions, and what was
+//! reported from a physical table. They do not affect the game.
 
 use chefshat_engine::{RuleSet, Seat};
 use chefshat_proto::v1::{self, game_event::Kind};
@@ -39,6 +39,7 @@ impl Seats {
                             .and_then(|clock| clock.bank_ms)
                             .unwrap_or(policy.bank_ms()),
                         built_in,
+                        at_table: seat.at_table,
                         substituted: false,
                     }
                 })
@@ -106,9 +107,36 @@ impl Seats {
                 self.seat("expressionShown", shown.seat)?;
                 check_shown("expressionShown", shown.expression.as_ref(), false)?;
             }
+            Kind::HandReported(reported) => {
+                self.at_a_table(header)?;
+                let hand = reported.hand.as_ref().ok_or("handReported has no hand")?;
+                self.seat("handReported", hand.seat)?;
+            }
+            Kind::Violation(violation) => {
+                self.at_a_table(header)?;
+                if let Some(seat) = violation.seat {
+                    self.seat("violation", seat)?;
+                }
+            }
+            Kind::Correction(correction) => {
+                self.at_a_table(header)?;
+                if correction.first_void != 0 {
+                    return Err(must_be("correction.firstVoid", correction.first_void, 0));
+                }
+            }
+            Kind::TablePaused(_) => self.at_a_table(header)?,
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Checks that an event of a physical table can be in this record.
+    fn at_a_table(&self, header: &v1::RecordHeader) -> Result<(), String> {
+        match header.origin() {
+            v1::GameOrigin::Physical if self.begun => Ok(()),
+            v1::GameOrigin::Physical => Err("the game has not started".into()),
+            _ => Err("only the game of a physical table has this event".into()),
+        }
     }
 
     /// Checks an expression for the record only.
