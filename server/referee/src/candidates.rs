@@ -166,7 +166,7 @@ impl<'a> Candidates<'a> {
     pub(crate) fn new(puzzle: &'a Puzzle<'a>, pair: ExchangePair, room: &Counts) -> Self {
         let opens = [pair.chooser, pair.forced]
             .into_iter()
-            .any(|seat| puzzle.tally.opener == Some(seat));
+            .any(|seat| puzzle.tally.has_top(seat));
         let opening_cards: &[OpeningCard] = if opens {
             &[OpeningCard::Kept, OpeningCard::Received]
         } else {

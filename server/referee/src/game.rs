@@ -3,7 +3,8 @@
 //! own; cards that were not stated are redacted from the events.
 
 use chefshat_engine::{
-    Action, BySeat, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat, SeatOrder,
+    Action, BySeat, Cards, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat,
+    SeatOrder,
 };
 
 use crate::complete::{Completer, Contradiction};
@@ -81,6 +82,29 @@ impl PhysicalGame {
             .as_ref()
             .filter(|found| found.line == line)
             .map(|found| found.problem.as_str())
+    }
+
+    /// The reason why the facts contradict each other, if they do.
+    pub fn problem(&self) -> Option<&str> {
+        self.contradiction
+            .as_ref()
+            .map(|found| found.problem.as_str())
+    }
+
+    /// Whether the gift of each seat is known; true if it gives none.
+    pub fn gifts_known(&self) -> BySeat<bool> {
+        self.plan
+            .as_ref()
+            .map_or_else(|| self.all(false), |plan| plan.given_known)
+    }
+
+    /// The hand of a seat as dealt, if it is known, with the Golden card.
+    pub fn dealt(&self, seat: Seat) -> Option<Cards> {
+        let plan = self.plan.as_ref()?;
+        let hand = plan.dealt[seat];
+        let top = Face::new(self.rules.faces())?;
+        let golden = plan.dealt_known.golden || hand.count(top) == 0;
+        (plan.dealt_known.hands[seat] && golden).then_some(hand)
     }
 
     /// Continues after a decision: starts the next Shift or applies unstated decisions.
@@ -180,6 +204,10 @@ impl PhysicalGame {
         self.shifts.get(self.started.checked_sub(1)?)
     }
 
+    fn choosing(&self) -> Option<Seat> {
+        self.current().and_then(|shift| shift.choosing)
+    }
+
     fn start_shift(
         &mut self,
         shift: u32,
@@ -218,6 +246,7 @@ impl PhysicalGame {
             let planned = match open.kind {
                 DecisionKind::Turn => None,
                 kind if self.is_pending(open.seat, kind) => None,
+                DecisionKind::Exchange if self.choosing() == Some(open.seat) => None,
                 DecisionKind::SpecialAction if self.continues_after(open.kind) => {
                     Some(Action::Decline)
                 }
@@ -243,10 +272,13 @@ impl PhysicalGame {
         let later = |(_, fact): &(usize, Fact)| match fact {
             Fact::Hand(..) | Fact::Special { .. } => false,
             Fact::Gives(..) => kind == DecisionKind::SpecialAction,
-            Fact::Given(..) | Fact::Turn(..) => true,
+            Fact::Held(..) | Fact::Given(..) | Fact::Turn(..) => true,
         };
-        self.current()
-            .is_some_and(|shift| shift.facts.iter().any(later))
+        let special_is_over = kind == DecisionKind::SpecialAction && self.choosing().is_some();
+        special_is_over
+            || self
+                .current()
+                .is_some_and(|shift| shift.facts.iter().any(later))
     }
 
     /// The next card of the planned gift.

@@ -2,7 +2,7 @@
 //! who may hold the Golden card. A hand, a gift or the golden opening reveals it; other plays do
 //! not.
 
-use chefshat_engine::{BySeat, Cards, Face, Opening, Seat};
+use chefshat_engine::{BySeat, Cards, Face, Seat};
 
 use crate::counts::{Counts, size_of};
 use crate::puzzle::{Kept, Puzzle};
@@ -28,9 +28,13 @@ pub(crate) struct KnownCards {
 }
 
 impl Puzzle<'_> {
-    /// What is known of the hands as dealt and after the exchange. Known hands are exact in the
-    /// completed Shift.
-    pub(crate) fn known(&self, dealt: &BySeat<Cards>, gifts: &BySeat<Counts>) -> (Known, Known) {
+    /// What is known of the hands as dealt and after the exchange, and whose gifts are known. Known
+    /// hands are exact in the completed Shift.
+    pub(crate) fn known(
+        &self,
+        dealt: &BySeat<Cards>,
+        gifts: &BySeat<Counts>,
+    ) -> (Known, Known, BySeat<bool>) {
         let known = self.known_cards();
         let (golden_dealt, golden_held) = self.golden_known(&known, dealt, gifts);
         (
@@ -42,6 +46,7 @@ impl Puzzle<'_> {
                 hands: known.held,
                 golden: golden_held,
             },
+            known.given,
         )
     }
 
@@ -52,9 +57,9 @@ impl Puzzle<'_> {
         let all_dealt = usize::from(rules.hand_size()) * players == usize::from(rules.deck_size());
         let mut known = KnownCards {
             dealt: tally.dealt.map(|hand| hand.is_some()),
-            held: tally
-                .played
-                .map(|counts| size_of(&counts) == rules.hand_size()),
+            held: BySeat::from_fn(players, |seat| {
+                tally.held[seat].is_some() || size_of(&tally.played[seat]) == rules.hand_size()
+            }),
             given: BySeat::from_fn(players, |seat| {
                 self.gives_to(seat).is_none() || tally.given[seat].is_some()
             }),
@@ -102,14 +107,12 @@ impl Puzzle<'_> {
                 } else {
                     self.partner(seat)
                 };
-                let opens = match tally.opener {
-                    Some(opener) if self.rules.opening() == Opening::Golden => {
-                        holder == Some(opener)
-                    }
-                    _ => true,
-                };
+                let opens = tally.holder.is_none_or(|stated| holder == Some(stated));
+                let as_held = (tally.held.iter()).all(|(seat, hand)| {
+                    hand.is_none_or(|hand| hand.has_golden() == (holder == Some(seat)))
+                });
                 let as_given = tally.given[seat].is_none_or(|gift| gift.has_golden() == goes);
-                (stays || goes) && opens && as_given
+                (stays || goes) && opens && as_held && as_given
             })
     }
 
@@ -124,13 +127,10 @@ impl Puzzle<'_> {
         let top = Face::new(self.rules.faces());
         let dealt_top = |seat: Seat| top.map_or(0, |top| dealt[seat].count(top));
         let gave_none = |seat: Seat| known.given[seat] && gifts[seat][self.top] == 0;
-        let opener = tally
-            .opener
-            .filter(|_| self.rules.opening() == Opening::Golden);
         let from: Vec<Seat> = (dealt.seats())
             .filter(|&seat| {
                 let had_none = known.dealt[seat] && dealt_top(seat) == 0;
-                let kept_it = opener.is_some_and(|opener| opener != seat) && gave_none(seat);
+                let kept_it = tally.holder.is_some_and(|holder| holder != seat) && gave_none(seat);
                 self.golden[seat] && !had_none && !kept_it
             })
             .collect();
@@ -151,7 +151,9 @@ impl Puzzle<'_> {
                 (None, _) | (_, Some(false)) => holders.push(seat),
             }
         }
+        let without = |seat: Seat| tally.held[seat].is_some_and(|hand| !hand.has_golden());
+        holders.retain(|seat| !without(*seat));
         let one_holder = holders.windows(2).all(|two| two[0] == two[1]);
-        (from.len() == 1, opener.is_some() || one_holder)
+        (from.len() == 1, tally.holder.is_some() || one_holder)
     }
 }

@@ -10,14 +10,19 @@ pub mod counts;
 mod facts;
 mod game;
 mod gifts;
+mod judge;
 mod known;
 mod puzzle;
+mod referee;
 mod report;
 mod search;
+mod shift;
 mod start;
+mod words;
 
 pub use facts::{Fact, ShiftFacts};
 pub use game::PhysicalGame;
+pub use referee::{MAX_HELD, MAX_QUESTIONS, Referee, ShiftStory};
 pub use report::{
     Corrected, Question, Report, Ruling, SeenCards, Stage, ToLay, Verdict, ViolatedRule, Violation,
 };

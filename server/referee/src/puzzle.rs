@@ -1,7 +1,7 @@
 //! A Shift to complete: its facts, and what follows from them for the hands when gifts are assumed.
 //! The search for gifts and hands that fit is in `search`.
 
-use chefshat_engine::{BySeat, ExchangePair, Opening, RuleSet, Seat, SeatOrder};
+use chefshat_engine::{BySeat, ExchangePair, RuleSet, Seat, SeatOrder};
 
 use crate::counts::{
     Counts, JOKER, NOTHING, add, at_least, contains, counts_of, highest, size_of, take,
@@ -72,8 +72,10 @@ impl<'a> Puzzle<'a> {
                 hand[JOKER] = hand[JOKER].max(2);
             }
             add(&mut dealt, &hand);
-            add(&mut held, &tally.played[seat]);
-            if tally.opener == Some(seat) {
+            let mut after = tally.held[seat].map_or(NOTHING, |hand| counts_of(hand, faces));
+            at_least(&mut after, &tally.played[seat]);
+            add(&mut held, &after);
+            if tally.has_top(seat) {
                 held[self.top] = held[self.top].max(1);
             }
         }
@@ -91,11 +93,9 @@ impl<'a> Puzzle<'a> {
         let (given, received) = (&gifts.chosen, &gifts.forced);
         let mut chooser = self.kept(pair.chooser, given, received, None, opening)?;
         let mut forced = self.kept(pair.forced, received, given, Some(gifts), opening)?;
-        if self.rules.opening() == Opening::Golden
-            && let Some(opener) = self.tally.opener.filter(|opener| pair.has(*opener))
-        {
-            let (seat, giver) = match (opening, opener == pair.chooser) {
-                (OpeningCard::Kept, _) => (opener, None),
+        if let Some(holder) = self.tally.holder.filter(|holder| pair.has(*holder)) {
+            let (seat, giver) = match (opening, holder == pair.chooser) {
+                (OpeningCard::Kept, _) => (holder, None),
                 (OpeningCard::Received, true) => (pair.forced, Some(&mut forced)),
                 (OpeningCard::Received, false) => (pair.chooser, Some(&mut chooser)),
             };
@@ -134,7 +134,7 @@ impl<'a> Puzzle<'a> {
             Some(gifts) if gifts.short => JOKER,
             Some(gifts) => highest(&gifts.forced)?,
         };
-        let opens = tally.opener == Some(seat);
+        let opens = tally.has_top(seat);
         let mut kept = Kept {
             floor,
             ..Kept::default()
@@ -143,6 +143,10 @@ impl<'a> Puzzle<'a> {
             Some(dealt) => {
                 kept.counts = counts_of(dealt, self.rules.faces());
                 take(&mut kept.counts, given)?;
+            }
+            None if let Some(hand) = tally.held[seat] => {
+                kept.counts = counts_of(hand, self.rules.faces());
+                take(&mut kept.counts, received)?;
             }
             None => {
                 for (kind, count) in kept.counts.iter_mut().enumerate() {
@@ -176,7 +180,8 @@ impl<'a> Puzzle<'a> {
             .iter()
             .all(|&count| count == 0)
             && contains(&held, &tally.played[seat])
-            && (!opens || has_top);
+            && (!opens || has_top)
+            && tally.held[seat].is_none_or(|hand| counts_of(hand, self.rules.faces()) == held);
         fits.then_some(kept)
     }
 
@@ -221,12 +226,12 @@ fn golden_seats(
         // All other cards of its face may be stated.
         let is_there = tally.dealt[seat].is_some() || stated < rules.faces();
         let given = tally.given[seat].map(|gift| gift.has_golden());
-        let as_opened = match tally.opener.filter(|_| rules.opening() == Opening::Golden) {
+        let as_opened = match tally.holder {
             None => true,
-            Some(opener) if opener == seat => given != Some(true),
-            Some(opener) => {
-                let with_opener = |pair: &ExchangePair| pair.has(seat) && pair.has(opener);
-                pairs.iter().any(with_opener) && given != Some(false)
+            Some(holder) if holder == seat => given != Some(true),
+            Some(holder) => {
+                let with_holder = |pair: &ExchangePair| pair.has(seat) && pair.has(holder);
+                pairs.iter().any(with_holder) && given != Some(false)
             }
         };
         as_dealt && as_given && is_there && as_opened

@@ -95,11 +95,12 @@ pub struct Question {
 }
 
 /// A verdict on a report.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Verdict {
     /// It counts.
     Accepted,
     /// It was known already.
+    #[default]
     Known,
     /// The rules or the cards do not allow it.
     Violation(Violation),
@@ -151,7 +152,7 @@ pub struct Violation {
 }
 
 /// What follows from a report or a decision. The events of the game contain only known cards.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Ruling {
     /// The verdict.
     pub verdict: Verdict,
@@ -166,7 +167,7 @@ pub struct Ruling {
 }
 
 /// A correction.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Corrected {
     /// Number of the corrected report.
     pub number: u64,

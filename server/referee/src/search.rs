@@ -27,6 +27,8 @@ pub(crate) struct Plan {
     pub(crate) dealt_known: Known,
     /// What is known of the hands after the exchange.
     pub(crate) held_known: Known,
+    /// Whether the gift of each seat is known.
+    pub(crate) given_known: BySeat<bool>,
 }
 
 impl Puzzle<'_> {
@@ -138,7 +140,7 @@ impl Puzzle<'_> {
             return None;
         }
         let dealt = dealt.map(Option::unwrap_or_default);
-        let (dealt_known, held_known) = self.known(&dealt, &given);
+        let (dealt_known, held_known, given_known) = self.known(&dealt, &given);
         Some(Plan {
             dealt,
             gifts: given,
@@ -149,6 +151,7 @@ impl Puzzle<'_> {
                 .then(|| self.tally.opener.unwrap_or(Seat::new(0))),
             dealt_known,
             held_known,
+            given_known,
         })
     }
 
@@ -175,6 +178,14 @@ impl Puzzle<'_> {
             }
             add(&mut dealt, &counts_of(*cards, rules.faces()));
         }
+        for (seat, cards) in tally.held.iter() {
+            if let Some(cards) = cards.filter(|cards| cards.len() != hand) {
+                return Err(format!(
+                    "seat {seat} had {} cards after the exchange, but every hand has {hand}",
+                    cards.len()
+                ));
+            }
+        }
         let mut seen = NOTHING;
         for (seat, counts) in tally.played.iter() {
             if size_of(counts) > hand {
@@ -184,7 +195,7 @@ impl Puzzle<'_> {
                 ));
             }
             if self.partner(seat).is_none() {
-                let dealt = tally.dealt[seat];
+                let dealt = tally.dealt[seat].or(tally.held[seat]);
                 add(
                     &mut seen,
                     &dealt.map_or(*counts, |cards| counts_of(cards, rules.faces())),
@@ -221,8 +232,8 @@ impl Puzzle<'_> {
             if tally.given[seat].is_some() && self.partner(seat).is_none() {
                 return Err(format!("seat {seat} gives no cards in this exchange"));
             }
-            if let Some(cards) = tally.dealt[seat]
-                && self.partner(seat).is_none()
+            if let Some(cards) =
+                tally.held[seat].or(tally.dealt[seat].filter(|_| self.partner(seat).is_none()))
                 && !contains(&counts_of(cards, rules.faces()), &tally.played[seat])
             {
                 return Err(format!("seat {seat} does not hold these cards"));

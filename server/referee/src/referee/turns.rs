@@ -1,0 +1,530 @@
+//! Plays, passes and cleared boards: whose turn it is, what was missed, and what must be asked.
+
+use chefshat_engine::{Action, DecisionKind, Game, PlayRequirement, Requirement, Seat, Viewer};
+
+use super::before::counts_of_action;
+use super::{Asked, Doubt, Judged, MAX_HELD, Referee};
+use crate::judge::{as_play, check_play};
+use crate::shift::{Act, Entry, Shift, play};
+use crate::words::turn_text;
+use crate::{Question, Report, Ruling, Verdict, ViolatedRule, Violation};
+
+/// The most turns that may have been missed before a report.
+const MAX_MISSED: usize = 24;
+
+/// A report about a turn.
+#[derive(Debug, Clone, Copy)]
+enum TurnReport {
+    /// Cards on the board, or a pass.
+    Acted {
+        seat: Option<Seat>,
+        action: Action,
+        golden: Option<bool>,
+    },
+    /// The board was cleared.
+    Cleared,
+}
+
+impl Referee {
+    /// Judges a report about a turn; while a question is open, it may have to wait.
+    pub(super) fn judge_turn(
+        &mut self,
+        number: u64,
+        report: &Report,
+        ruling: &mut Ruling,
+    ) -> Judged {
+        let Some(asked) = self.asked.clone() else {
+            return self.take_turn(number, report);
+        };
+        // A turn that is possible now answers the question: nobody passed before it unseen.
+        let before = self.clone();
+        self.asked = None;
+        match self.take_turn(number, report) {
+            Ok(verdict @ (Verdict::Accepted | Verdict::Known)) if self.asked.is_none() => {
+                if verdict == Verdict::Accepted {
+                    self.close_question(&asked.id);
+                    self.judge_held(ruling);
+                } else {
+                    self.asked = Some(asked);
+                }
+                Ok(verdict)
+            }
+            _ => {
+                *self = before;
+                if self.held.len() >= MAX_HELD {
+                    return Err((
+                        None,
+                        (ViolatedRule::Turn, "Answer the open question first.".into()),
+                    ));
+                }
+                self.held.push((number, report.clone()));
+                Ok(Verdict::Held { question: asked.id })
+            }
+        }
+    }
+
+    fn take_turn(&mut self, number: u64, report: &Report) -> Judged {
+        let turn = match report {
+            Report::Laid { seat, cards } => TurnReport::Acted {
+                seat: *seat,
+                action: as_play(&self.rules, cards).map_err(|broken| (*seat, broken))?,
+                golden: cards.golden,
+            },
+            Report::Pass { seat } => TurnReport::Acted {
+                seat: *seat,
+                action: Action::Pass,
+                golden: None,
+            },
+            _ => TurnReport::Cleared,
+        };
+        match turn {
+            TurnReport::Acted {
+                seat,
+                action,
+                golden,
+            } => {
+                if let Some(judged) = self.confirm_turn(seat, action) {
+                    return judged;
+                }
+                if self.is_repeated(seat, action) {
+                    return Ok(Verdict::Known);
+                }
+                self.act(number, report, seat, action, golden)
+            }
+            TurnReport::Cleared => self.clear(number, report),
+        }
+    }
+
+    /// A report of what a remote seat decided; `None` if the report is not about a remote seat.
+    fn confirm_turn(&mut self, seat: Option<Seat>, action: Action) -> Option<Judged> {
+        let same = |entry: &Entry| match entry.act {
+            Act::Turn(of, done) => {
+                self.remote[of] && seat.is_none_or(|seat| seat == of) && done == action
+            }
+            _ => false,
+        };
+        let entries = &self.shift().entries;
+        let open = entries
+            .iter()
+            .position(|entry| same(entry) && !entry.confirmed);
+        if let Some(index) = open {
+            return Some(Ok(self.confirm(index)));
+        }
+        let seat = seat.filter(|seat| self.remote[*seat])?;
+        if self.is_repeated(Some(seat), action) {
+            return Some(Ok(Verdict::Known));
+        }
+        let name = self.names.of(seat);
+        let wanted = self
+            .to_lay
+            .iter()
+            .find(|it| it.seat == seat && it.kind == DecisionKind::Turn);
+        let shown = turn_text(action);
+        let text = match wanted {
+            Some(wanted) => format!("{}, not {shown}.", self.describe_to_lay(wanted)),
+            None => format!("{name} has not decided to play {shown}: take the cards back."),
+        };
+        Some(Err((Some(seat), (ViolatedRule::Decision, text))))
+    }
+
+    /// Whether the report repeats the last turn of the seat: its cards still lie there, or it is
+    /// still out of the pizza.
+    fn is_repeated(&self, seat: Option<Seat>, action: Action) -> bool {
+        let shift = self.shift();
+        let last_play = shift.turns().rfind(|(_, done)| *done != Action::Pass);
+        let now = self.game().observe(Viewer::Spectator);
+        match (action, seat) {
+            (Action::Pass, Some(seat)) => {
+                let last = shift.turns().rfind(|(of, _)| *of == seat);
+                now.passed[seat]
+                    && last == Some((seat, Action::Pass))
+                    && self.to_act() != Some(seat)
+            }
+            (Action::Pass, None) => false,
+            (action, seat) => {
+                now.board.size > 0
+                    && last_play.is_some_and(|(of, done)| {
+                        done == action && seat.is_none_or(|seat| seat == of)
+                    })
+            }
+        }
+    }
+
+    /// Judges what a seat at the table did.
+    fn act(
+        &mut self,
+        number: u64,
+        report: &Report,
+        seat: Option<Seat>,
+        action: Action,
+        golden: Option<bool>,
+    ) -> Judged {
+        let before = self.clone();
+        let judged = self.act_unless_refused(number, report, seat, action, golden);
+        if judged.is_err() {
+            *self = before;
+        }
+        judged
+    }
+
+    fn act_unless_refused(
+        &mut self,
+        number: u64,
+        report: &Report,
+        seat: Option<Seat>,
+        action: Action,
+        golden: Option<bool>,
+    ) -> Judged {
+        self.end_exchange(number, seat)?;
+        let refuse = |seat, broken| Err((Some(seat), broken));
+        let opening = !self.shift().has_turns();
+        let seat = match (seat, opening) {
+            (Some(seat), _) => seat,
+            (None, false) => self.to_act().expect("a Shift in progress has a turn"),
+            (None, true) => match self.opener() {
+                Some(seat) => seat,
+                None => return Ok(self.ask_who_opened(number, report)),
+            },
+        };
+        if opening {
+            let required = self.requirement(self.game());
+            check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
+            return self.accept_turn(number, report, seat, action);
+        }
+        if self.to_act() == Some(seat) {
+            let required = self.requirement(self.game());
+            check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
+            return self.accept_turn(number, report, seat, action);
+        }
+        let to_act = self.to_act().expect("a Shift in progress has a turn");
+        let out_of_turn = || {
+            let (name, next) = (self.names.of(seat), self.names.of(to_act));
+            (
+                ViolatedRule::Turn,
+                format!("It is {next}'s turn, not {name}'s."),
+            )
+        };
+        let Some((missed, game)) = self.passes_before(|game| turn_of(game) == Some(seat)) else {
+            return refuse(seat, out_of_turn());
+        };
+        let required = self.requirement(&game);
+        if let Err(broken) = check_play(&self.rules, &required, action, golden) {
+            // The play would break a rule even if the others had passed: say the simpler thing.
+            let same_pizza = game.observe(Viewer::Spectator).pizza
+                == self.game().observe(Viewer::Spectator).pizza;
+            return refuse(seat, if same_pizza { broken } else { out_of_turn() });
+        }
+        if let Some(remote) = missed.iter().find(|seat| self.remote[**seat]) {
+            let text = format!("It is {}'s turn.", self.names.of(*remote));
+            return refuse(seat, (ViolatedRule::Turn, text));
+        }
+        self.miss(number, report, missed, Some((seat, action)))
+    }
+
+    fn accept_turn(&mut self, number: u64, report: &Report, seat: Seat, action: Action) -> Judged {
+        let refuse = |text| Err((Some(seat), (ViolatedRule::Cards, text)));
+        let name = self.names.of(seat).to_owned();
+        let report = with_seat(report, seat);
+        let left = self.game().observe(Viewer::Spectator).cards_left[seat];
+        let count: u8 = counts_of_action(action).iter().sum();
+        if count > left {
+            return refuse(format!("{name} has only {left} cards left."));
+        }
+        match self.try_act(number, Some(&report), Act::Turn(seat, action)) {
+            Ok(()) => Ok(Verdict::Accepted),
+            Err(problem) => refuse(format!(
+                "{name} cannot have {}: {}.",
+                turn_text(action),
+                self.names.replace_seats(&problem)
+            )),
+        }
+    }
+
+    /// Notes that the exchange is over, because somebody plays.
+    fn end_exchange(
+        &mut self,
+        number: u64,
+        seat: Option<Seat>,
+    ) -> Result<(), (Option<Seat>, crate::judge::Broken)> {
+        let shift = self.shift();
+        if shift.has_turns() || shift.exchange_is_over(&self.rules, &self.remote) {
+            return Ok(());
+        }
+        let pairs = shift.pairs(&self.rules);
+        let undecided = pairs.iter().find(|pair| {
+            let given = shift.gives(pair.chooser).count();
+            self.remote[pair.chooser] && given < usize::from(pair.size)
+        });
+        if let Some(pair) = undecided {
+            let name = self.names.of(pair.chooser);
+            let text = format!("{name} has not given cards yet.");
+            return Err((seat, (ViolatedRule::Turn, text)));
+        }
+        self.try_act(number, None, Act::ExchangeOver)
+            .map_err(|problem| {
+                (
+                    seat,
+                    (ViolatedRule::Gift, self.names.replace_seats(&problem)),
+                )
+            })
+    }
+
+    fn clear(&mut self, number: u64, report: &Report) -> Judged {
+        let now = self.game().observe(Viewer::Spectator);
+        if now.board.size == 0 || !self.shift().has_turns() {
+            return Ok(Verdict::Known);
+        }
+        let pizza = now.pizza;
+        let is_done = |game: &Game| game.observe(Viewer::Spectator).pizza != pizza;
+        let to_act = self.to_act();
+        let (missed, _) = self.passes_before(is_done).ok_or_else(|| {
+            let text = "The pizza is not over yet.".to_owned();
+            (to_act, (ViolatedRule::Turn, text))
+        })?;
+        if let Some(remote) = missed.iter().find(|seat| self.remote[**seat]) {
+            let text = format!(
+                "The pizza is not over yet: it is {}'s turn.",
+                self.names.of(*remote)
+            );
+            return Err((to_act, (ViolatedRule::Turn, text)));
+        }
+        self.miss(number, report, missed, None)
+    }
+
+    /// The seats that would have to pass until `done`, and the game then.
+    fn passes_before(&self, done: impl Fn(&Game) -> bool) -> Option<(Vec<Seat>, Game)> {
+        let mut game = self.game().clone();
+        let shift = game.shift();
+        let pass = self.rules.actions().pass();
+        let mut missed = Vec::new();
+        while !done(&game) {
+            let seat = turn_of(&game)?;
+            if missed.len() >= MAX_MISSED || game.shift() != shift {
+                return None;
+            }
+            game.apply(pass, |_| {}).ok()?;
+            missed.push(seat);
+        }
+        (game.shift() == shift && !game.is_over()).then_some((missed, game))
+    }
+
+    /// Seats must have passed unseen before a report. If nothing else is possible, they did;
+    /// otherwise the referee asks.
+    fn miss(
+        &mut self,
+        number: u64,
+        report: &Report,
+        missed: Vec<Seat>,
+        then: Option<(Seat, Action)>,
+    ) -> Judged {
+        if then.is_some() && self.only_passes_fit(number, &missed, then) {
+            for seat in &missed {
+                self.try_act(number, None, Act::Turn(*seat, Action::Pass))
+                    .map_err(|problem| (Some(*seat), (ViolatedRule::Turn, problem)))?;
+            }
+            return self.take_turn(number, report);
+        }
+        let names = self.names.list(&missed);
+        let text = format!("Did {names} pass?");
+        let options = vec!["Yes".to_owned(), "No".to_owned()];
+        let first = missed.first().copied();
+        Ok(self.ask_and_hold(number, report, Doubt::Passed(missed), text, options, first))
+    }
+
+    fn ask_who_opened(&mut self, number: u64, report: &Report) -> Verdict {
+        let seats: Vec<Seat> = (self.remote.seats())
+            .filter(|seat| !self.hand_known(*seat))
+            .collect();
+        let options = seats
+            .iter()
+            .map(|seat| self.names.of(*seat).to_owned())
+            .collect();
+        let text = "Who opened the Shift?".to_owned();
+        self.ask_and_hold(number, report, Doubt::Opener(seats), text, options, None)
+    }
+
+    fn ask_and_hold(
+        &mut self,
+        number: u64,
+        report: &Report,
+        doubt: Doubt,
+        text: String,
+        options: Vec<String>,
+        seat: Option<Seat>,
+    ) -> Verdict {
+        let id = format!("referee-{number}");
+        self.questions.push(Question {
+            id: id.clone(),
+            text,
+            options,
+            seat,
+        });
+        self.asked = Some(Asked {
+            id: id.clone(),
+            doubt,
+        });
+        self.held.insert(0, (number, report.clone()));
+        Verdict::Held { question: id }
+    }
+
+    /// Whether no missed seat can have played instead of passing, by the rules and the cards.
+    fn only_passes_fit(&self, number: u64, missed: &[Seat], then: Option<(Seat, Action)>) -> bool {
+        let mut game = self.game().clone();
+        let pass = self.rules.actions().pass();
+        for (index, seat) in missed.iter().enumerate() {
+            let required = self.requirement(&game);
+            let instead = self.rules.actions().iter().filter_map(|id| {
+                let action = self.rules.actions().decode(id)?;
+                (action != Action::Pass && required.allows(action)).then_some(action)
+            });
+            for action in instead {
+                let mut turns: Vec<(Seat, Action)> = Vec::new();
+                turns.extend(missed[..index].iter().map(|seat| (*seat, Action::Pass)));
+                turns.push((*seat, action));
+                turns.extend(missed[index + 1..].iter().map(|seat| (*seat, Action::Pass)));
+                turns.extend(then);
+                if self.can_be_played(number, &turns) {
+                    return false;
+                }
+            }
+            if game.apply(pass, |_| {}).is_err() {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn can_be_played(&self, number: u64, turns: &[(Seat, Action)]) -> bool {
+        let shift = self.shift();
+        let entries = turns.iter().map(|(seat, action)| Entry {
+            number,
+            report: None,
+            act: Act::Turn(*seat, *action),
+            pizza: 0,
+            confirmed: false,
+        });
+        let shift = Shift {
+            start: shift.start.clone(),
+            entries: shift.entries.iter().cloned().chain(entries).collect(),
+        };
+        play(&self.rules, &self.remote, &shift).is_ok()
+    }
+
+    fn insert_passes(&mut self, number: u64, missed: &[Seat]) -> Result<(), String> {
+        for seat in missed {
+            let report = Report::Pass { seat: Some(*seat) };
+            self.try_act(number, Some(&report), Act::Turn(*seat, Action::Pass))?;
+        }
+        Ok(())
+    }
+
+    /// Takes the answer to a question.
+    pub(super) fn answer(
+        &mut self,
+        number: u64,
+        id: &str,
+        option: Option<usize>,
+        ruling: &mut Ruling,
+    ) -> Judged {
+        let Some(question) = self.questions.iter().find(|it| it.id == id).cloned() else {
+            return Ok(Verdict::Known);
+        };
+        if option.is_some_and(|option| option >= question.options.len()) {
+            let text = "The question has no such answer.".to_owned();
+            return Err((question.seat, (ViolatedRule::Form, text)));
+        }
+        let asked = self.asked.clone().filter(|asked| asked.id == id);
+        self.close_question(id);
+        let Some(asked) = asked else {
+            return Ok(Verdict::Accepted);
+        };
+        match (asked.doubt, option) {
+            (Doubt::Passed(missed), Some(0)) => {
+                let before = self.clone();
+                if self.insert_passes(number, &missed).is_err() {
+                    *self = before;
+                }
+                self.judge_held(ruling);
+            }
+            (Doubt::Opener(seats), Some(index)) => {
+                if let (Some(seat), Some((_, first))) = (seats.get(index), self.held.first_mut()) {
+                    *first = with_seat(first, *seat);
+                }
+                self.judge_held(ruling);
+            }
+            // They did not pass: the first report was out of turn.
+            (Doubt::Passed(_) | Doubt::Opener(_), _) => {
+                if !self.held.is_empty() {
+                    let (held, report) = self.held.remove(0);
+                    let seat = seat_of(&report);
+                    let next = self
+                        .to_act()
+                        .map_or("the other player", |seat| self.names.of(seat));
+                    let violation = Violation {
+                        seat,
+                        rule: ViolatedRule::Turn,
+                        text: format!("It is {next}'s turn."),
+                    };
+                    ruling.violations.push((held, violation));
+                }
+                self.judge_held(ruling);
+            }
+        }
+        Ok(Verdict::Accepted)
+    }
+
+    fn close_question(&mut self, id: &str) {
+        self.questions.retain(|question| question.id != id);
+        self.asked = self.asked.take().filter(|asked| asked.id != id);
+    }
+
+    /// Judges the reports that waited, until one must wait again.
+    pub(super) fn judge_held(&mut self, ruling: &mut Ruling) {
+        let held = std::mem::take(&mut self.held);
+        let mut held = held.into_iter();
+        for (number, report) in held.by_ref() {
+            match self.take_turn(number, &report) {
+                Ok(Verdict::Held { .. }) => break,
+                Ok(_) => {}
+                Err((seat, (rule, text))) => {
+                    ruling
+                        .violations
+                        .push((number, Violation { seat, rule, text }));
+                }
+            }
+        }
+        self.held.extend(held);
+    }
+
+    fn requirement(&self, game: &Game) -> PlayRequirement {
+        match game.requirement() {
+            Some(Requirement::Play(required)) => required,
+            _ => unreachable!("a turn is open"),
+        }
+    }
+}
+
+fn turn_of(game: &Game) -> Option<Seat> {
+    let open = game.decision()?;
+    (open.kind == DecisionKind::Turn).then_some(open.seat)
+}
+
+/// The report with the seat it is about.
+pub(super) fn with_seat(report: &Report, seat: Seat) -> Report {
+    match report {
+        Report::Laid { cards, .. } => Report::Laid {
+            seat: Some(seat),
+            cards: *cards,
+        },
+        Report::Pass { .. } => Report::Pass { seat: Some(seat) },
+        other => other.clone(),
+    }
+}
+
+/// The seat a report about a turn names.
+pub(super) fn seat_of(report: &Report) -> Option<Seat> {
+    match report {
+        Report::Laid { seat, .. } | Report::Pass { seat } => *seat,
+        _ => None,
+    }
+}
