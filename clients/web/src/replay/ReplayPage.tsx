@@ -123,7 +123,9 @@ function Decision({ table, open }: { table: TableState; open: DecisionRecord }) 
           {estimate !== undefined && ` · ${words.estimate(estimate)}`}
         </span>
       </summary>
-      {open.kind === DecisionKind.TURN ? (
+      {open.kind === DecisionKind.TURN && open.actionMask.length === 0 ? (
+        <p>{t().table.physical.handUnknown}</p>
+      ) : open.kind === DecisionKind.TURN ? (
         <LookupTable lookup={lookupAt(table, open)} taken={open.action} />
       ) : (
         <p>{words.noTable}</p>

@@ -5,6 +5,7 @@
 
 import type { GameEvent } from "../gen/chefshat/v1/event_pb";
 import type { DecisionRecord, RecordHeader, RecordLine } from "../gen/chefshat/v1/record_pb";
+import { GameOrigin } from "../gen/chefshat/v1/room_pb";
 import { applyEvent } from "../table/model/reduce";
 import { emptyTable, fromRules, seatFromParticipant, type TableState } from "../table/model/state";
 
@@ -115,5 +116,6 @@ function tableFromHeader(header: RecordHeader): TableState {
     roomName: header.roomName,
     gameId: header.gameId,
     policy: header.policy,
+    physical: header.origin === GameOrigin.PHYSICAL,
   };
 }

@@ -34,6 +34,8 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
     const lines = visibleLines(fresh, !hidden.peek().includes("expressions"));
     for (const line of lines) {
       if (isPresence(line)) presence.apply(line);
+      // The notice of a violation is read out by itself.
+      else if (line.entry.kind === "violated") continue;
       else announce(spokenLine(table, line));
     }
     const sounds = lines.flatMap((line) => soundOf(line) ?? []);

@@ -39,6 +39,8 @@ const SOUNDS = {
     tone(784, 0.28, 0.2, 0.22),
     tone(1047, 0.42, 0.45, 0.22),
   ],
+  /** The rules do not allow it. */
+  violated: [tone(330, 0, 0.16, 0.24, "triangle"), tone(247, 0.14, 0.3, 0.24, "triangle")],
   yourTurn: [tone(880, 0, 0.16, 0.24), tone(1175, 0.11, 0.3, 0.24)],
 } as const satisfies Record<string, readonly Tone[]>;
 
@@ -74,6 +76,7 @@ export function soundOf({ entry }: LogLine): Sound | undefined {
     case "passed":
       return "pass";
     case "pizzaDone":
+    case "violated":
     case "finished":
     case "shiftOver":
       return entry.kind;

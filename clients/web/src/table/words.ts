@@ -7,7 +7,7 @@ import { isLabel } from "./expressions";
 import type { Move } from "./model/actions";
 import { type Card, faceOf } from "./model/cards";
 import type { Reason } from "./model/picking";
-import type { LogEntry, LogLine, SeatState, TableState } from "./model/state";
+import type { Breach, Demand, LogEntry, LogLine, SeatState, TableState } from "./model/state";
 
 /** A seat's name, or its number while it is free. */
 export function nameOf(table: TableState, seat: number): string {
@@ -105,6 +105,14 @@ export function happeningWords(table: TableState, entry: LogEntry): SaidLine {
       return { seat: entry.seat, text: words.shows(expressionWord(entry.label)) };
     case "substituted":
       return { seat: entry.seat, text: words.substituted(entry.agent) };
+    case "handReported":
+      return { seat: entry.seat, text: words.handReported };
+    case "violated": {
+      const text = violationWords(table, entry.breach, entry.demand);
+      return { seat: entry.breach.seat, text: entry.breach.seat === undefined ? text : words.violated(text) };
+    }
+    case "corrected":
+      return { seat: undefined, text: words.corrected(entry.text) };
     case "seated":
     case "left":
     case "lost":
@@ -118,7 +126,22 @@ export function happeningWords(table: TableState, entry: LogEntry): SaidLine {
 /** A line as it is read out. */
 export function spokenLine(table: TableState, { entry }: LogLine): string {
   const { seat, text } = happeningWords(table, entry);
-  return seat === undefined ? `${text}.` : `${distinctName(table, seat)} ${text}.`;
+  const sentence = seat === undefined ? text : `${distinctName(table, seat)} ${text}`;
+  return sentence.endsWith(".") ? sentence : `${sentence}.`;
+}
+
+/** What the rules or the cards do not allow: the page's own sentence, or the server's. */
+export function violationWords(table: TableState, { rule, text }: Breach, demand: Demand): string {
+  return t().table.violation({
+    rule,
+    text,
+    top: table.faces,
+    highest: demand.highestFace,
+    fewest: demand.fewestCards,
+    onBoard: demand.onBoard,
+    golden: demand.opening && demand.goldenCard,
+    next: demand.next === undefined ? "" : distinctName(table, demand.next),
+  });
 }
 
 /** The word of an expression, or its label if it has none. */

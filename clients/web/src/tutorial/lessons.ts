@@ -139,6 +139,7 @@ export function firstTable(you: string): TableState {
     reservedFor: kind,
     builtIn: "",
     connected: true,
+    atTable: false,
     substitute: "",
     role: Role.UNSPECIFIED,
     points: 0,

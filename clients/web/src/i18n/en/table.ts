@@ -1,9 +1,29 @@
 // English texts of table/.
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
+import type { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import { plurals } from "../plural";
 
 const plural = plurals("en");
+
+/** What the sentence about a violation is made of. */
+export interface Breach {
+  readonly rule: ViolatedRule;
+  /** The server's sentence, in English. */
+  readonly text: string;
+  /** The highest face of the deck. */
+  readonly top: number;
+  /** The highest face allowed; `top` on an empty board, 0 if nothing beats the board. */
+  readonly highest: number;
+  /** The fewest cards allowed. */
+  readonly fewest: number;
+  /** Whether cards lay on the board. */
+  readonly onBoard: boolean;
+  /** Whether it was the first turn of a Shift that needs the Golden card. */
+  readonly golden: boolean;
+  /** The name of the seat whose turn it was; empty if unknown. */
+  readonly next: string;
+}
 
 export const table = {
   title: "Table",
@@ -68,8 +88,24 @@ export const table = {
       disconnected: "not connected",
       substitute: "by a substitute",
       recorded: "as recorded",
+      table: "",
     },
+    handReported: "shows all cards to the referee",
+    violated: (text: string) => `is stopped by the referee: ${text}`,
+    corrected: (text: string) => `Corrected: ${text}`,
+    paused: "The game is paused",
+    resumed: "The game continues",
   },
+  physical: {
+    atTable: "at the table",
+    paused: "The game is paused at the table.",
+    violation: (name: string, text: string) => (name ? `${name}: ${text}` : text),
+    handAwaited: "Your cards are on their way",
+    handAwaitedText:
+      "The attendant shows your cards to the camera or types them in. You see them here as soon as they are known.",
+    handUnknown: "This hand is not known.",
+  },
+  violation: (what: Breach) => what.text,
   now: {
     yourTurn: "Your turn",
     turnOf: (name: string) => `${name} to play`,

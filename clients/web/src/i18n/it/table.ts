@@ -1,6 +1,7 @@
 // Italian texts of table/.
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
+import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import type { Texts } from "../en";
 import { plurals } from "../plural";
 
@@ -68,7 +69,47 @@ export const table: Texts["table"] = {
       disconnected: "non connesso",
       substitute: "da un sostituto",
       recorded: "come registrato",
+      table: "",
     },
+    handReported: "mostra tutte le carte all’arbitro",
+    violated: (text) => `riceve un richiamo dall’arbitro: ${text}`,
+    corrected: () => "Un errore di lettura è stato corretto",
+    paused: "La partita è in pausa",
+    resumed: "La partita riprende",
+  },
+  physical: {
+    atTable: "al tavolo",
+    paused: "La partita è in pausa al tavolo.",
+    violation: (name, text) => (name ? `${name}: ${text}` : text),
+    handAwaited: "Le tue carte stanno arrivando",
+    handAwaitedText:
+      "Chi assiste al tavolo mostra le tue carte alla telecamera o le scrive. Compaiono qui appena sono note.",
+    handUnknown: "Questa mano non è nota.",
+  },
+  violation: ({ rule, text, top, highest, fewest, onBoard, golden, next }) => {
+    switch (rule) {
+      case ViolatedRule.TURN:
+        return next ? `Non è il suo turno: tocca a ${next}.` : "Non è il suo turno.";
+      case ViolatedRule.FACE:
+        if (!onBoard) return text;
+        if (highest === 0) return "Niente batte il tartufo sul piatto: si può solo passare.";
+        if (highest === top) return "Sul piatto c’è un jolly da solo: si batte con qualsiasi ingrediente.";
+        return `Sul piatto ci sono già carte di valore ${highest + 1}: serve ${highest === 1 ? "un 1" : `un ${highest} o un numero più basso`}.`;
+      case ViolatedRule.SIZE:
+        return plural(fewest, { one: "Serve almeno # carta.", other: "Servono almeno # carte." });
+      case ViolatedRule.FORM:
+        return "Una giocata è di carte dello stesso valore, con o senza jolly, oppure di un solo jolly.";
+      case ViolatedRule.OPENING:
+        return golden
+          ? `Lo Shift si apre con il ${top} d’oro: solo ${top} e jolly insieme.`
+          : `Lo Shift si apre con il ${top}: nessun altro valore.`;
+      case ViolatedRule.PASS:
+        return "Ora non si può passare.";
+      case ViolatedRule.DECISION:
+        return "Chi gioca a distanza ha deciso diversamente.";
+      default:
+        return text;
+    }
   },
   now: {
     yourTurn: "Tocca a te",

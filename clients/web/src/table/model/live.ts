@@ -142,6 +142,9 @@ function closes(event: GameEvent, live: LiveState): boolean {
       return kind.value.giver === own && decision?.kind === DecisionKind.EXCHANGE;
     case "substituted":
       return kind.value.seat === own;
+    // A decision that is still open after a correction is asked again.
+    case "correction":
+      return kind.value.firstVoid > 0n;
     case "shiftEnded":
     case "gameEnded":
     case "gameAborted":

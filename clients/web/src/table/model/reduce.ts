@@ -5,8 +5,10 @@ import type { GameEvent, Play } from "../../gen/chefshat/v1/event_pb";
 import { DecisionSource } from "../../gen/chefshat/v1/event_pb";
 import { Opening, PassScope, Role } from "../../gen/chefshat/v1/rules_pb";
 import { type Card, cardsFromNumbers, countOf, faceOf, playedCards, together, without } from "./cards";
+import { publicRequirement } from "./requirement";
 import {
   type Cause,
+  type Demand,
   fromRules,
   type LogEntry,
   MAX_LOG,
@@ -23,12 +25,44 @@ const CAUSES: Record<DecisionSource, Cause> = {
   [DecisionSource.DISCONNECTED]: "disconnected",
   [DecisionSource.SUBSTITUTE]: "substitute",
   [DecisionSource.RECORDED]: "recorded",
+  [DecisionSource.TABLE]: "table",
 };
 
 /** The table after an event. An event that was already applied changes nothing. */
 export function applyEvent(table: TableState, event: GameEvent): TableState {
   const sequence = Number(event.sequence);
   if (sequence < table.nextSequence) return table;
+  const { history } = table;
+  if (!history) return step(table, event);
+  const firstVoid = event.kind.case === "correction" ? Number(event.kind.value.firstVoid) : 0;
+  if (firstVoid === 0) return { ...step(table, event), history: { ...history, events: [...history.events, event] } };
+  const valid = history.events.filter((past) => Number(past.sequence) < firstVoid || isOfRoom(past));
+  const events = [...valid, event];
+  return { ...events.reduce(step, history.start), history: { ...history, events } };
+}
+
+/** Whether an event stays when a correction makes the events of the game before it void. */
+function isOfRoom({ kind }: GameEvent): boolean {
+  switch (kind.case) {
+    case "seated":
+    case "vacated":
+    case "disconnected":
+    case "returned":
+    case "substituted":
+    case "expressionShown":
+    case "serverRestarted":
+    case "violation":
+    case "correction":
+    case "tablePaused":
+      return true;
+    default:
+      return false;
+  }
+}
+
+/** The table after an event and its line in the log. */
+function step(table: TableState, event: GameEvent): TableState {
+  const sequence = Number(event.sequence);
   const [changed, entry] = change(table, event, sequence);
   const log = entry ? [...changed.log, { sequence, entry }].slice(-MAX_LOG) : changed.log;
   return { ...changed, log, nextSequence: sequence + 1 };
@@ -139,6 +173,26 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
     }
     case "serverRestarted":
       return [table, { kind: "restarted" }];
+    case "handReported": {
+      const { seat = 0, cards = [], golden = false } = kind.value.hand ?? {};
+      // Without cards, the viewer may not see them.
+      const hand = cards.length > 0 ? { hand: cardsFromNumbers(cards, golden, table.faces) } : {};
+      return [withSeat(table, seat, hand), { kind: "handReported", seat }];
+    }
+    case "violation": {
+      const { seat, rule, text } = kind.value;
+      const violation = { kind: "violated" as const, breach: { seat, rule, text }, demand: demandOf(table) };
+      return [{ ...table, violation }, violation];
+    }
+    case "correction":
+      return [
+        { ...table, violation: undefined },
+        { kind: "corrected", text: kind.value.text },
+      ];
+    case "tablePaused": {
+      const { paused } = kind.value;
+      return [{ ...table, paused }, { kind: paused ? "paused" : "resumed" }];
+    }
     // An event of a later protocol version: it is counted, but its content is unknown.
     case undefined:
       return [table, undefined];
@@ -182,12 +236,15 @@ function exchanged(
   count: number,
   cards: readonly Card[],
 ): TableState {
+  // Without its cards, a gift makes a known hand unknown: at a table with real cards.
+  const known = cards.length === count;
   return eachSeat(table, (seat) => {
     if (seat.seat === giver) {
-      return { cardsLeft: seat.cardsLeft - count, hand: seat.hand && without(seat.hand, cards) };
+      const hand = known && seat.hand ? without(seat.hand, cards) : undefined;
+      return { cardsLeft: seat.cardsLeft - count, hand };
     }
     if (seat.seat === receiver) {
-      const hand = seat.hand && together(seat.hand, cards);
+      const hand = known && seat.hand ? together(seat.hand, cards) : undefined;
       return { cardsLeft: seat.cardsLeft + count, hand, received: together(seat.received, cards) };
     }
     return {};
@@ -228,7 +285,20 @@ function playsGolden(table: TableState, hand: readonly Card[] | undefined, quant
 }
 
 function turnTaken(table: TableState): TableState {
-  return { ...table, phase: "pizza", pizza: Math.max(1, table.pizza), turn: table.turn + 1 };
+  return { ...table, phase: "pizza", pizza: Math.max(1, table.pizza), turn: table.turn + 1, violation: undefined };
+}
+
+/** What the board demands at the open turn. */
+function demandOf(table: TableState): Demand {
+  const { highestFace, fewestCards, goldenCard, lowestFace } = publicRequirement(table);
+  return {
+    highestFace,
+    fewestCards,
+    onBoard: table.board.length > 0,
+    goldenCard,
+    opening: lowestFace > 1,
+    next: table.next,
+  };
 }
 
 /** The next seat to the left that is still in the pizza. */

@@ -4,7 +4,7 @@
 import type { Observation } from "../../gen/chefshat/v1/decision_pb";
 import type { Snapshot } from "../../gen/chefshat/v1/play_service_pb";
 import { cardsFromCounts, playedCards } from "./cards";
-import { fromRules, seatFromParticipant, type TableState } from "./state";
+import { fromRules, seatFromParticipant, type TableState, withHistory } from "./state";
 
 /** The table of a snapshot, for the holder of a seat or a spectator. */
 export function applySnapshot(table: TableState, snapshot: Snapshot, own: number | undefined): TableState {
@@ -14,7 +14,8 @@ export function applySnapshot(table: TableState, snapshot: Snapshot, own: number
   const { gameId, policy } = start;
   const seats = start.seats.map(seatFromParticipant);
   const begun = { ...table, ...fromRules(start.rules), gameId, policy, seats, log: [], nextSequence };
-  return applyObservation(begun, observation, own);
+  const seen = applyObservation(begun, observation, own);
+  return table.history ? withHistory(seen) : seen;
 }
 
 /** The table with everything in an observation. */

@@ -2,9 +2,11 @@
 // from the protocol's messages by reduce.ts and snapshot.ts, without anything the viewer may not
 // see.
 
+import type { GameEvent } from "../../gen/chefshat/v1/event_pb";
 import type { Room, RoomPolicy } from "../../gen/chefshat/v1/room_pb";
-import { AbortReason, type Participant, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
+import { AbortReason, GameOrigin, type Participant, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { PassScope, Role, type RuleSet, type SpecialAction } from "../../gen/chefshat/v1/rules_pb";
+import type { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import type { Card } from "./cards";
 
 /** Length of the log, events. */
@@ -13,8 +15,20 @@ export const MAX_LOG = 120;
 /** The phase of the game. */
 export type Phase = "waiting" | "dealt" | "pizza" | "shiftOver" | "gameOver" | "aborted";
 
-/** Who or what made a decision; "agent" for the seat's own participant. */
-export type Cause = "agent" | "timeout" | "invalid" | "disconnected" | "substitute" | "recorded";
+/**
+ * Who or what made a decision: "agent" for the seat's own participant, "table" for one reported from
+ * a physical table.
+ */
+export type Cause = "agent" | "timeout" | "invalid" | "disconnected" | "substitute" | "recorded" | "table";
+
+/** Something at a physical table that the rules or the cards do not allow. */
+export interface Breach {
+  /** Undefined if unknown. */
+  readonly seat: number | undefined;
+  readonly rule: ViolatedRule;
+  /** The server's sentence, in English. */
+  readonly text: string;
+}
 
 /** An event as the viewer may see it. */
 export type LogEntry =
@@ -36,7 +50,25 @@ export type LogEntry =
   | { readonly kind: "expressed"; readonly seat: number; readonly label: string }
   | { readonly kind: "seated" | "left" | "lost" | "back"; readonly seat: number }
   | { readonly kind: "substituted"; readonly seat: number; readonly agent: string }
+  | { readonly kind: "handReported"; readonly seat: number }
+  | { readonly kind: "violated"; readonly breach: Breach; readonly demand: Demand }
+  | { readonly kind: "corrected"; readonly text: string }
+  | { readonly kind: "paused" | "resumed" }
   | { readonly kind: "restarted" | "gameStarted" | "gameOver" | "aborted" };
+
+/** What the board demanded when something was not allowed: for the sentence that says so. */
+export interface Demand {
+  /** The highest face allowed; the top face on an empty board, 0 if nothing beats the board. */
+  readonly highestFace: number;
+  readonly fewestCards: number;
+  /** Whether cards lay on the board. */
+  readonly onBoard: boolean;
+  /** Whether it was the first turn of a Shift, and whether that needs the Golden card. */
+  readonly opening: boolean;
+  readonly goldenCard: boolean;
+  /** The seat whose turn it was, if known. */
+  readonly next: number | undefined;
+}
 
 /** An event and its sequence number. */
 export interface LogLine {
@@ -54,6 +86,8 @@ export interface SeatState {
   /** Name of the built-in agent in the seat, or empty. */
   readonly builtIn: string;
   readonly connected: boolean;
+  /** Whether the player sits at the physical table with real cards. Nobody connects. */
+  readonly atTable: boolean;
   /** Name of the built-in agent that plays for a disconnected participant, or empty. */
   readonly substitute: string;
   readonly role: Role;
@@ -127,8 +161,25 @@ export interface TableState {
   readonly abortReason: AbortReason;
   /** The final standings, best first; empty before the end. */
   readonly standings: readonly StandingLine[];
+  /** Whether the cards are real. */
+  readonly physical: boolean;
+  /** At a physical table: whether the game is paused. */
+  readonly paused: boolean;
+  /** At a physical table: the last violation, until a play or pass counts. */
+  readonly violation: (LogEntry & { readonly kind: "violated" }) | undefined;
+  /**
+   * At a physical table in progress: what a correction rebuilds the table from. A record needs none:
+   * it has the game as corrected.
+   */
+  readonly history: History | undefined;
   /** Sequence number of the next event. */
   readonly nextSequence: number;
+}
+
+/** The events of a physical table that are not void, and the table before them. */
+export interface History {
+  readonly start: TableState;
+  readonly events: readonly GameEvent[];
 }
 
 export function seatFromParticipant(participant: Participant): SeatState {
@@ -138,7 +189,8 @@ export function seatFromParticipant(participant: Participant): SeatState {
     kind: participant.kind,
     reservedFor: participant.reservedFor,
     builtIn: participant.builtInAgent,
-    connected: participant.connected,
+    connected: participant.connected || participant.atTable,
+    atTable: participant.atTable,
     substitute: participant.substituted ? "substitute" : "",
     role: Role.UNSPECIFIED,
     points: 0,
@@ -180,23 +232,45 @@ export function emptyTable(seats: readonly SeatState[] = []): TableState {
     result: undefined,
     abortReason: AbortReason.UNSPECIFIED,
     standings: [],
+    physical: false,
+    paused: false,
+    violation: undefined,
+    history: undefined,
     nextSequence: 1,
   };
 }
 
 /** The table of a room, before its first event. */
 export function tableFromRoom(room: Room): TableState {
-  return {
+  const physical = room.origin === GameOrigin.PHYSICAL;
+  const table = {
     ...emptyTable(room.seats.map(seatFromParticipant)),
     ...fromRules(room.rules),
     roomId: room.roomId,
     roomName: room.name,
     gameId: room.gameId,
     policy: room.policy,
+    physical,
   };
+  return physical ? withHistory(table) : table;
+}
+
+/** A physical table whose corrections go back to this point. */
+export function withHistory(table: TableState): TableState {
+  return { ...table, history: { start: { ...table, history: undefined }, events: [] } };
 }
 
 /** Whether a participant has the seat. */
 export function isTaken(seat: SeatState): boolean {
   return seat.builtIn !== "" || seat.kind !== ParticipantKind.UNSPECIFIED;
+}
+
+/**
+ * Whether the cards of a seat are dealt but not yet known to the server: at a physical table, those
+ * of a remote participant are shown to it.
+ */
+export function awaitsHand({ physical, phase, seats }: TableState, own: number | undefined): boolean {
+  const seat = own === undefined ? undefined : seats[own];
+  if (!physical || !seat || seat.atTable || seat.hand !== undefined) return false;
+  return (phase === "dealt" || phase === "pizza") && seat.cardsLeft > 0;
 }

@@ -30,6 +30,8 @@ interface HandProps {
   /** A card was refused for a reason to be shown. */
   onRefused: (reason: string) => void;
   label: string;
+  /** Shown in place of cards if there are none. */
+  empty: string;
 }
 
 /**
@@ -121,7 +123,7 @@ export function Hand(props: HandProps) {
       <p id="hand-help" class="visually-hidden">
         {t().table.hand.help}
       </p>
-      {cards.length === 0 && <p class="soft">{t().table.hand.empty}</p>}
+      {cards.length === 0 && <p class="soft">{props.empty}</p>}
       {runs.map((stack) => {
         const face = stack[0] && faceOf(stack[0]);
         const fresh = countOf(received, face);

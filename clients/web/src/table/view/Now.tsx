@@ -23,6 +23,8 @@ interface NowProps {
   kind?: DecisionKind | undefined;
   /** Whether passing is legal at the open turn. */
   mayPass?: boolean;
+  /** Whether the reader's real cards are not known to the server yet. */
+  handAwaited?: boolean;
 }
 
 export function Now(props: NowProps) {
@@ -50,9 +52,10 @@ export function Now(props: NowProps) {
 }
 
 /** Who decides, in a few words. */
-export function nowHeading({ table, own, decision, next, kind }: NowProps): string {
+export function nowHeading({ table, own, decision, next, kind, handAwaited }: NowProps): string {
   const words = t().table.now;
   const deciding = decision?.kind;
+  if (handAwaited) return t().table.physical.handAwaited;
   switch (deciding) {
     case DecisionKind.EXCHANGE: {
       const { number = 1, total = 1 } = decision?.gift ?? {};

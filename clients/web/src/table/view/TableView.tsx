@@ -7,13 +7,14 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import { clockOfPeople } from "../../lobby/rooms";
+import { Notice } from "../../parts/Notice";
 import type { Label } from "../expressions";
 import { actionOf } from "../model/actions";
 import type { Card } from "../model/cards";
 import type { OpenDecision } from "../model/live";
 import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
-import type { TableState } from "../model/state";
-import { headingWords, nameOf, reasonWords } from "../words";
+import { awaitsHand, type TableState } from "../model/state";
+import { headingWords, nameOf, reasonWords, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
 import { Board } from "./Board";
 import { Hand } from "./Hand";
@@ -113,6 +114,8 @@ export function TableView(props: TableViewProps) {
   };
   const wholeMs = props.untimed || !table.policy ? 0 : clockOfPeople(table.policy).decisionTimeMs;
 
+  // A remote player at a table with real cards waits until somebody has shown them.
+  const handAwaited = awaitsHand(table, own) && !props.replayed;
   const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
 
   return (
@@ -126,6 +129,7 @@ export function TableView(props: TableViewProps) {
       </header>
       <div class={css.banner} data-part="table-banner">
         {props.banner}
+        <Physical table={table} />
       </div>
       <Seats table={table} own={own} next={next} kind={kind} />
       <div class={css.middle}>
@@ -142,6 +146,7 @@ export function TableView(props: TableViewProps) {
             next={next}
             kind={kind}
             mayPass={moves.some((legal) => legal.kind === "pass")}
+            handAwaited={handAwaited && table.phase === "dealt"}
           />
           <Played table={table} />
         </div>
@@ -169,6 +174,13 @@ export function TableView(props: TableViewProps) {
             <Hand
               row={row}
               cards={hand}
+              empty={
+                handAwaited
+                  ? t().table.physical.handAwaitedText
+                  : mine.hand === undefined && mine.cardsLeft > 0
+                    ? t().table.physical.handUnknown
+                    : t().table.hand.empty
+              }
               picked={picked}
               received={mine.received}
               refusal={refusal}
@@ -208,6 +220,27 @@ export function TableView(props: TableViewProps) {
       )}
       {props.children}
     </div>
+  );
+}
+
+/** The state of a physical table, if there is something to say. */
+function Physical({ table }: { table: TableState }) {
+  const words = t().table.physical;
+  const { paused, violation } = table;
+  if (!paused && !violation) return null;
+  const seat = violation?.breach.seat;
+  return (
+    <>
+      {paused && <Notice kind="hint">{words.paused}</Notice>}
+      {violation && (
+        <Notice kind="fault">
+          {words.violation(
+            seat === undefined ? "" : nameOf(table, seat),
+            violationWords(table, violation.breach, violation.demand),
+          )}
+        </Notice>
+      )}
+    </>
   );
 }
 

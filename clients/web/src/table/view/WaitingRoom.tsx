@@ -75,8 +75,8 @@ export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
 }
 
 /** Whether the seat is ready for the game. */
-function isThere({ connected, builtIn }: SeatState): boolean {
-  return connected || builtIn !== "";
+function isThere({ connected, atTable, builtIn }: SeatState): boolean {
+  return connected || atTable || builtIn !== "";
 }
 
 /** A seat: its participant and whether it is ready, or what it waits for. */
@@ -97,8 +97,7 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
             <p class={`${css.state} small`}>
               <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
               <span class={ready ? css.there : ""}>
-                <span aria-hidden="true">{ready ? "✓" : "…"}</span>{" "}
-                {ready ? (seat.builtIn ? words.ready : words.here) : words.notHere}
+                <span aria-hidden="true">{ready ? "✓" : "…"}</span> {ready ? readyWords(seat) : words.notHere}
               </span>
             </p>
           </>
@@ -111,6 +110,11 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
       </div>
     </li>
   );
+}
+
+function readyWords({ atTable, builtIn }: SeatState): string {
+  if (atTable) return t().table.physical.atTable;
+  return builtIn ? t().table.room.ready : t().table.room.here;
 }
 
 interface WaysProps {
