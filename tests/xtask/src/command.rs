@@ -11,15 +11,15 @@ pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// A module run by the Python package's interpreter, in the package's folder, with all caches in
-/// the build folder.
-pub(crate) fn python_command(places: &Places, module: &str) -> Command {
+/// A module run by the Python packages' interpreter, in the folder of one of them, with all caches
+/// in the build folder.
+pub(crate) fn python_command(places: &Places, package: &str, module: &str) -> Command {
     let mut command = with_environment(places, Command::new(places.python()));
     command
         .args(["-m", module])
-        .current_dir(places.python_package());
+        .current_dir(places.root.join(package));
     command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
-    command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
+    command.env("MYPY_CACHE_DIR", places.own.join("mypy").join(package));
     // Most of the time of the learning tests is spent compiling; compiled programs are cached.
     command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
     command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");

@@ -28,11 +28,11 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         tool(places, "hadolint").arg("docker/Dockerfile"),
     )?;
 
-    if places.has_python_package() {
-        steps.run("set up Python", || setup::python_package(places))?;
-        python(places, steps)?;
-    } else {
+    if places.python_packages().is_empty() {
         steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
+    } else {
+        steps.run("set up Python", || setup::python_packages(places))?;
+        python(places, steps)?;
     }
     if places.has_web_package() {
         steps.run("set up web", || setup::web_package(places))?;
@@ -56,15 +56,20 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     })
 }
 
-/// The linter, formatter and type checker of the Python package, which must be set up.
+/// The linter, formatter and type checker of the Python packages, which must be set up.
 pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    steps.program(
-        "ruff check",
-        python_command(places, "ruff").args(["check", "."]),
-    )?;
-    let format = ["format", "--check", "."];
-    steps.program("ruff format", python_command(places, "ruff").args(format))?;
-    steps.program("mypy", &mut python_command(places, "mypy"))
+    for package in places.python_packages() {
+        let checks = [
+            ("ruff check", "ruff", &["check", "."][..]),
+            ("ruff format", "ruff", &["format", "--check", "."]),
+            ("mypy", "mypy", &[]),
+        ];
+        for (check, module, arguments) in checks {
+            let mut command = python_command(places, package, module);
+            steps.program(&format!("{check}, {package}"), command.args(arguments))?;
+        }
+    }
+    Ok(())
 }
 
 /// Checks a file against one of the schemas that come with the checker.

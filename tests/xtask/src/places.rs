@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// Why steps are skipped if [`Places::has_python_package`] is false.
+/// Why steps are skipped if there are no [`Places::python_packages`].
 pub(crate) const NO_PYTHON_PACKAGE: &str = "missing: clients/python/pyproject.toml";
 
 /// Why steps are skipped if [`Places::has_node_package`] is false.
@@ -42,14 +42,13 @@ impl Places {
         self.target.join("debug/chefshat")
     }
 
-    /// The Python package.
-    pub(crate) fn python_package(&self) -> PathBuf {
-        self.root.join("clients/python")
-    }
-
-    /// Whether there is a Python package to set up.
-    pub(crate) fn has_python_package(&self) -> bool {
-        self.python_package().join("pyproject.toml").exists()
+    /// The Python packages in the source tree, relative to its root: the SDK, then those built on
+    /// it.
+    pub(crate) fn python_packages(&self) -> Vec<&'static str> {
+        let all = ["clients/python", "clients/robot"];
+        all.into_iter()
+            .filter(|package| self.root.join(package).join("pyproject.toml").exists())
+            .collect()
     }
 
     /// The JavaScript agent.
@@ -88,12 +87,12 @@ impl Places {
         self.web_tree().join("clients/web")
     }
 
-    /// Virtual environment of the Python package.
+    /// Virtual environment of the Python packages.
     pub(crate) fn venv(&self) -> PathBuf {
         self.own.join("venv")
     }
 
-    /// Interpreter of the Python package's environment.
+    /// Interpreter of the Python packages' environment.
     pub(crate) fn python(&self) -> PathBuf {
         self.venv().join("bin/python")
     }

@@ -20,16 +20,22 @@ const OLDEST_NODE: u32 = 20;
 /// A file in each created folder that lists its sources.
 const MADE_FROM: &str = ".made-from";
 
-/// The Python package, editable, with its development extras, in its own environment.
-pub(crate) fn python_package(places: &Places) -> Result<(), Failure> {
-    let package = places.python_package();
-    let project = package.join("pyproject.toml");
-    let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
-    let editable = format!("{}[dev]", package.display());
-    // The path counts too: clones may share a build folder, and the package runs from its source
-    // folder.
-    let made_from = format!("{editable}\n{text}");
-    venv(&places.venv(), &made_from, &["--editable", &editable])
+/// The Python packages, editable, with their development extras, in one environment.
+pub(crate) fn python_packages(places: &Places) -> Result<(), Failure> {
+    let mut made_from = String::new();
+    let mut install = Vec::new();
+    for package in places.python_packages() {
+        let package = places.root.join(package);
+        let project = package.join("pyproject.toml");
+        let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
+        let editable = format!("{}[dev]", package.display());
+        // The path counts too: clones may share a build folder, and a package runs from its source
+        // folder.
+        made_from += &format!("{editable}\n{text}\n");
+        install.extend(["--editable".to_owned(), editable]);
+    }
+    let install: Vec<&str> = install.iter().map(String::as_str).collect();
+    venv(&places.venv(), &made_from, &install)
 }
 
 /// The checkers of tools.txt, in their own environment.

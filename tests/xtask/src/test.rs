@@ -18,7 +18,7 @@ use crate::web;
 pub(crate) enum Language {
     /// Engine, server, Rust SDK and system tests.
     Rust,
-    /// The package in clients/python.
+    /// The packages in clients/python and clients/robot.
     Python,
     /// The agent in clients/node.
     Node,
@@ -33,11 +33,11 @@ pub(crate) fn run(
     only: Option<Language>,
 ) -> Result<(), Failure> {
     let wants = |language| only.is_none_or(|only| only == language);
-    let (has_python, has_node) = (places.has_python_package(), places.has_node_package());
-    let has_web = places.has_web_package();
+    let has_python = !places.python_packages().is_empty();
+    let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
 
     if has_python && (wants(Language::Rust) || wants(Language::Python)) {
-        steps.run("set up Python", || setup::python_package(places))?;
+        steps.run("set up Python", || setup::python_packages(places))?;
     }
     if has_node && (wants(Language::Rust) || wants(Language::Node)) {
         steps.run("set up Node", || setup::node_package(places))?;
@@ -70,9 +70,12 @@ pub(crate) fn run(
     }
     if wants(Language::Python) {
         if has_python {
-            let cache = format!("cache_dir={}", places.own.join("pytest").display());
-            let mut pytest = python_command(places, "pytest");
-            steps.program("pytest", pytest.args(["-o", &cache]))?;
+            for package in places.python_packages() {
+                let cache = places.own.join("pytest").join(package);
+                let cache = format!("cache_dir={}", cache.display());
+                let mut pytest = python_command(places, package, "pytest");
+                steps.program(&format!("pytest, {package}"), pytest.args(["-o", &cache]))?;
+            }
             lint::python(places, steps)?;
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
