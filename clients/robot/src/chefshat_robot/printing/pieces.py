@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from chefshat_robot.deck import JOKERS, ROLES, Card, Piece, PieceKind
 from chefshat_robot.field import CARD_HEIGHT, CARD_TAG_CENTRE, CARD_TAG_SIZE, CARD_WIDTH
-from chefshat_robot.printing.canvas import CAP_HEIGHT, POINT, SOFT, Canvas
+from chefshat_robot.printing.canvas import CAP_HEIGHT, INK, POINT, SOFT, Canvas
 
 INGREDIENTS = (
     "truffle",
@@ -59,9 +59,11 @@ QR_CORNER = (5.5, CARD_HEIGHT - 5.5 - QR_SIZE)
 """Where the QR code lies on a card, in mm: its size without the quiet zone, and its top left corner."""
 
 MIDDLE = (CARD_WIDTH / 2, CARD_HEIGHT / 2)
-DISC = 16.5
+DISC = 16.0
 """Radius of the coloured disc behind a drawing, in mm."""
 DRAWING = 27.0
+INDEX = 36
+"""Size of the number beside the tags, in points."""
 
 
 def draw_piece(canvas: Canvas, piece: Piece) -> None:
@@ -81,7 +83,7 @@ def draw_back(canvas: Canvas, deck: int) -> None:
     canvas.rect(4, 4, CARD_WIDTH - 8, CARD_HEIGHT - 8, line=BACK_LINE, line_width=0.6, radius=3)
     canvas.rect(5.4, 5.4, CARD_WIDTH - 10.8, CARD_HEIGHT - 10.8, line=BACK_LINE, line_width=0.2, radius=2.2)
     for angle in (0, 180):
-        with canvas.at(MIDDLE[0], MIDDLE[1], angle):
+        with canvas.at(*MIDDLE, angle):
             canvas.symbol("joker", -12.5, -30, 25)
             canvas.text(0, 35.5, f"deck {deck}", 6, colour=BACK_LINE, align="middle")
     canvas.line(12, MIDDLE[1], CARD_WIDTH - 12, MIDDLE[1], colour=BACK_LINE, width=0.4)
@@ -108,7 +110,7 @@ def _card(canvas: Canvas, card: Card) -> None:
     remark = "starts the Shift" if card.is_golden else "counts as any face" if card.is_joker else f"{copies} in the deck"
     _front(canvas, colour, drawing, index, title, remark)
     if card.is_golden:
-        canvas.circle(*MIDDLE, DISC + 1.2, line=GOLD, line_width=0.5)
+        canvas.circle(*MIDDLE, DISC, line=GOLD, line_width=0.8)
 
 
 def _role(canvas: Canvas, role: str) -> None:
@@ -128,10 +130,13 @@ def _front(canvas: Canvas, colour: str, drawing: str, index: str, title: Sequenc
     """What all fronts share: the drawing on its disc, the index beside each tag, the title opposite the first."""
     canvas.circle(*MIDDLE, DISC, fill=tint(colour))
     canvas.symbol(drawing, MIDDLE[0] - DRAWING / 2, MIDDLE[1] - DRAWING / 2, DRAWING)
+    baseline = 26.5 + INDEX * POINT * CAP_HEIGHT
     for angle in (0, 180):
-        with canvas.at(MIDDLE[0], MIDDLE[1], angle):
-            size = 36
-            canvas.text(11 - MIDDLE[0], 26.5 + size * POINT * CAP_HEIGHT - MIDDLE[1], index, size, bold=True, align="middle")
+        with canvas.at(*MIDDLE, angle), canvas.at(-MIDDLE[0], -MIDDLE[1]):
+            canvas.text(11, baseline, index, INDEX, bold=True, align="middle")
+            # Upside down, a 6 would be a 9.
+            if index in ("6", "9"):
+                canvas.rect(8, baseline + 1.2, 6, 0.9, fill=INK)
     right = CARD_WIDTH - 5
     for line, word in enumerate(title):
         canvas.text(right, 8.4 + 5 * line, word, 14, bold=True, align="right")
@@ -143,8 +148,8 @@ def _front(canvas: Canvas, colour: str, drawing: str, index: str, title: Sequenc
 def _codes(canvas: Canvas, piece: Piece) -> None:
     """The two tags, the QR code, and the number in words."""
     for angle in (0, 180):
-        with canvas.at(MIDDLE[0], MIDDLE[1], angle):
-            canvas.tag(piece.tag, CARD_TAG_CENTRE[0] - MIDDLE[0], CARD_TAG_CENTRE[1] - MIDDLE[1], CARD_TAG_SIZE)
+        with canvas.at(*MIDDLE, angle), canvas.at(-MIDDLE[0], -MIDDLE[1]):
+            canvas.tag(piece.tag, *CARD_TAG_CENTRE, CARD_TAG_SIZE)
     canvas.qr(piece.qr_text, *QR_CORNER, QR_SIZE)
     for line, text in enumerate(("Chef's Hat", f"deck {piece.deck}", f"tag {piece.tag}")):
         canvas.text(QR_CORNER[0] + QR_SIZE + 2.4, QR_CORNER[1] + QR_SIZE - 5 + 2.4 * line, text, 5.5, colour=SOFT)
