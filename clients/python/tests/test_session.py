@@ -155,3 +155,14 @@ def test_a_snapshot_replaces_earlier_events(stage: Stage) -> None:
 
 def test_a_session_of_no_seats_is_done() -> None:
     assert PlaySession({}).done
+
+
+def test_a_seat_knows_which_events_happened_before_it_was_first_attached() -> None:
+    stage = Stage()
+    stage.connect()
+    stage.receive(attached(next_sequence=12))
+    (ask,) = stage.receive(decision(1))
+    stage.session.lost()
+    stage.connect()
+    stage.receive(attached(next_sequence=40))
+    assert ask.decision.seat_info.live_from == 12

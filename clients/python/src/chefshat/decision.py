@@ -22,14 +22,16 @@ class SeatInfo:
         game_id: 32 hexadecimal digits.
         seat: number of the seat, from 0.
         game_started: the start of the game (rule set, policy, participants, action space); None until the game has started.
+        live_from: number of the next event when the seat was first attached: events with a lower number had happened before.
     """
 
-    __slots__ = ("game_id", "game_started", "room_id", "seat")
+    __slots__ = ("game_id", "game_started", "live_from", "room_id", "seat")
 
-    def __init__(self, room_id: str, game_id: str, seat: int) -> None:
+    def __init__(self, room_id: str, game_id: str, seat: int, live_from: int = 0) -> None:
         self.room_id = room_id
         self.game_id = game_id
         self.seat = seat
+        self.live_from = live_from
         self.game_started: pb.GameStarted | None = None
 
     def __repr__(self) -> str:

@@ -286,7 +286,7 @@ class PlaySession:
         seat.attachments += 1
         self._by_handle[handle] = seat
         if seat.info is None:
-            seat.info = SeatInfo(attached.room_id, attached.game_id, attached.seat)
+            seat.info = SeatInfo(attached.room_id, attached.game_id, attached.seat, attached.next_sequence)
         seat.agent.on_attached(seat.info)
         # The last answer may not have arrived. The server acknowledges a repeated answer in the same way.
         self._send_answer(seat)

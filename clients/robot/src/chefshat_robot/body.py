@@ -1,0 +1,450 @@
+"""What a robot does at the table: the acts for its seat's turns and for the events of the game, and what happens when an act fails.
+
+Acts are performed one after another by one task. Two queues feed it: acts that the game needs (cards and what is said with them),
+all of which are performed, and reactions (looking, small talk), which are dropped when there is something more urgent. Who decides
+is elsewhere: an agent in `player`, a person on the page in `wizard`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from chefshat import pb
+
+from chefshat_robot import layout
+from chefshat_robot.drivers.driver import (
+    Act,
+    CardMove,
+    Driver,
+    Express,
+    Failed,
+    Gaze,
+    Outcome,
+    Pick,
+    Point,
+    Say,
+    attempt,
+    describe,
+)
+from chefshat_robot.layout import Stand
+from chefshat_robot.table import TableState, follow, plays_golden
+from chefshat_robot.words import Words
+
+LOG = logging.getLogger("chefshat_robot")
+# Reactions that wait; beyond that the oldest are dropped.
+MAX_REACTIONS = 4
+# Events that wait to be shown to the robot; beyond that the oldest are dropped.
+MAX_FORWARDS = 1000
+# Seconds in which acts still waiting may be finished at the end.
+FINISH_S = 30.0
+
+
+@dataclass(frozen=True)
+class Times:
+    """How long acts may take, in seconds; for `Pick` per piece.
+
+    Attributes:
+        say: speaking a sentence.
+        pick: carrying one piece.
+        point: pointing.
+        gaze: looking.
+        express: showing a feeling.
+    """
+
+    say: float = 15.0
+    pick: float = 20.0
+    point: float = 8.0
+    gaze: float = 4.0
+    express: float = 8.0
+
+    def of(self, act: Act) -> float:
+        """Returns the limit for an act."""
+        match act:
+            case Say():
+                return self.say
+            case Pick(moves):
+                return self.pick * len(moves)
+            case Point():
+                return self.point
+            case Gaze():
+                return self.gaze
+            case Express():
+                return self.express
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A message to the attendant.
+
+    Attributes:
+        kind: "help": a person has to do something; "unsaid": the robot could not say the text.
+        text: what to do, or what was to be said, in the robot's language.
+        reason: why.
+        cards: for "help" with cards: the pieces and where they go.
+    """
+
+    kind: str
+    text: str
+    reason: str
+    cards: tuple[CardMove, ...] = ()
+
+
+class Turn(NamedTuple):
+    """A play, or a pass if all are 0."""
+
+    face: int = 0
+    quantity: int = 0
+    jokers: int = 0
+
+    @property
+    def is_pass(self) -> bool:
+        """Whether it is a pass."""
+        return not (self.quantity or self.jokers)
+
+
+PASS = Turn()
+
+
+@dataclass
+class _Job:
+    """Acts performed in order. If a `Pick` among them fails, `plea` asks a person to do it, aloud and on the attendant's screen."""
+
+    acts: tuple[Act, ...]
+    plea: str = ""
+    done: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class Body:
+    """A robot at the table. An asynchronous context manager: entering connects the robot, leaving waits for acts in progress.
+
+    Attributes:
+        state: what the robot's seat knows of the game.
+        live_from: events with a lower number are of the past: they change the state, but the robot does not react.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        words: Words,
+        *,
+        seat: int | None = None,
+        notify: Callable[[Notice], None] = lambda notice: None,
+        on_act: Callable[[Act, Outcome], None] = lambda act, outcome: None,
+        times: Times | None = None,
+        stand: Stand | None = None,
+        handles_cards: bool = True,
+        finish_s: float = FINISH_S,
+    ) -> None:
+        """Creates the body.
+
+        Args:
+            driver: the robot; the body connects and closes it.
+            words: what it says.
+            seat: its seat; None: `seat_at` sets it.
+            notify: called with messages to the attendant.
+            on_act: called after each act with its outcome.
+            times: limits of acts.
+            stand: where its cards are; None: in front of its seat.
+            handles_cards: whether there are real cards. Otherwise it only speaks, looks and expresses.
+            finish_s: seconds for acts that still wait at the end.
+        """
+        self.driver = driver
+        self.words = words
+        self.state = TableState(seat=seat)
+        self.live_from = 0
+        self._notify = notify
+        self._on_act = on_act
+        self._times = times or Times()
+        self._stand = stand
+        self._handles_cards = handles_cards
+        self._finish_s = finish_s
+        self._pass_is_down = False
+        # The own turn that is being performed and that the game has not confirmed yet.
+        self._announced: Turn | None = None
+        self._needed: deque[_Job] = deque()
+        self._reactions: deque[_Job] = deque(maxlen=MAX_REACTIONS)
+        self._forwards: deque[tuple[pb.GameEvent, TableState]] = deque(maxlen=MAX_FORWARDS)
+        self._work = asyncio.Event()
+        self._idle = asyncio.Event()
+        self._idle.set()
+        self._worker: asyncio.Task[None] | None = None
+        self._forwarder: asyncio.Task[None] | None = None
+        self._forward_work = asyncio.Event()
+
+    async def __aenter__(self) -> Self:
+        await self.driver.__aenter__()
+        self._worker = asyncio.create_task(self._run(), name="robot acts")
+        self._forwarder = asyncio.create_task(self._forward(), name="robot events")
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if error is None:
+            try:
+                await asyncio.wait_for(self._idle.wait(), self._finish_s)
+            except TimeoutError:
+                LOG.warning("the robot did not finish its last acts within %g s", self._finish_s)
+        for task in (self._worker, self._forwarder):
+            if task is not None:
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
+        await self.driver.__aexit__(kind, error, trace)
+
+    def seat_at(self, seat: int, live_from: int = 0) -> None:
+        """Sets the robot's seat, and the number of the first event to react to."""
+        if self.state.seat is None:
+            self.live_from = live_from
+            self.state = replace(self.state, seat=seat)
+
+    async def take_turn(self, turn: Turn, limit_s: float) -> bool:
+        """Performs an own turn. Returns True when its acts have ended, False after `limit_s` seconds; they then continue.
+
+        If the limit is not positive, it returns at once.
+        """
+        self._announced = turn
+        job = self._turn_job(turn, self.state)
+        self._need(job)
+        if limit_s <= 0:
+            return False
+        try:
+            await asyncio.wait_for(job.done.wait(), limit_s)
+        except TimeoutError:
+            return False
+        return True
+
+    def say(self, text: str) -> None:
+        """Says a line, before anything less urgent."""
+        self._need(_Job((Say(text, self.words.language),)))
+
+    def express(self, label: str, valence: float = 0.0, arousal: float = 0.0) -> None:
+        """Shows an expression, before anything less urgent."""
+        self._need(_Job((Express(label, valence, arousal),)))
+
+    async def idle(self) -> None:
+        """Waits until nothing is left to perform."""
+        await self._idle.wait()
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        """Follows the game, and queues what the robot does about it. Call it for every event, in order."""
+        before = self.state
+        after = self.state = follow(before, event)
+        live = event.sequence >= self.live_from
+        if self._handles_cards:
+            self._follow_cards(event, before, after, live)
+        self._forwards.append((event, after))
+        self._forward_work.set()
+        if not live:
+            return
+        self._react(event, before, after)
+        if after.to_act is not None and after.to_act != before.to_act and after.to_act != after.seat:
+            face = layout.face_of(after.to_act, after.players)
+            self._reaction(Gaze(face.x, face.y, face.z))
+
+    # Cards.
+
+    def _follow_cards(self, event: pb.GameEvent, before: TableState, after: TableState, live: bool) -> None:
+        """Keeps the stand as the game has it, and moves the own cards that no decision has moved yet."""
+        own = after.seat
+        if own is None:
+            return
+        if self._stand is None and after.players:
+            self._stand = Stand.at(own, after.players)
+        stand = self._stand
+        if stand is None:
+            return
+        kind = event.WhichOneof("kind")
+        if kind == "shift_started":
+            stand.fill(after.hand, after.golden)
+            self._pass_is_down = False
+            self._announced = None
+        elif kind == "cards_exchanged" and event.cards_exchanged.giver == own:
+            self._give(event.cards_exchanged, before, after, stand, live)
+        elif kind == "cards_exchanged" and event.cards_exchanged.receiver == own and after.hand:
+            stand.settle(after.hand, after.golden)
+        elif kind == "pizza_done" and self._pass_is_down:
+            self._pass_is_down = False
+            rest, place = layout.pass_rest(own, after.players), layout.pass_place(own)
+            if live and place is not None:
+                self._need(_Job((Pick((CardMove("pass", place, rest),)),), self.words.say("please_return_pass")))
+
+    def _give(self, given: pb.CardsExchanged, before: TableState, after: TableState, stand: Stand, live: bool) -> None:
+        """Carries the gifts of the exchange to their receiver. What they are is not said."""
+        joker = after.faces + 1
+        pieces = [str(card) if card < joker else "joker" for card in given.cards]
+        if given.golden:
+            pieces[pieces.index(str(after.faces))] = "golden"
+        moves = stand.take(pieces, [layout.gift_place(given.receiver, after.players)] * len(pieces))
+        if after.hand:
+            stand.settle(after.hand, after.golden)
+        if live and moves:
+            name, count = after.name(given.receiver), self.words.some_cards(len(moves))
+            told = Say(self.words.say("give", count=count, name=name), self.words.language)
+            self._need(_Job((told, Pick(moves)), self.words.say("please_give", count=count, name=name)))
+
+    def _turn_job(self, turn: Turn, state: TableState) -> _Job:
+        """Returns what the robot does for a turn in a state, and takes the cards out of its stand."""
+        words = self.words
+        if turn.is_pass:
+            said = words.say("pass")
+            plea = words.say("please_pass")
+        else:
+            cards = words.cards(turn.face, turn.quantity, turn.jokers)
+            last = bool(state.hand) and sum(state.hand) == turn.quantity + turn.jokers
+            said = words.say("last_cards" if last else "play", cards=cards)
+            plea = words.say("please_lay", cards=words.my_cards(turn.face, turn.quantity, turn.jokers))
+        acts: list[Act] = [Say(said, words.language)]
+        if self._handles_cards and (moves := self._moves(turn, state)):
+            end = moves[0].end
+            acts += [Gaze(end.x, end.y), Pick(moves)]
+        return _Job(tuple(acts), plea)
+
+    def _moves(self, turn: Turn, state: TableState) -> tuple[CardMove, ...]:
+        own = state.seat
+        if own is None:
+            return ()
+        if turn.is_pass:
+            place = layout.pass_place(own)
+            if place is None or self._pass_is_down:
+                return ()
+            self._pass_is_down = not state.pass_scope_turn
+            return (CardMove("pass", layout.pass_rest(own, state.players), place),)
+        golden = plays_golden(state, turn.face, turn.quantity)
+        if not state.hand:  # A spectator sees no hand, only that the opening includes the Golden card.
+            golden = state.opening and state.golden_opening and turn.face == state.faces
+        pieces = layout.pieces_of_play(turn.face, turn.quantity, turn.jokers, golden)
+        stand = self._stand if self._stand is not None else Stand.at(own, state.players)
+        return stand.take(pieces, layout.play_places(len(pieces)))
+
+    def _own_turn(self, turn: Turn, before: TableState, after: TableState) -> None:
+        """Confirms the announced turn, or performs the one that counted instead."""
+        announced, self._announced = self._announced, None
+        if announced == turn:
+            return
+        if announced is not None and not announced.is_pass and self._handles_cards:
+            # The decision was too late: its cards lie on the table, but something else counted.
+            cards = self.words.my_cards(announced.face, announced.quantity, announced.jokers)
+            text = self.words.say("please_take_back", cards=cards)
+            self.say(text)
+            self._notify(Notice("help", text, "the decision was too late, and the default decision counted"))
+        self._need(self._turn_job(turn, before))
+        if self._stand is not None and after.hand:
+            self._stand.settle(after.hand, after.golden)
+
+    # Reactions.
+
+    def _react(self, event: pb.GameEvent, before: TableState, after: TableState) -> None:
+        words, own = self.words, after.seat
+        match event.WhichOneof("kind"):
+            case "game_started" if own is not None:
+                self._reaction(Express("joy", 0.6, 0.4), self._line("hello", name=after.name(own)))
+            case "play" if event.play.seat == own:
+                play = event.play
+                self._own_turn(Turn(play.face if play.quantity else 0, play.quantity, play.jokers), before, after)
+            case "pass" if getattr(event, "pass").seat == own:
+                self._own_turn(PASS, before, after)
+            case "special_action_declared" if event.special_action_declared.seat == own:
+                food_fight = event.special_action_declared.action == pb.SPECIAL_ACTION_FOOD_FIGHT
+                self.say(words.say("food_fight" if food_fight else "dinner"))
+                self.express("amusement", 0.6, 0.7)
+            case "special_action_declared":
+                self._reaction(Express("surprise", 0.1, 0.8))
+            case "pizza_done" if event.pizza_done.HasField("last_to_play"):
+                if own is not None and event.pizza_done.last_to_play == own == after.to_act:
+                    self._reaction(self._line("lead"))
+            case "shift_ended" if own is not None:
+                self._place(list(event.shift_ended.order).index(own) + 1, after.players)
+            case "game_ended" if own is not None:
+                best = event.game_ended.standings[0].seat
+                if best == own:
+                    self._reaction(Express("joy", 0.9, 0.8), self._line("win"))
+                else:
+                    self._reaction(self._line("lose", name=after.name(best)), Express("sadness", -0.3, -0.2))
+            case "game_aborted":
+                self._reaction(self._line("aborted"))
+
+    def _place(self, place: int, players: int) -> None:
+        """Reacts to the own place in a Shift."""
+        if place == 1:
+            self._reaction(Express("joy", 0.8, 0.6), self._line("finish_first"))
+        elif place == players:
+            self._reaction(Express("sadness", -0.6, -0.3), self._line("finish_last"))
+        else:
+            self._reaction(self._line("finish_middle", place=place))
+
+    def _line(self, key: str, **values: object) -> Say:
+        return Say(self.words.say(key, **values), self.words.language)
+
+    # The queues.
+
+    def _need(self, job: _Job) -> None:
+        self._needed.append(job)
+        self._reactions.clear()
+        self._wake()
+
+    def _reaction(self, *acts: Act) -> None:
+        self._reactions.append(_Job(acts))
+        self._wake()
+
+    def _wake(self) -> None:
+        self._idle.clear()
+        self._work.set()
+
+    async def _run(self) -> None:
+        """Performs jobs in order, the needed ones first."""
+        while True:
+            if job := self._next():
+                await self._perform(job)
+            else:
+                self._work.clear()
+                self._idle.set()
+                await self._work.wait()
+
+    def _next(self) -> _Job | None:
+        waiting = self._needed or self._reactions
+        return waiting.popleft() if waiting else None
+
+    async def _perform(self, job: _Job) -> None:
+        try:
+            for act in job.acts:
+                outcome = await self._attempt(act)
+                if isinstance(outcome, Failed):
+                    await self._failed(act, outcome.reason, job.plea)
+        except Exception:
+            LOG.exception("an act could not be performed")
+        finally:
+            job.done.set()
+
+    async def _attempt(self, act: Act) -> Outcome:
+        outcome = await attempt(self.driver, act, self._times.of(act))
+        self._on_act(act, outcome)
+        return outcome
+
+    async def _failed(self, act: Act, reason: str, plea: str) -> None:
+        """Reports a failed act to the attendant; for cards, also asks the table for help. Other failures are only logged."""
+        LOG.info("%s failed: %s", type(act).__name__, reason)
+        if isinstance(act, Say):
+            self._notify(Notice("unsaid", act.text, reason))
+        if isinstance(act, Pick):
+            self._notify(Notice("help", plea, reason, act.moves))
+            outcome = await self._attempt(Say(plea, self.words.language))
+            if isinstance(outcome, Failed):
+                self._notify(Notice("unsaid", plea, outcome.reason))
+
+    async def _forward(self) -> None:
+        """Shows events and states to the driver, independently of acts."""
+        while True:
+            await self._forward_work.wait()
+            self._forward_work.clear()
+            while self._forwards:
+                event, state = self._forwards.popleft()
+                try:
+                    async with asyncio.timeout(self._times.gaze):
+                        await self.driver.show_event(event)
+                        await self.driver.show_state(state)
+                except Exception as error:
+                    LOG.debug("the robot was not shown event %d: %s", event.sequence, describe(error))

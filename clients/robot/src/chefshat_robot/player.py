@@ -1,0 +1,127 @@
+"""An agent with a body: an agent of `chefshat` decides, and a robot does at the table what it decided.
+
+What the robot does is in `body`. A decision is answered when the robot has finished its turn, or when the time of the decision is
+nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+
+import chefshat
+from chefshat import ChefsHatError, Decision, SeatInfo, SeatResult, pb
+
+from chefshat_robot.body import PASS, Body, Turn
+from chefshat_robot.drivers.driver import RobotEvent
+
+# The part of a decision's time that is left for the answer to travel, and the least of it, in seconds.
+MARGIN = 0.15
+MIN_MARGIN_S = 1.0
+
+
+class RobotPlayer(chefshat.Agent):
+    """Plays a seat with an agent's decisions and a robot's body. For `chefshat.aio`, inside `async with` of its body."""
+
+    def __init__(
+        self,
+        agent: chefshat.Agent,
+        body: Body,
+        *,
+        hold_s: float | None = None,
+        on_robot_event: Callable[[RobotEvent], None] = lambda event: None,
+    ) -> None:
+        """Creates the player.
+
+        Args:
+            agent: decides.
+            body: acts.
+            hold_s: most seconds by which the robot's acts may delay an answer; None: as long as the decision's time allows.
+            on_robot_event: called with what the robot hears, reads in faces, and with its buttons.
+        """
+        self._agent = agent
+        self._body = body
+        self._hold_s = hold_s
+        self._on_robot_event = on_robot_event
+        self._listener: asyncio.Task[None] | None = None
+
+    async def decide(self, request: Decision) -> int:
+        """Lets the agent decide, and the robot act. Illegal actions of the agent are answered at once, without an act."""
+        asked = time.monotonic()
+        answer = self._agent.decide(request)
+        action = int(await answer if isinstance(answer, Awaitable) else answer)
+        if request.kind == pb.DECISION_KIND_TURN and action in request.legal_actions:
+            limit = limit_s(request.time_left_ms, time.monotonic() - asked)
+            if self._hold_s is not None:
+                limit = min(limit, self._hold_s)
+            await self._body.take_turn(turn_of(action, request.faces), limit)
+        return action
+
+    def on_attached(self, seat: SeatInfo) -> None:
+        """Sets the robot's seat."""
+        self._body.seat_at(seat.seat, seat.live_from)
+        if self._listener is None:
+            self._listener = asyncio.get_running_loop().create_task(self._listen(), name="robot perceives")
+        self._agent.on_attached(seat)
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        """Lets the agent and the robot follow the game."""
+        self._agent.on_event(event)
+        self._body.on_event(event)
+
+    def on_snapshot(self, snapshot: pb.Snapshot) -> None:
+        """Passes it to the agent."""
+        self._agent.on_snapshot(snapshot)
+
+    def on_result(self, result: pb.AnswerResult) -> None:
+        """Passes it to the agent."""
+        self._agent.on_result(result)
+
+    def on_refused(self, refused: pb.Refused) -> None:
+        """Passes it to the agent."""
+        self._agent.on_refused(refused)
+
+    def on_game_over(self, result: SeatResult) -> None:
+        """Passes it to the agent."""
+        self._end()
+        self._agent.on_game_over(result)
+
+    def on_seat_lost(self, error: ChefsHatError) -> None:
+        """Passes it to the agent."""
+        self._end()
+        self._agent.on_seat_lost(error)
+
+    async def _listen(self) -> None:
+        async for event in self._body.driver.events():
+            self._on_robot_event(event)
+
+    def _end(self) -> None:
+        if self._listener is not None:
+            self._listener.cancel()
+
+
+def limit_s(time_left_ms: int, used_s: float) -> float:
+    """Returns for how many seconds an answer may be held back: the decision's time without its bank, less a margin.
+
+    Args:
+        time_left_ms: milliseconds that the decision had when it arrived.
+        used_s: seconds that have passed since.
+    """
+    left = time_left_ms / 1000
+    return left - used_s - max(left * MARGIN, MIN_MARGIN_S)
+
+
+def turn_of(action: int, faces: int) -> Turn:
+    """Converts the index of a turn's action (docs/rules.md §8.1) for decks of `faces` faces."""
+    passing = 3 * faces * (faces + 1) // 2 + 1
+    if action == passing:
+        return PASS
+    if action == passing - 1:
+        return Turn(jokers=1)
+    cards, jokers = divmod(action, 3)
+    face = 1
+    while cards >= face:
+        cards -= face
+        face += 1
+    return Turn(face, cards + 1, jokers)

@@ -1,0 +1,207 @@
+"""`chefshat-robot robot`: takes a seat for a robot, whose decisions an agent makes, and plays the game to its end.
+
+Acts are in `body`, decisions in `player`, robots in `drivers`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
+from chefshat.agent import make_agent
+from chefshat.join_options import TICKET
+from chefshat.outcome import Played
+from chefshat.outcome import report as report_result
+
+from chefshat_robot import drivers, speech, wire
+from chefshat_robot.body import Body, Notice
+from chefshat_robot.cli import CommandError
+from chefshat_robot.drivers.driver import LOG, Act, Done, Driver, Outcome, RobotError, RobotEvent, Say
+from chefshat_robot.player import RobotPlayer
+from chefshat_robot.words import LANGUAGES, Words
+
+DESCRIPTION = """\
+Plays a seat with a robot: an agent decides, and the robot says, shows and lays what it decided. What the robot cannot do, it asks
+the people at the table to do; such requests also appear here and in the room.
+
+Examples:
+  chefshat-robot robot --address 127.0.0.1:50051 --room ABCDEF --name Pepe --driver simulated:frames=frames,png=true
+  chefshat-robot robot --room ABCDEF --name Pepe --language it --agent strong.safetensors --driver jsonlines:host=10.0.0.7
+
+The driver is NAME[:option=value,...]; --list-drivers shows all with their options.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of the subcommand."""
+    parser.description = DESCRIPTION
+    add_robot_arguments(parser)
+    parser.add_argument("--room", "--code", dest="room", metavar="CODE", help="the room's join code")
+    parser.add_argument(
+        "--ticket", help=f"resume a seat with its ticket, instead of --room; also from the environment variable {TICKET}"
+    )
+    parser.add_argument("--seat", type=int, help="the seat, from 0 (default: the first free one)")
+    parser.add_argument("--name", default="Robot", help="the robot's name, 1 to 64 characters (default: %(default)s)")
+    parser.add_argument(
+        "--agent",
+        default="random",
+        help="who decides: 'random', module:Class of a chefshat.Agent, or a trained network, FILE.safetensors (default: random)",
+    )
+    parser.add_argument("--seed", type=int, help="seed of the agent")
+    parser.add_argument(
+        "--hold", type=float, metavar="SECONDS", help="answer at the latest after so many seconds, while the robot is still moving"
+    )
+
+
+def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments that all commands with a robot share."""
+    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    parser.add_argument("--driver", default="simulated", metavar="SPEC", help="the robot (default: %(default)s)")
+    parser.add_argument("--list-drivers", action="store_true", help="list the drivers and their options, and exit")
+    parser.add_argument("--language", choices=LANGUAGES, default="en", help="what the robot speaks (default: %(default)s)")
+    parser.add_argument("--no-cards", action="store_true", help="there are no real cards: the robot only speaks, looks and shows")
+    parser.add_argument("--json", action="store_true", help="print requests for help and the result as lines of JSON")
+    parser.add_argument("--quiet", action="store_true", help="do not print what the robot says and does")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Runs the subcommand. Returns 0 if the game finished."""
+    ticket = arguments.ticket or os.environ.get(TICKET)
+
+    async def play() -> int:
+        if bool(ticket) == bool(arguments.room):
+            raise CommandError("give the room's join code (--room), or the ticket of a seat to resume (--ticket)")
+        agent = _agent(arguments.agent, arguments.seed)
+        async with aio.Client(arguments.address) as client:
+            taken = ticket or await _join(client, arguments)
+            result = await play_seat(
+                client,
+                taken,
+                agent,
+                drivers.create(arguments.driver),
+                words=Words(arguments.language),
+                handles_cards=not arguments.no_cards,
+                hold_s=arguments.hold,
+                notify=attendant(arguments.json),
+            )
+            return report_result(Played([result]), as_json=arguments.json)
+
+    return with_robot(arguments, play)
+
+
+def with_robot(arguments: argparse.Namespace, command: Callable[[], Any]) -> int:
+    """Runs a command's coroutine function with logging to standard error, and turns its errors into messages."""
+    if arguments.list_drivers:
+        print_drivers()
+        return 0
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
+    LOG.setLevel(logging.WARNING if arguments.quiet else logging.INFO)
+    try:
+        return int(asyncio.run(command()))
+    except (ChefsHatError, RobotError, OSError) as error:
+        raise CommandError(str(error)) from error
+    except KeyboardInterrupt:
+        return 130
+
+
+async def play_seat(
+    client: aio.Client,
+    ticket: str,
+    agent: Agent,
+    driver: Driver,
+    *,
+    words: Words,
+    handles_cards: bool = True,
+    hold_s: float | None = None,
+    notify: Callable[[Notice], None] = lambda notice: None,
+) -> SeatResult:
+    """Plays one seat with a robot until its game is over.
+
+    What the robot says is recorded with the game, and its requests for help are shown in the room (`speech`).
+
+    Args:
+        client: the connection to the server.
+        ticket: of the seat.
+        agent: decides.
+        driver: the robot, not connected yet.
+        words: what it says.
+        handles_cards: whether there are real cards.
+        hold_s: most seconds by which the robot's acts may delay an answer.
+        notify: called with messages to the attendant, in addition.
+
+    Raises:
+        RobotError: the robot cannot be reached at the start.
+        ChefsHatError: the seat was refused or lost.
+    """
+    outbox = speech.Outbox(client, ticket)
+
+    def noticed(notice: Notice) -> None:
+        notify(notice)
+        if notice.kind == "help":
+            outbox.send(speech.line(notice.text, label=speech.HELP))
+
+    def acted(act: Act, outcome: Outcome) -> None:
+        if isinstance(act, Say) and isinstance(outcome, Done):
+            outbox.send(speech.line(act.text, record_only=True))
+
+    def perceived(event: RobotEvent) -> None:
+        LOG.info("the robot perceived %s", event)
+        hook = getattr(agent, "on_robot_event", None)
+        if hook is not None:
+            hook(event)
+
+    async with outbox, Body(driver, words, notify=noticed, on_act=acted, handles_cards=handles_cards) as body:
+        player = RobotPlayer(agent, body, hold_s=hold_s, on_robot_event=perceived)
+        return await client.play(player, ticket, options=PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
+
+
+def attendant(as_json: bool) -> Callable[[Notice], None]:
+    """Returns a function that prints messages to the attendant: words on standard error, or JSON on standard output."""
+
+    def show(notice: Notice) -> None:
+        if as_json:
+            cards = [wire.move_to_json(move) for move in notice.cards]
+            line = {"event": notice.kind, "text": notice.text, "reason": notice.reason, "cards": cards}
+            print(json.dumps(line, ensure_ascii=False), flush=True)
+        else:
+            kind = "HELP" if notice.kind == "help" else "NOT SAID"
+            print(f"{kind}: {notice.text} ({notice.reason})", file=sys.stderr, flush=True)
+
+    return show
+
+
+def print_drivers() -> None:
+    """Prints every driver with its options."""
+    for name in drivers.DRIVERS:
+        print(f"{name:12} {drivers.summary(name)}")
+        for option, (kind, default) in drivers.options_of(drivers.find(name)).items():
+            print(f"{'':12}   {option}={kind.__name__.upper()}  (default: {default})")
+
+
+async def _join(client: aio.Client, arguments: argparse.Namespace) -> str:
+    joined = await client.join_room(arguments.room, arguments.name, kind=pb.PARTICIPANT_KIND_ROBOT, seat=arguments.seat)
+    print(f"if this process ends before the game, resume with --ticket {joined.ticket}", file=sys.stderr)
+    return joined.ticket
+
+
+def _agent(name: str, seed: int | None) -> Agent:
+    """Creates the agent that decides."""
+    try:
+        if name.endswith(".safetensors"):
+            from chefshat.learn import network
+            from chefshat.learn.play import NetworkAgent
+
+            return NetworkAgent(network.load(name))
+        return make_agent(name, seed)
+    except ImportError as error:
+        hint = ": a network needs  pip install 'chefshat[learn]'" if name.endswith(".safetensors") else ""
+        raise CommandError(f"--agent {name}: {error}{hint}") from error
+    except (AttributeError, TypeError, ValueError, OSError) as error:
+        raise CommandError(f"--agent {name}: {error}") from error

@@ -1,0 +1,294 @@
+"""What a robot does at the table, and what happens when it cannot."""
+
+from __future__ import annotations
+
+import chefshat
+import pytest
+from chefshat import Decision, SeatInfo, pb
+
+from chefshat_robot.body import PASS, Body, Notice, Times, Turn
+from chefshat_robot.drivers.driver import Act, CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Pose, RobotError, Say
+from chefshat_robot.player import RobotPlayer, limit_s, turn_of
+from chefshat_robot.words import Words
+from tests.loop import run
+from tests.robots import HAND, ScriptedRobot, game_started, numbered, passed, pizza_done, play, shift_started
+
+FAR_S = 3600.0
+
+
+def said(robot: ScriptedRobot) -> list[str]:
+    return [act.text for act in robot.acts if isinstance(act, Say)]
+
+
+def carried(robot: ScriptedRobot) -> list[CardMove]:
+    return [move for act in robot.acts if isinstance(act, Pick) for move in act.moves]
+
+
+async def table(robot: ScriptedRobot, notices: list[Notice], times: Times | None = None) -> Body:
+    """A body at seat 1, after the deal."""
+    body = Body(robot, Words("en"), seat=1, notify=notices.append, times=times)
+    await body.__aenter__()
+    for event in numbered(game_started(), shift_started()):
+        body.on_event(event)
+    await body.idle()
+    robot.acts.clear()
+    notices.clear()
+    return body
+
+
+def test_a_turn_is_said_looked_at_and_laid_from_the_stand_to_the_field() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        assert await body.take_turn(Turn(11, 2, 1), FAR_S)
+        assert [type(act) for act in robot.acts] == [Say, Gaze, Pick]
+        assert said(robot) == ["I play two 11s and a joker."]
+        moves = carried(robot)
+        # The opening plays the Golden card first; the hand is in the stand in order, the Golden card behind the other 11s.
+        assert [move.piece for move in moves] == ["golden", "11", "joker"]
+        starts = [move.start for move in moves]
+        # Seat 1 sits at the left: its stand runs along the left side of the field, slot 14 (golden), 10 (first 11), 15 (joker).
+        assert [start.y for start in starts if start] == [200 - 200 + 25 * slot for slot in (14, 10, 15)]
+        assert {(start.x, start.angle) for start in starts if start} == {(-130.0, 90.0)}
+        assert [(move.end.x, move.end.y) for move in moves] == [(97.5, 151.0), (170.5, 151.0), (243.5, 151.0)]
+        assert notices == []
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_a_pass_puts_the_pass_card_down_and_takes_it_back_when_the_pizza_is_done() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        await body.take_turn(PASS, FAR_S)
+        for event in list(numbered({}, {}, passed(1), pizza_done(0, 0)))[2:]:
+            body.on_event(event)
+        await body.idle()
+        there, back = carried(robot)
+        assert (there.piece, there.end) == ("pass", Pose(36.0, 200.0, 0.0))
+        assert (back.start, back.end) == (there.end, there.start)
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_a_failed_pick_is_asked_of_the_people_aloud_and_reported() -> None:
+    def drops(act: Act) -> Outcome:
+        return Failed("the gripper is jammed") if isinstance(act, Pick) else Done()
+
+    async def test() -> None:
+        robot, notices = ScriptedRobot(drops), list[Notice]()
+        body = await table(robot, notices)
+        await body.take_turn(Turn(9, 2, 0), FAR_S)
+        assert said(robot) == ["I play two 9s.", "Please lay my two 9s for me."]
+        (notice,) = notices
+        assert (notice.kind, notice.text, notice.reason) == ("help", "Please lay my two 9s for me.", "the gripper is jammed")
+        assert [move.piece for move in notice.cards] == ["9", "9"]
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+@pytest.mark.parametrize(
+    ("failure", "reason"),
+    [(RobotError("the robot has closed its socket"), "closed its socket"), (ZeroDivisionError("a bug"), "a bug"), (None, "0.01 s")],
+)
+def test_a_robot_that_is_gone_or_hangs_is_reported_and_stopped(failure: Exception | None, reason: str) -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(lambda act: failure), list[Notice]()
+        body = await table(robot, notices, Times(say=0.01, pick=0.005, gaze=0.01, express=0.01))
+        assert await body.take_turn(Turn(9, 2, 0), FAR_S)
+        assert [(notice.kind, notice.text) for notice in notices] == [
+            ("unsaid", "I play two 9s."),
+            ("help", "Please lay my two 9s for me."),
+            ("unsaid", "Please lay my two 9s for me."),
+        ]
+        assert all(reason in notice.reason for notice in notices)
+        assert bool(robot.stops) == (failure is None)
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_a_default_decision_is_performed_and_the_cards_laid_too_late_are_asked_back() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        await body.take_turn(Turn(9, 2, 0), FAR_S)
+        for event in list(numbered({}, {}, passed(1)))[2:]:
+            body.on_event(event)
+        await body.idle()
+        take_back = "I was too late, so that does not count. Please put my two 9s back into my stand."
+        assert said(robot) == ["I play two 9s.", take_back, "I pass."]
+        assert [(notice.kind, notice.text) for notice in notices] == [("help", take_back)]
+        assert [move.piece for move in carried(robot)] == ["9", "9", "pass"]
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_own_turns_that_nobody_announced_are_performed_once_and_announced_ones_not_again() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        await body.take_turn(Turn(9, 1, 0), FAR_S)
+        for event in list(numbered({}, {}, play(1, 9, 1, cards_left=16), play(1, 7, 1, cards_left=15)))[2:]:
+            body.on_event(event)
+        await body.idle()
+        assert said(robot) == ["I play one 9.", "I play one 7."]
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_events_of_the_past_are_followed_without_acts() -> None:
+    async def test() -> None:
+        robot = ScriptedRobot()
+        async with Body(robot, Words("en")) as body:
+            body.seat_at(1, live_from=4)
+            for event in numbered(game_started(), shift_started(), play(1, 11, 1, cards_left=16), passed(2)):
+                body.on_event(event)
+            await body.idle()
+            assert [type(act) for act in robot.acts] == [Gaze]
+            assert body.state.hand[10] == 4
+            assert not body.state.golden
+            await body.take_turn(Turn(11, 1, 0), FAR_S)
+            assert [move.piece for move in carried(robot)] == ["11"]
+
+    run(test())
+
+
+def test_it_looks_at_the_seat_that_is_to_act() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        for event in list(numbered({}, {}, play(2, 11, 1)))[2:]:
+            body.on_event(event)
+        await body.idle()
+        # Seat 3 sits at the right.
+        assert robot.acts == [Gaze(910.0, 200.0, 450.0)]
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_gifts_are_carried_without_saying_what_they_are() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        gift = pb.CardsExchanged(giver=1, receiver=3, count=2, cards=[10, 11], golden=True)
+        got = pb.CardsExchanged(giver=3, receiver=1, count=2, cards=[1, 3])
+        for event in list(numbered({}, {}, {"cards_exchanged": gift}, {"cards_exchanged": got}))[2:]:
+            body.on_event(event)
+        await body.idle()
+        assert said(robot) == ["I give two cards to Dan."]
+        assert [move.piece for move in carried(robot)] == ["10", "golden"]
+        assert {(move.end.x, move.end.y) for move in carried(robot)} == {(630.0, 200.0)}
+        # What it received lies in the slots that became free, and is found there.
+        await body.take_turn(Turn(1, 1, 0), FAR_S)
+        start = carried(robot)[-1].start
+        assert start is not None
+        assert start.y == 25 * HAND.index(10)
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_winning_and_losing_show() -> None:
+    async def ends(order: list[int], winner: int) -> list[Act]:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        shift = pb.ShiftEnded(shift=1, order=order, shift_points=[0] * 4, points=[0] * 4)
+        game = pb.GameEnded(standings=[pb.Standing(seat=winner, points=5, place=1)])
+        for event in list(numbered({}, {}, {"shift_ended": shift}, {"game_ended": game}))[2:]:
+            body.on_event(event)
+        await body.idle()
+        await body.__aexit__(None, None, None)
+        return robot.acts
+
+    won = run(ends([1, 0, 2, 3], 1))
+    assert [act.valence > 0 for act in won if isinstance(act, Express)] == [True, True]
+    assert Say("I won the game! Thank you for playing.") in won
+    lost = run(ends([0, 2, 3, 1], 2))
+    assert [act.valence < 0 for act in lost if isinstance(act, Express)] == [True, True]
+    assert Say("Cleo has won. Well played!") in lost
+
+
+class Takes(chefshat.Agent):
+    """Takes an action, legal or not."""
+
+    def __init__(self, action: int) -> None:
+        self.action = action
+
+    def decide(self, request: Decision) -> int:
+        return self.action
+
+
+def request(legal: list[int], time_left_ms: int = 3_600_000) -> Decision:
+    """A turn of seat 1."""
+    mask = bytearray(27)
+    for action in legal:
+        mask[action // 8] |= 1 << action % 8
+    message = pb.DecisionRequest(
+        decision_id=1,
+        kind=pb.DECISION_KIND_TURN,
+        action_mask=bytes(mask),
+        observation=pb.Observation(hand=bytes(12)),
+        time_left_ms=time_left_ms,
+    )
+    return Decision(message, SeatInfo("room", "game", 1))
+
+
+def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_robot_does() -> None:
+    async def test() -> None:
+        for behaviour, time_left_ms in [(Done(), 3_600_000), (Failed("no"), 3_600_000), (None, 1100), (None, 0)]:
+            robot, notices = ScriptedRobot(lambda act, outcome=behaviour: outcome), list[Notice]()  # type: ignore[misc]
+            async with Body(robot, Words("en"), notify=notices.append, finish_s=0) as body:
+                player = RobotPlayer(Takes(199), body)
+                player.on_attached(SeatInfo("room", "game", 1))
+                assert await player.decide(request([0, 199], time_left_ms)) == 199
+                assert said(robot)[:1] == (["I pass."] if time_left_ms else [])
+
+    run(test())
+
+
+def test_an_illegal_action_is_answered_without_an_act() -> None:
+    async def test() -> None:
+        robot = ScriptedRobot()
+        async with Body(robot, Words("en"), seat=1) as body:
+            assert await RobotPlayer(Takes(5), body).decide(request([0, 199])) == 5
+        assert robot.acts == []
+
+    run(test())
+
+
+def test_answers_are_held_back_no_longer_than_the_time_of_the_decision() -> None:
+    assert limit_s(60_000, 0) == pytest.approx(51)
+    assert limit_s(60_000, 20) == pytest.approx(31)
+    assert limit_s(2_000, 0) == pytest.approx(1)
+    assert limit_s(500, 0) < 0
+
+
+def test_actions_are_turns() -> None:
+    assert turn_of(0, 11) == Turn(1, 1, 0)
+    assert turn_of(199, 11) == PASS
+    assert turn_of(198, 11) == Turn(jokers=1)
+    assert turn_of(197, 11) == Turn(11, 11, 2)
+    indices = [3 * (face * (face - 1) // 2 + quantity - 1) + jokers
+               for face in range(1, 12) for quantity in range(1, face + 1) for jokers in range(3)]  # fmt: skip
+    turns = [Turn(face, quantity, jokers) for face in range(1, 12) for quantity in range(1, face + 1) for jokers in range(3)]
+    assert [turn_of(index, 11) for index in indices] == turns
+
+
+def test_a_turn_is_not_delayed_by_reactions_that_wait() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        for event in list(numbered({}, {}, play(2, 11, 1), passed(3), play(0, 10, 1)))[2:]:
+            body.on_event(event)
+        await body.take_turn(PASS, FAR_S)
+        assert [type(act) for act in robot.acts] == [Say, Gaze, Pick]
+        await body.__aexit__(None, None, None)
+
+    run(test())

@@ -1,0 +1,163 @@
+"""Robots in games on the real server, and the command `chefshat-robot robot`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from chefshat import RandomAgent, aio, pb
+
+from chefshat_robot import cli, drivers, speech
+from chefshat_robot.body import Notice, Turn
+from chefshat_robot.drivers.driver import Done, Failed, Pick, Say
+from chefshat_robot.robot import play_seat
+from chefshat_robot.words import TEXTS, Words
+from tests.loop import run
+from tests.robots import ScriptedRobot
+
+ONE_SHIFT = pb.RuleSet(target_shifts=1)
+
+
+async def room(client: aio.Client) -> str:
+    """Creates a room with built-in agents and a free seat, and returns its join code."""
+    made = await client.create_room("robots", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
+    return made.join_code
+
+
+async def own_turns(client: aio.Client, game_id: str, seat: int) -> list[Turn]:
+    """The turns of a seat by the record."""
+    turns = []
+    async for line in client.record(game_id):
+        event = line.event
+        if line.HasField("event") and event.HasField("play") and event.play.seat == seat:
+            turns.append(Turn(event.play.face if event.play.quantity else 0, event.play.quantity, event.play.jokers))
+        elif line.HasField("event") and event.HasField("pass") and getattr(event, "pass").seat == seat:
+            turns.append(Turn())
+    return turns
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("jammed", [False, True])
+def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, jammed: bool) -> None:
+    robot = ScriptedRobot(lambda act: Failed("jammed") if jammed and isinstance(act, Pick) else Done())
+    notices: list[Notice] = []
+
+    async def test() -> tuple[list[Turn], list[pb.RecordLine]]:
+        async with aio.Client(server_address) as client:
+            seat = await client.join_room(await room(client), "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), notify=notices.append)
+            assert result.finished
+            assert (result.late, result.invalid) == (0, 0)
+            turns = await own_turns(client, result.game_id, result.seat)
+            return turns, [line async for line in client.record(result.game_id)]
+
+    turns, record = run(test())
+    assert turns
+    cards = [[move.piece for move in act.moves if move.piece != "pass"] for act in robot.acts if isinstance(act, Pick)]
+    laid = [pieces for pieces in cards if pieces]
+    assert [len(pieces) for pieces in laid] == [turn.quantity + turn.jokers for turn in turns if not turn.is_pass]
+    for pieces, turn in zip(laid, [turn for turn in turns if not turn.is_pass], strict=True):
+        faces = {"11" if piece == "golden" else piece for piece in pieces if piece != "joker"}
+        assert faces == ({str(turn.face)} if turn.quantity else set())
+        assert pieces.count("joker") == turn.jokers
+    assert all(move.start is not None for act in robot.acts if isinstance(act, Pick) for move in act.moves)
+    assert sum(act == Say("I pass.") for act in robot.acts) == sum(turn.is_pass for turn in turns)
+    # What it said is in the record, its requests for help in the game's public events.
+    said = [text for line in record if (text := speech.text_of(line.private_expression.expression))]
+    assert said
+    assert said == [act.text for act in robot.acts if isinstance(act, Say)][: len(said)]
+    asked = [text for line in record if (text := speech.text_of(line.event.expression_shown.expression))]
+    assert bool(asked) == jammed
+    assert asked == [notice.text for notice in notices][: len(asked)]
+
+
+@pytest.mark.server
+def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    async def code() -> str:
+        async with aio.Client(server_address) as client:
+            return await room(client)
+
+    arguments = ["--address", server_address, "--room", run(code()), "--seed", "3", "--json", "--language", "it"]
+    driver = f"simulated:frames={tmp_path / 'frames'},speed=0,clumsy=true"
+    assert cli.main(["robot", *arguments, "--driver", driver]) == 0
+    out, err = capsys.readouterr()
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert lines[-1]["event"] == "finished"
+    assert {line["event"] for line in lines[:-1]} == {"help"}
+    assert any("al posto mio" in line["text"] for line in lines[:-1])
+    assert "resume with --ticket" in err
+    frames = sorted((tmp_path / "frames").glob("*.svg"))
+    assert len(frames) > 20
+    assert any("Passo." in frame.read_text() or "Gioco" in frame.read_text() for frame in frames)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--room", "X", "--ticket", "Y"], "give the room's join code (--room), or the ticket"),
+        ([], "give the room's join code (--room), or the ticket"),
+        (["--room", "X", "--agent", "nonsense"], "--agent nonsense: give 'random' or module:Class"),
+        (["--room", "X", "--agent", "missing.safetensors"], "--agent missing.safetensors"),
+        (["--room", "X", "--address", "127.0.0.1:1"], "no server answers"),
+    ],
+)
+def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["robot", *arguments]) == 1
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("unknown", "no driver 'unknown': give one of simulated"),
+        ("simulated:colour=red", "driver simulated has no option 'colour'"),
+        ("simulated:speed=fast", "option speed of driver simulated: 'fast' is not a number"),
+        ("simulated:png=perhaps", "option png of driver simulated: 'perhaps' is not true or false"),
+        ("no.such.Driver", "driver no.such.Driver: No module named 'no'"),
+        ("chefshat_robot.words.Words", "Words is not a subclass"),
+    ],
+)
+def test_wrong_drivers_are_explained(spec: str, message: str) -> None:
+    with pytest.raises(drivers.RobotError) as error:
+        drivers.create(spec)
+    assert message in str(error.value)
+
+
+def test_drivers_are_listed_with_their_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["robot", "--list-drivers"]) == 0
+    out = capsys.readouterr().out
+    for name in drivers.DRIVERS:
+        assert name in out
+    assert "speed=FLOAT  (default: 1.0)" in out
+
+
+def test_an_own_class_is_a_driver() -> None:
+    assert isinstance(drivers.create("tests.robots.ScriptedRobot"), ScriptedRobot)
+
+
+def test_both_languages_have_all_texts_with_the_same_values() -> None:
+    def values(text: str) -> set[str]:
+        return {part.split("}")[0] for part in text.split("{")[1:]}
+
+    english, italian = TEXTS["en"], TEXTS["it"]
+    assert english.keys() == italian.keys()
+    assert {key: values(text) for key, text in english.items()} == {key: values(text) for key, text in italian.items()}
+
+
+def test_cards_are_named_in_both_languages() -> None:
+    assert Words("en").cards(9, 2, 1) == "two 9s and a joker"
+    assert Words("en").my_cards(9, 1, 2) == "my 9 and my jokers"
+    assert Words("it").cards(9, 1, 0) == "un 9"
+    assert Words("it").my_cards(11, 3, 1) == "i miei tre 11 e il mio jolly"
+    assert Words("en").cards(0, 0, 1) == "a joker"
+
+
+def test_lines_travel_in_expressions_within_the_protocols_limit() -> None:
+    for text in ("I pass.", "È la mia ultima carta, perché no? 100 % & più", "ò" * 300):
+        expression = speech.line(text, by_person=True)
+        assert len(expression.media.encode()) <= 256
+        carried = speech.text_of(expression)
+        assert carried is not None
+        assert carried == text or (carried.endswith("…") and text.startswith(carried[:-1]))
+    assert speech.text_of(pb.Expression(label="joy")) is None
