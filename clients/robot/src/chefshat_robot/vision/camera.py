@@ -1,0 +1,83 @@
+"""The inner geometry of a camera, as calibration finds it and a file keeps it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera's intrinsics, for one size of its pictures.
+
+    Attributes:
+        width: Width of its pictures in pixels.
+        height: Height of its pictures in pixels.
+        matrix: Focal lengths and principal point in pixels; shape (3, 3).
+        distortion: Distortion of the lens as OpenCV orders it (k1, k2, p1, p2, k3); shape (5,).
+        error: Root mean square error of the calibration in pixels; 0 for a synthetic camera.
+    """
+
+    width: int
+    height: int
+    matrix: NDArray[np.float64]
+    distortion: NDArray[np.float64]
+    error: float = 0.0
+
+    def undistort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where a lens without distortion would show points; shape (n, 2), pixels."""
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-4)
+        found = cv2.undistortPoints(
+            np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 1, 2),
+            self.matrix,
+            self.distortion,
+            None,
+            np.eye(3),
+            self.matrix,
+            criteria,
+        )
+        return np.asarray(found, dtype=np.float64).reshape(-1, 2)
+
+    def distort(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where this lens shows points that a lens without distortion shows at `points`; shape (n, 2), pixels."""
+        rays = (
+            cv2.convertPointsToHomogeneous(np.ascontiguousarray(points, dtype=np.float64)).reshape(-1, 3)
+            @ np.linalg.inv(self.matrix).T
+        )
+        zero = np.zeros(3)
+        found, _ = cv2.projectPoints(np.ascontiguousarray(rays), zero, zero, self.matrix, self.distortion)
+        return np.asarray(found, dtype=np.float64).reshape(-1, 2)
+
+    def save(self, path: Path) -> None:
+        """Writes the camera to a JSON file."""
+        values = {
+            "width": self.width,
+            "height": self.height,
+            "matrix": self.matrix.tolist(),
+            "distortion": self.distortion.tolist(),
+            "error": self.error,
+        }
+        path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> Camera:
+        """Reads a camera from a JSON file that `save` wrote.
+
+        Raises:
+            OSError: The file cannot be read.
+            ValueError: It is not the file of a camera.
+        """
+        try:
+            values = json.loads(path.read_text(encoding="utf-8"))
+            matrix = np.asarray(values["matrix"], dtype=np.float64)
+            distortion = np.asarray(values["distortion"], dtype=np.float64)
+            if matrix.shape != (3, 3) or distortion.shape != (5,):
+                raise ValueError("wrong shapes")
+            return cls(int(values["width"]), int(values["height"]), matrix, distortion, float(values["error"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is not a camera's calibration; make one with `chefshat-robot calibrate`") from error
