@@ -196,6 +196,21 @@ def test_nothing_lies_within_the_margins(printed: dict[str, list[Page]]) -> None
             assert (page.grey[~outside] < 255).any(), (part, number)
 
 
+def test_tags_have_a_quiet_zone_of_a_module(printed: dict[str, list[Page]]) -> None:
+    checked = 0
+    for page in [page for pages in printed.values() for page in pages]:
+        for tag in page.tags():
+            # The last pixel of the tag itself may be grey.
+            inner, outer = tag.size / 2 + 0.25, tag.size * 5 / 8
+            (left, top), (right, bottom) = ((np.array([tag.x, tag.y]) + side * outer) * page.pixels_per_mm for side in (-1, 1))
+            around = page.grey[round(top) : round(bottom), round(left) : round(right)].copy()
+            edge = round((outer - inner) * MM)
+            around[edge:-edge, edge:-edge] = 255
+            assert (around == 255).all(), tag
+            checked += 1
+    assert checked == 2 * (68 + 6 + 6) + 4 + 4
+
+
 def test_decks_are_told_apart(tmp_path: Path) -> None:
     for deck in range(DECKS):
         (page,) = pages_of(print_game(PAPERS["a4"], deck, ["passes"]), tmp_path)

@@ -112,7 +112,8 @@ def _plan(canvas: Canvas, tiling: Tiling, sheet: int, x: float, y: float, advice
     canvas.text(text_x, y + 2.6, tiling.name.capitalize(), 11, bold=True)
     lines = [
         "Cut along the grey lines, but leave the hatched flaps.",
-        "Glue each flap under the sheet that it names: the rows first, then one row to the next.",
+        "Glue each flap under the sheet that it names"
+        + (": the rows first, then one row to the next." if tiling.rows > 1 else "."),
         *advice,
     ]
     for number, text in enumerate(lines):
