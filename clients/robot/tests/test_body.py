@@ -66,7 +66,7 @@ def test_a_pass_puts_the_pass_card_down_and_takes_it_back_when_the_pizza_is_done
             body.on_event(event)
         await body.idle()
         there, back = carried(robot)
-        assert (there.piece, there.end) == ("pass", Pose(36.0, 200.0, 0.0))
+        assert (there.piece, there.end) == ("pass", Pose(45.0, 256.0, 0.0))
         assert (back.start, back.end) == (there.end, there.start)
         await body.__aexit__(None, None, None)
 

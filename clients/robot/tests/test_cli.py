@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -43,6 +45,11 @@ def test_a_missing_library_is_named_with_its_extra(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "segno", None)
     assert cli.main(["print"]) == 1
     assert "needs the library segno; install it with: pip install 'chefshat-robot[print]'" in capsys.readouterr().err
+
+
+def test_the_extra_of_every_subcommand_exists() -> None:
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    assert {entry.extra for entry in cli.COMMANDS.values()} <= set(project["optional-dependencies"])
 
 
 def test_the_libraries_of_a_subcommand_are_imported_only_for_it() -> None:

@@ -48,7 +48,7 @@ class Entry:
 
 
 COMMANDS = {
-    "robot": Entry("robot", "robot", "play a seat with a robot, whose decisions an agent makes"),
+    "robot": Entry("robot", "robots", "play a seat with a robot, whose decisions an agent makes"),
     "print": Entry("printing.command", "print", "write the cards, the playing field and the calibration sheet as a PDF"),
 }
 
