@@ -20,6 +20,7 @@ const pages: Pages = {
   new: async () => (await import("./lobby/NewRoom")).NewRoom,
   join: async () => (await import("./lobby/Join")).Join,
   room: async () => (await import("./table/RoomPage")).RoomPage,
+  attend: async () => (await import("./attend/AttendPage")).AttendPage,
   watch: async () => (await import("./table/WatchPage")).WatchPage,
   replay: async () => (await import("./replay/ReplayPage")).ReplayPage,
   tournaments: async () => (await import("./tournaments/TournamentsPage")).TournamentsPage,

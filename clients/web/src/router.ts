@@ -1,4 +1,4 @@
-// Maps addresses to pages and navigates between them without reloading the document. Addresses
+// Maps addresses to pages and navigates between them without reloading the document. Routes
 // contain no "#": the server returns the same document for every path. The pages themselves are in
 // app.tsx.
 
@@ -9,6 +9,7 @@ export type Route =
   | { page: "lobby" }
   | { page: "new" }
   | { page: "room"; roomId: string }
+  | { page: "attend"; roomId: string }
   | { page: "join"; code: string }
   | { page: "watch"; roomId: string }
   | { page: "replay"; gameId: string }
@@ -23,7 +24,8 @@ export type Route =
 /** Parses a path such as "/rooms/0123". */
 export function routeOf(path: string): Route {
   const parts = path.split("/").filter((part) => part !== "");
-  const [first, second] = parts.map(decoded);
+  const [first, second, third] = parts.map(decoded);
+  if (parts.length === 3 && first === "rooms" && third === "table") return { page: "attend", roomId: second ?? "" };
   if (parts.length > 2) return { page: "unknown" };
   if (second === undefined) {
     switch (first) {
@@ -68,6 +70,8 @@ export function pathOf(route: Route): string {
       return "/";
     case "room":
       return `/rooms/${encodeURIComponent(route.roomId)}`;
+    case "attend":
+      return `/rooms/${encodeURIComponent(route.roomId)}/table`;
     case "join":
       return route.code === "" ? "/join" : `/join/${encodeURIComponent(route.code)}`;
     case "watch":

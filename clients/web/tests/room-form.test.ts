@@ -6,7 +6,16 @@ import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { CreateRoomRequestSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { Opening, PassScope, RuleSetSchema } from "../src/gen/chefshat/v1/rules_pb";
 import { gameProblems, withPreset } from "../src/lobby/game-form";
-import { MAX_NAME, newForm, quickGame, type RoomForm, requestOf, withPlayers } from "../src/lobby/room-form";
+import {
+  MAX_NAME,
+  namesMissing,
+  newForm,
+  quickGame,
+  type RoomForm,
+  requestOf,
+  withCards,
+  withPlayers,
+} from "../src/lobby/room-form";
 
 const AGENTS = ["random", "greedy", "trained"];
 const form = (changed: Partial<RoomForm> = {}): RoomForm => ({ ...newForm(AGENTS), ...changed });
@@ -21,6 +30,35 @@ test("a new form has a person against the strongest agents", () => {
   ]);
   const few = create(CreateRoomRequestSchema, requestOf(newForm(["random"])));
   expect(few.seats.slice(1).map(({ filledBy }) => filledBy.value)).toEqual(["random", "random", "random"]);
+});
+
+test("with real cards everybody but built-in agents sits at the table, with a name", () => {
+  const real = withCards(form({ seats: ["human", "robot", "anybody", "built-in greedy"] }), "real");
+  expect(real.seats).toEqual(["at-table human", "at-table human", "at-table human", "built-in greedy"]);
+  expect(withPlayers(real, 5).seats.at(-1)).toBe("at-table human");
+  const named = {
+    ...real,
+    seats: real.seats.with(1, "at-table robot").with(2, "agent"),
+    seatNames: [" Ada ", "", "Cy"],
+  };
+  expect(namesMissing(named)).toBe(true);
+  const complete = { ...named, seatNames: [" Ada ", "Bo", "Cy"] };
+  expect(namesMissing(complete)).toBe(false);
+  const request = asked(complete);
+  expect(request.physical).toBe(true);
+  expect(request.seats.map(({ filledBy, name }) => [filledBy.case, filledBy.value, name])).toEqual([
+    ["atTable", ParticipantKind.HUMAN, "Ada"],
+    ["atTable", ParticipantKind.ROBOT, "Bo"],
+    ["reservedFor", ParticipantKind.AGENT, ""],
+    ["builtInAgent", "greedy", ""],
+  ]);
+});
+
+test("with cards dealt by the server nobody sits at the table", () => {
+  const real = withCards(form({ seats: ["at-table human", "at-table robot", "agent", "built-in greedy"] }), "dealt");
+  expect(real.seats).toEqual(["human", "robot", "agent", "built-in greedy"]);
+  expect(namesMissing(real)).toBe(false);
+  expect(asked(real).physical).toBe(false);
 });
 
 test("clocks are sent in milliseconds, and custom ones accept a decimal comma", () => {

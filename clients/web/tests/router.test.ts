@@ -7,6 +7,7 @@ const ROUTES: [string, Route][] = [
   ["/", { page: "lobby" }],
   ["/new", { page: "new" }],
   ["/rooms/0123", { page: "room", roomId: "0123" }],
+  ["/rooms/0123/table", { page: "attend", roomId: "0123" }],
   ["/join", { page: "join", code: "" }],
   ["/join/BCDF2345", { page: "join", code: "BCDF2345" }],
   ["/watch/0123", { page: "watch", roomId: "0123" }],

@@ -8,6 +8,7 @@ import { RecordService } from "../gen/chefshat/v1/record_service_pb";
 import { RoomService } from "../gen/chefshat/v1/room_service_pb";
 import { ServerService } from "../gen/chefshat/v1/server_service_pb";
 import { SpectatorService } from "../gen/chefshat/v1/spectator_service_pb";
+import { TableService } from "../gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../gen/chefshat/v1/tournament_service_pb";
 import { repeat } from "./repeat";
 
@@ -21,6 +22,8 @@ export const roomApi = createClient(RoomService, transport);
 export const playApi = createClient(PlayService, transport);
 /** Watching without a seat. */
 export const spectatorApi = createClient(SpectatorService, transport);
+/** Reporting about a physical table, and following its state. */
+export const tableApi = createClient(TableService, transport);
 /** Records of finished games. */
 export const recordApi = createClient(RecordService, transport);
 /** Tournaments, their results, the leaderboard. */

@@ -38,7 +38,7 @@ export function OwnRooms({ room, names, searchFor }: OwnRoomsProps) {
     <>
       <p class="soft">{words.text}</p>
       {barred && <Notice kind="hint">{words.barred[barred]}</Notice>}
-      {barred !== "hands" && (
+      {barred !== "hands" && barred !== "real" && (
         <>
           <SelectField
             label={words.wait}

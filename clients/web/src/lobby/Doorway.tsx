@@ -4,6 +4,7 @@
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
+import { tableTicket } from "../attend/ticket";
 import { hidden } from "../experiment/hiding";
 import { freeForPeople } from "../experiment/places";
 import { KeptLinks } from "../experiment/StudyLinks";
@@ -94,7 +95,12 @@ function DoorwayLinks({ room }: { room: Room }) {
   const over = room.state === RoomState.FINISHED || room.state === RoomState.ABORTED;
   if (room.state === RoomState.ABORTED) return <Notice kind="hint">{t().lobby.door.aborted}</Notice>;
   return (
-    <div>
+    <div class="row">
+      {!over && tableTicket(room.roomId) !== null && (
+        <ButtonLink look="main" href={pathOf({ page: "attend", roomId: room.roomId })}>
+          {t().attend.room.attend}
+        </ButtonLink>
+      )}
       {over && <ButtonLink href={pathOf({ page: "replay", gameId: room.gameId })}>{words.replay}</ButtonLink>}
       {!over && room.policy?.spectators && (
         <ButtonLink href={pathOf({ page: "watch", roomId: room.roomId })}>{words.watch}</ButtonLink>

@@ -9,7 +9,7 @@ import { FormFrame, FormPage, FormPart } from "./FormPage";
 import { type FieldFaults, useFormState } from "./form-state";
 import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
 import { gameProblems } from "./game-form";
-import { type FieldName, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
+import { type FieldName, namesMissing, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
 import { createRoom } from "./seat";
 
@@ -28,11 +28,14 @@ export function NewRoom() {
 function RoomFormView({ offered }: { offered: Offered }) {
   const words = t().lobby.make;
   const state = useFormState(() => newForm(offered.agents), {
-    check: (form) => wordsOfProblems<FieldName>(gameProblems(form, form.seats.length)),
+    check: (form) => ({
+      ...wordsOfProblems<FieldName>(gameProblems(form, form.seats.length)),
+      ...(namesMissing(form) ? { seatNames: words.nameMissing } : {}),
+    }),
     fields: ROOM_FIELDS,
     send: async (form) => {
       const { room } = await createRoom(requestOf(form));
-      navigate({ page: "room", roomId: room.roomId });
+      navigate({ page: form.cards === "real" ? "attend" : "room", roomId: room.roomId });
     },
   });
   const { form, faults, change } = state;

@@ -1,6 +1,7 @@
 // A room in the lists of the lobby: name, state, players, actions.
 
-import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
+import { tableTicket } from "../attend/ticket";
+import { GameOrigin, ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { StateChip } from "../parts/StateChip";
@@ -40,11 +41,21 @@ function RoomActions({ room }: { room: Room }) {
   );
   if (room.state === RoomState.FINISHED) return link(pathOf({ page: "replay", gameId }), words.replay);
   if (heldSeat(roomId)) return link(pathOf({ page: "room", roomId }), words.goBack, true);
+  const attend = tableTicket(roomId) !== null && link(pathOf({ page: "attend", roomId }), t().attend.room.attend, true);
   const watch = room.policy?.spectators && link(pathOf({ page: "watch", roomId }), words.watch);
-  if (room.state === RoomState.PLAYING) return <>{watch || <span class="soft small">{words.closed}</span>}</>;
+  if (room.state === RoomState.PLAYING) {
+    if (!attend && !watch) return <span class="soft small">{words.closed}</span>;
+    return (
+      <>
+        {attend}
+        {watch}
+      </>
+    );
+  }
   return (
     <>
-      {isOpen(room) && link(pathOf({ page: "room", roomId }), hostedRoom(roomId) ? words.open : words.join, true)}
+      {attend}
+      {isOpen(room) && link(pathOf({ page: "room", roomId }), hostedRoom(roomId) ? words.open : words.join, !attend)}
       {watch}
     </>
   );
@@ -72,9 +83,10 @@ export function rulesInShort(room: Room): string {
   const stop = room.rules?.stop;
   if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
   if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
-  const withPeople = room.seats.some(({ kind, reservedFor, builtInAgent }) => {
+  const withPeople = room.seats.some(({ kind, reservedFor, builtInAgent, atTable }) => {
     return (
       builtInAgent === "" &&
+      !atTable &&
       (kind || reservedFor) !== ParticipantKind.AGENT &&
       (kind || reservedFor) !== ParticipantKind.ROBOT
     );
@@ -83,6 +95,7 @@ export function rulesInShort(room: Room): string {
     const clock = withPeople ? clockOfPeople(room.policy).decisionTimeMs : room.policy.decisionTimeMs;
     parts.push(words.decisionTime(clock ?? 0));
   }
+  if (room.origin === GameOrigin.PHYSICAL) parts.push(t().attend.room.realCards);
   if (room.tournamentId) parts.push(words.ofTournament);
   return parts.join(" · ");
 }

@@ -1,64 +1,97 @@
-// The number of players, and who fills each seat: people, robots, connected agents or built-in
-// agents.
+// Whether the cards are real, the number of players, and who fills each seat: players at the table,
+// people, robots, connected agents or built-in agents.
 
 import { t } from "../i18n";
-import { SelectField } from "../parts/Field";
+import { SelectField, TextField } from "../parts/Field";
 import { SeatNumber } from "../parts/SeatNumber";
 import css from "./FormPage.module.css";
 import type { FormProps } from "./NewRoom";
-import { type SeatChoice, withPlayers } from "./room-form";
+import { isAtTable, MAX_NAME, type SeatChoice, withCards, withPlayers } from "./room-form";
 
 /** Possible numbers of players. */
 const PLAYERS = ["2", "3", "4", "5", "6"] as const;
 
 /** The part of the form. */
-export function SeatFields({ form, change, agents }: FormProps & { agents: string[] }) {
+export function SeatFields({ form, faults, change, agents }: FormProps & { agents: string[] }) {
   const words = t().lobby.make;
+  const real = form.cards === "real";
   const choices: SeatChoice[] = [
+    ...(real ? (["at-table human", "at-table robot"] as const) : []),
     "human",
     "anybody",
     "agent",
     "robot",
     ...agents.map((agent): SeatChoice => `built-in ${agent}`),
   ];
-  const options = choices.map((value) => ({ value, label: choiceWord(value) }));
+  const options = choices.map((value) => ({ value, label: choiceWord(value, real) }));
   const players = PLAYERS.find((count) => Number(count) === form.seats.length) ?? "4";
   return (
     <>
-      <SelectField
-        label={words.players}
-        value={players}
-        options={PLAYERS.map((value) => ({ value, label: value }))}
-        onPick={(count) => change(withPlayers(form, Number(count)))}
-      />
+      <div class={css.fields}>
+        <SelectField
+          label={words.cards}
+          hint={real ? words.realHint : undefined}
+          value={form.cards}
+          options={[
+            { value: "dealt", label: words.dealt },
+            { value: "real", label: words.real },
+          ]}
+          onPick={(cards) => change(withCards(form, cards))}
+        />
+        <SelectField
+          label={words.players}
+          value={players}
+          options={PLAYERS.map((value) => ({ value, label: value }))}
+          onPick={(count) => change(withPlayers(form, Number(count)))}
+        />
+      </div>
       <ol class={css.seatFields} aria-label={words.seats}>
-        {form.seats.map((choice, seat) => (
-          <li key={seat}>
-            <SeatNumber seat={seat} />
-            <SelectField
-              label={t().common.seat(seat)}
-              value={choice}
-              options={options}
-              onPick={(picked) => change({ seats: form.seats.with(seat, picked) })}
-            />
-          </li>
-        ))}
+        {form.seats.map((choice, seat) => {
+          const name = form.seatNames[seat] ?? "";
+          return (
+            <li key={seat}>
+              <SeatNumber seat={seat} />
+              <SelectField
+                label={t().common.seat(seat)}
+                value={choice}
+                options={options}
+                onPick={(picked) => change({ seats: form.seats.with(seat, picked) })}
+              />
+              {isAtTable(choice) && (
+                <TextField
+                  label={words.nameOf(seat)}
+                  value={name}
+                  fault={name.trim() === "" ? faults.seatNames : undefined}
+                  onText={(typed) =>
+                    change({ seatNames: form.seats.map((_, at) => (at === seat ? typed : (form.seatNames[at] ?? ""))) })
+                  }
+                  maxLength={MAX_NAME}
+                  autoComplete="off"
+                />
+              )}
+            </li>
+          );
+        })}
       </ol>
     </>
   );
 }
 
-function choiceWord(choice: SeatChoice): string {
+function choiceWord(choice: SeatChoice, real: boolean): string {
   const words = t().lobby.make.choices;
   switch (choice) {
+    case "at-table human":
+      return words.atTableHuman;
+    case "at-table robot":
+      return words.atTableRobot;
     case "human":
-      return words.human;
+      return real ? words.remoteHuman : words.human;
     case "anybody":
-      return words.anybody;
+      return real ? words.remoteAnybody : words.anybody;
     case "agent":
-      return words.agent;
+      return real ? words.remoteAgent : words.agent;
     case "robot":
-      return words.robot;
+      return real ? words.remoteRobot : words.robot;
     default:
       return words.builtIn(choice.slice("built-in ".length));
   }

@@ -30,7 +30,11 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
                 {participant.seat === mine && <span class="soft"> {words.you}</span>}
               </span>
               <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
-              {!participant.connected && <span class={css.away}>{words.away}</span>}
+              {participant.atTable ? (
+                <span class="soft small">{t().table.physical.atTable}</span>
+              ) : (
+                !participant.connected && <span class={css.away}>{words.away}</span>
+              )}
             </>
           )}
         </li>

@@ -9,24 +9,35 @@ import { GAME_FIELDS, type GameForm, newGame, policyOf, rulesOf } from "./game-f
 /** Longest name of a room or participant, characters. */
 export const MAX_NAME = 64;
 
-/** Whom a seat is reserved for, or the built-in agent that fills it. */
-export type SeatChoice = "human" | "robot" | "agent" | "anybody" | `built-in ${string}`;
+/**
+ * Whom a seat is reserved for, who sits at the table with real cards, or the built-in agent that
+ * fills it.
+ */
+export type SeatChoice = Remote | AtTable | `built-in ${string}`;
+type Remote = "human" | "robot" | "agent" | "anybody";
+export type AtTable = "at-table human" | "at-table robot";
 
 /** The form; numbers as typed. */
 export interface RoomForm extends GameForm {
   name: string;
+  /** Whether the server deals, or real cards lie on a table. */
+  cards: "dealt" | "real";
   seats: SeatChoice[];
+  /** Names of the players at the table, by seat; others choose theirs. */
+  seatNames: string[];
   abort: "allLost" | "anyLost" | "never";
 }
 
 /** Names of the fields with a single value. */
-export type FieldName = Exclude<keyof RoomForm, "seats">;
+export type FieldName = Exclude<keyof RoomForm, "seats" | "cards">;
 
 /** The initial form: a person and three built-in agents, with the default rules. */
 export function newForm(opponents: readonly string[]): RoomForm {
   return {
     ...newGame(),
     name: "",
+    cards: "dealt",
+    seatNames: [],
     seats: ["human", ...threeOf(opponents).map((agent): SeatChoice => `built-in ${agent}`)],
     abort: "allLost",
   };
@@ -38,8 +49,30 @@ export function newForm(opponents: readonly string[]): RoomForm {
  */
 export function withPlayers(form: RoomForm, players: number): RoomForm {
   const seats = form.seats.slice(0, players);
-  while (seats.length < players) seats.push("human");
+  while (seats.length < players) seats.push(form.cards === "real" ? "at-table human" : "human");
   return { ...form, seats, points: seats.length === form.seats.length ? form.points : "" };
+}
+
+/**
+ * Changes whether the cards are real: then everybody but built-in agents sits at the table at first,
+ * else nobody.
+ */
+export function withCards(form: RoomForm, cards: RoomForm["cards"]): RoomForm {
+  const seats = form.seats.map((choice): SeatChoice => {
+    if (cards === "real") return choice.startsWith("built-in ") ? choice : "at-table human";
+    return choice === "at-table robot" ? "robot" : isAtTable(choice) ? "human" : choice;
+  });
+  return { ...form, cards, seats };
+}
+
+/** Whether a player of this choice sits at the table with real cards. */
+export function isAtTable(choice: SeatChoice): choice is AtTable {
+  return choice.startsWith("at-table ");
+}
+
+/** Whether a player at the table has no name yet. */
+export function namesMissing({ seats, seatNames }: RoomForm): boolean {
+  return seats.some((choice, seat) => isAtTable(choice) && (seatNames[seat] ?? "").trim() === "");
 }
 
 /** The request of a form without problems. */
@@ -47,8 +80,9 @@ export function requestOf(form: RoomForm): MessageInitShape<typeof CreateRoomReq
   return {
     name: form.name.trim(),
     rules: rulesOf(form, form.seats.length),
-    seats: form.seats.map(seatConfig),
+    seats: form.seats.map((choice, seat) => seatConfig(choice, form.seatNames[seat] ?? "")),
     policy: { ...policyOf(form), abort: ABORTS[form.abort] },
+    physical: form.cards === "real",
   };
 }
 
@@ -61,7 +95,7 @@ export function quickGame(
 }
 
 /** The fields by their names in the protocol. */
-export const ROOM_FIELDS: Record<string, FieldName> = { ...GAME_FIELDS, name: "name" };
+export const ROOM_FIELDS: Record<string, FieldName> = { ...GAME_FIELDS, name: "name", seats: "seatNames" };
 
 const ABORTS = { allLost: AbortPolicy.ALL_LOST, anyLost: AbortPolicy.ANY_LOST, never: AbortPolicy.NEVER };
 
@@ -80,8 +114,12 @@ const KINDS = {
   anybody: ParticipantKind.UNSPECIFIED,
 };
 
-function seatConfig(choice: SeatChoice) {
+function seatConfig(choice: SeatChoice, name: string) {
   switch (choice) {
+    case "at-table human":
+      return { filledBy: { case: "atTable" as const, value: KINDS.human }, name: name.trim() };
+    case "at-table robot":
+      return { filledBy: { case: "atTable" as const, value: KINDS.robot }, name: name.trim() };
     case "human":
     case "robot":
     case "agent":

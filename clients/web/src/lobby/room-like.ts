@@ -10,8 +10,9 @@ import { MAX_NAME } from "./room-form";
 import { createRoom, takeSeat } from "./seat";
 
 /** Why a room cannot be repeated exactly; null if it can. */
-export function notToBeRepeated(room: Room): "seed" | "hands" | null {
+export function notToBeRepeated(room: Room): "seed" | "hands" | "real" | null {
   if (room.origin === GameOrigin.SCRIPTED) return "hands";
+  if (room.origin === GameOrigin.PHYSICAL) return "real";
   return room.seedFixed ? "seed" : null;
 }
 
@@ -24,6 +25,7 @@ export function requestLike(
   return {
     name: Array.from(name).slice(0, MAX_NAME).join(""),
     seats: room.seats.map(seatLike),
+    physical: room.origin === GameOrigin.PHYSICAL,
     policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
     // A branched game keeps the rules of the game it branches from.
     ...(room.branchedFrom
@@ -33,7 +35,8 @@ export function requestLike(
 }
 
 function seatLike(seat: Participant) {
-  const { replay, builtInAgent, name, reservedFor } = seat;
+  const { replay, builtInAgent, name, reservedFor, atTable, kind } = seat;
+  if (atTable) return { filledBy: { case: "atTable" as const, value: kind }, name };
   if (replay) return { filledBy: { case: "replay" as const, value: replay }, name };
   if (builtInAgent) return { filledBy: { case: "builtInAgent" as const, value: builtInAgent }, name };
   return { filledBy: { case: "reservedFor" as const, value: reservedFor } };

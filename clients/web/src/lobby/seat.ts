@@ -1,8 +1,10 @@
 // Taking seats and creating rooms, and the secrets that this device stores for it: the ticket of
-// each seat, the owner token of each room. Without them a reload would lose the seat.
+// each seat, the owner token of each room; that of a physical table is in attend/ticket.ts. Without
+// them a reload would lose the seat.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { keepTableTicket } from "../attend/ticket";
 import { rememberFinished } from "../experiment/study";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
@@ -91,6 +93,7 @@ export async function createRoom(
   const room = saidRoom(made.room);
   const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken };
   remember(`hosted.${room.roomId}`, JSON.stringify(hosted));
+  if (made.tableTicket !== "") keepTableTicket(room.roomId, made.tableTicket);
   return { room, joinCode: made.joinCode };
 }
 

@@ -99,6 +99,8 @@ function pageName(here: Route): string {
       return words.lobby.join.title;
     case "room":
       return words.table.title;
+    case "attend":
+      return words.attend.title;
     case "watch":
       return words.lobby.rooms.watch;
     case "replay":

@@ -98,6 +98,7 @@ export const experiment = {
       text: "Each room gets the rules, times and agents of this one. This device stores what it needs to close them. Their links stay listed here, each with the settings that this form had when its room was created.",
       barred: {
         seed: "The deals of this room are fixed by a secret seed; the other rooms are dealt at random.",
+        real: "This room has a table with real cards, and no second table.",
         hands: "This room starts with prescribed hands, which are not known here, so no room like it can be created.",
       },
       wait: "Each room waits",

@@ -1,5 +1,6 @@
 // All English texts; their form is the form of every language.
 
+import { attend } from "./attend";
 import { common } from "./common";
 import { experiment } from "./experiment";
 import { faults } from "./faults";
@@ -11,7 +12,7 @@ import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
 
-export const en = { common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };
+export const en = { attend, common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };
 
 /** The form of a language's texts. */
 export type Texts = typeof en;

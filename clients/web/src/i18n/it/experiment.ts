@@ -99,6 +99,7 @@ export const experiment: Texts["experiment"] = {
       text: "Ogni stanza ha le regole, i tempi e gli agenti di questa. Questo dispositivo conserva ciò che serve per chiuderle. I link restano elencati qui, ciascuno con le impostazioni che questo modulo aveva quando la stanza è stata creata.",
       barred: {
         seed: "Le carte di questa stanza sono fissate da un seme segreto; nelle altre stanze vengono distribuite a caso.",
+        real: "Questa stanza ha un tavolo con carte vere, e non ce n’è un secondo.",
         hands:
           "Questa stanza inizia con mani prestabilite, che qui non sono note: non se ne può creare un’altra uguale.",
       },

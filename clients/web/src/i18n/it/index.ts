@@ -1,6 +1,7 @@
 // All Italian texts.
 
 import type { Texts } from "../en";
+import { attend } from "./attend";
 import { common } from "./common";
 import { experiment } from "./experiment";
 import { faults } from "./faults";
@@ -12,4 +13,16 @@ import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
 
-export const it: Texts = { common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };
+export const it: Texts = {
+  attend,
+  common,
+  experiment,
+  faults,
+  lobby,
+  organise,
+  people,
+  replay,
+  table,
+  tournaments,
+  tutorial,
+};

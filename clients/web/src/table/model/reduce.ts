@@ -51,6 +51,7 @@ function isOfRoom({ kind }: GameEvent): boolean {
     case "substituted":
     case "expressionShown":
     case "serverRestarted":
+    case "handReported":
     case "violation":
     case "correction":
     case "tablePaused":

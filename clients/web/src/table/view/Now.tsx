@@ -84,7 +84,7 @@ function OwnState({ table, own }: { table: TableState; own: number | undefined }
 }
 
 /** The requirement as tiles, and a sentence. */
-function Demands({ requirement, mayPass }: { requirement: Requirement; mayPass: boolean }) {
+export function Demands({ requirement, mayPass }: { requirement: Requirement; mayPass: boolean }) {
   const words = t().table.now;
   const { lowestFace, highestFace, fewestCards, goldenCard, loneJoker } = requirement;
   if (isOpening(requirement)) {

@@ -1,0 +1,81 @@
+// The page of an attendant: attaches to the table with this device's ticket, and shows how another
+// device gets it.
+
+import { useEffect, useState } from "preact/hooks";
+import { wordsOf } from "../api/faults";
+import type { PageProps } from "../app";
+import { t } from "../i18n";
+import { CopyLine, HostInvite, QrCode } from "../lobby/Invite";
+import { isForAgents, isOpen } from "../lobby/rooms";
+import { ErrorPage } from "../parts/ErrorPage";
+import css from "./Attend.module.css";
+import { AttendView } from "./AttendView";
+import { type Attending, startAttending } from "./attending";
+import { isBeforePlay } from "./entries";
+import { attendantLink, keepTableTicket, takeTicket } from "./ticket";
+
+/** The page. */
+export function AttendPage({ route }: PageProps<"attend">) {
+  const { roomId } = route;
+  const [ticket] = useState(() => takeTicket(roomId));
+  const [attending, setAttending] = useState<Attending | undefined>(undefined);
+  useEffect(() => {
+    if (ticket === null) return;
+    const started = startAttending(ticket);
+    setAttending(started);
+    return () => started.stop();
+  }, [ticket]);
+  if (ticket === null) return <ErrorPage title={t().attend.title} words={t().attend.noTicket} />;
+  return attending ? <Attended roomId={roomId} ticket={ticket} attending={attending} /> : null;
+}
+
+interface AttendedProps {
+  roomId: string;
+  ticket: string;
+  attending: Attending;
+}
+
+function Attended({ roomId, ticket, attending }: AttendedProps) {
+  const state = attending.state.value;
+  const { link, fault } = attending.following;
+  const failed = link.value === "failed" ? fault.value : undefined;
+  const unknown = failed?.reason === "TICKET_UNKNOWN";
+  useEffect(() => {
+    if (unknown) keepTableTicket(roomId, null);
+  }, [unknown]);
+  if (failed && !state) {
+    return <ErrorPage title={t().attend.title} words={unknown ? t().attend.gone : wordsOf(failed)} />;
+  }
+  if (!state?.room) return <p class="soft">{t().common.loading}</p>;
+  const { room } = state;
+  const early = isBeforePlay(state) && (state.observation?.shift ?? 1) === 1;
+  return (
+    <>
+      <p class={css.room}>
+        {t().attend.heading(room.name)} <span class="soft">· {t().attend.room.realCards}</span>
+      </p>
+      <AttendView state={state} report={attending.report} lost={link.value === "lost"} />
+      {isOpen(room) && <HostInvite roomId={roomId} forAgents={isForAgents(room.seats)} />}
+      <details class={`${css.link} sheet`} open={early} data-part="attendant-link">
+        <summary>
+          <h2>{t().attend.link.title}</h2>
+        </summary>
+        <AttendantLink address={attendantLink(roomId, ticket)} />
+      </details>
+    </>
+  );
+}
+
+/** The address of this view for another device, and its QR code. */
+function AttendantLink({ address }: { address: string }) {
+  const words = t().attend.link;
+  return (
+    <div class={css.linkBody}>
+      <div class="stack">
+        <p>{words.text}</p>
+        <CopyLine label={words.address} text={address} />
+      </div>
+      <QrCode text={address} label={words.qr} />
+    </div>
+  );
+}

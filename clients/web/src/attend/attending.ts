@@ -1,0 +1,97 @@
+// Attending to a physical table: follows its state and sends reports. A report whose response was
+// lost is sent again with its id, so that the server counts it once.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { type Signal, signal } from "@preact/signals";
+import { CALL_LIMIT_MS, tableApi } from "../api/client";
+import { faultOf, inWords, isPassing } from "../api/faults";
+import { type Following, follow } from "../api/follow";
+import {
+  type ReportResponse,
+  ReportSource,
+  ReportVerdict,
+  type TableReportSchema,
+  TableStage,
+  type TableState,
+} from "../gen/chefshat/v1/table_service_pb";
+
+/** What happened, as it is reported. */
+export type Happening = NonNullable<MessageInitShape<typeof TableReportSchema>["kind"]> & { case: string };
+
+/** What came of the last report, as far as the state of the table does not show it. */
+export type Outcome =
+  | { readonly kind: "accepted" }
+  | { readonly kind: "known" }
+  | { readonly kind: "violation" }
+  | { readonly kind: "held" }
+  /** A correction after which this many later reports are void. */
+  | { readonly kind: "void"; readonly count: number }
+  | { readonly kind: "fault"; readonly words: string };
+
+/** Reports something; resolves to what came of it. */
+export type Report = (what: Happening) => Promise<Outcome>;
+
+export interface Attending {
+  /** Undefined before the first message. */
+  readonly state: Signal<TableState | undefined>;
+  readonly following: Following;
+  readonly report: Report;
+  stop(): void;
+}
+
+/** Attempts to send a report, and the delay between them, times the attempt. */
+const MAX_ATTEMPTS = 5;
+const RETRY_MS = 400;
+const REPORT_ID_BYTES = 16;
+
+/** Starts attending with a table's ticket. */
+export function startAttending(ticket: string): Attending {
+  const state = signal<TableState | undefined>(undefined);
+  const apply = (next: TableState | undefined) => {
+    const before = state.peek();
+    if (next && (before === undefined || next.version > before.version)) state.value = next;
+  };
+  const following = follow(
+    (abort) => tableApi.watch({ tableTicket: ticket }, { signal: abort }),
+    (message) => {
+      apply(message.state);
+      return state.peek()?.stage !== TableStage.OVER;
+    },
+  );
+  const report: Report = async (what) => {
+    const request = {
+      tableTicket: ticket,
+      reportId: newId(),
+      report: { source: ReportSource.ATTENDANT, kind: what },
+    };
+    for (let attempt = 1; ; attempt += 1) {
+      try {
+        const response = await tableApi.report(request, { timeoutMs: CALL_LIMIT_MS });
+        apply(response.state);
+        return outcomeOf(response);
+      } catch (thrown) {
+        if (!isPassing(faultOf(thrown)) || attempt >= MAX_ATTEMPTS) return { kind: "fault", words: inWords(thrown) };
+        await new Promise((resolve) => setTimeout(resolve, RETRY_MS * attempt));
+      }
+    }
+  };
+  return { state, following, report, stop: () => following.stop() };
+}
+
+function outcomeOf({ verdict, voidReports }: ReportResponse): Outcome {
+  switch (verdict) {
+    case ReportVerdict.VIOLATION:
+      return { kind: "violation" };
+    case ReportVerdict.KNOWN:
+      return { kind: "known" };
+    case ReportVerdict.HELD:
+      return { kind: "held" };
+    default:
+      return voidReports.length > 0 ? { kind: "void", count: voidReports.length } : { kind: "accepted" };
+  }
+}
+
+function newId(): string {
+  const bytes = crypto.getRandomValues(new Uint8Array(REPORT_ID_BYTES));
+  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,386 @@
+// The attendant's view: what it shows of each state, and the reports that its controls send.
+
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, describe, expect, test } from "vitest";
+import { AttendView, pictureSource } from "../src/attend/AttendView";
+import type { Happening, Outcome } from "../src/attend/attending";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
+import { TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
+import { setLanguage, startLanguage } from "../src/i18n";
+import { DEALT, OBSERVATION, stateOf } from "./table-state";
+
+let root: HTMLElement;
+let sent: Happening[];
+let outcome: Outcome;
+
+beforeEach(async () => {
+  await startLanguage();
+  root = document.createElement("div");
+  document.body.append(root);
+  sent = [];
+  outcome = { kind: "accepted" };
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  root.remove();
+});
+
+const show = (state: TableState) =>
+  act(() =>
+    render(
+      <AttendView
+        state={state}
+        lost={false}
+        report={async (what) => {
+          sent.push(what);
+          return outcome;
+        }}
+      />,
+      root,
+    ),
+  );
+
+/** The accessible name of a button. */
+const nameOf = (button: Element) => (button.getAttribute("aria-label") ?? button.textContent ?? "").trim();
+const button = (name: string, within: ParentNode = root) => {
+  const found = [...within.querySelectorAll("button")].filter((one) => nameOf(one) === name);
+  if (!found[0]) throw new Error(`no button "${name}", but ${[...within.querySelectorAll("button")].map(nameOf)}`);
+  return found[0];
+};
+/** Presses a button, and lets what it sends be answered. */
+const press = (name: string, within?: ParentNode) =>
+  act(async () => {
+    button(name, within).click();
+    await new Promise((resolve) => setTimeout(resolve));
+  });
+const part = (name: string) => root.querySelector(`[data-part~="${name}"]`);
+const heading = () => part("awaited-heading")?.textContent?.replace(/^\d/, "");
+const type = (label: string, text: string) =>
+  act(() => {
+    const found = [...root.querySelectorAll("label")].find(({ textContent }) => textContent === label);
+    const input = root.querySelector<HTMLInputElement>(`[id="${found?.htmlFor}"]`);
+    if (!input) throw new Error(`no field "${label}"`);
+    input.value = text;
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+
+describe("what the table waits for", () => {
+  test.each([
+    [{ stage: TableStage.WAITING }, "Waiting for remote players"],
+    [{ stage: TableStage.HAND, seat: 2 }, "Show the hand of Cleo"],
+    [{ stage: TableStage.SPECIAL_ACTION, seat: undefined }, "Does anyone declare a special action?"],
+    [{ stage: TableStage.SPECIAL_ACTION, seat: 2 }, "Cleo decides about a special action"],
+    [{ stage: TableStage.GIFT, seat: 1 }, "Bo gives cards"],
+    [{ stage: TableStage.GIFT, seat: 2 }, "Cleo chooses what to give"],
+    [{ stage: TableStage.OPENING, seat: undefined }, "The player with the Golden 11 opens the Shift"],
+    [{}, "Ada to play"],
+    [{ seat: 2 }, "Cleo is deciding"],
+    [{ stage: TableStage.QUESTION, seat: undefined }, "A question to you"],
+    [{ stage: TableStage.OVER, seat: undefined }, "The game is over"],
+  ])("%o", async (changed, words) => {
+    await show(stateOf(changed));
+    expect(heading()).toBe(words);
+  });
+
+  test("is shown with what a play must be, the board and the seats", async () => {
+    await show(stateOf());
+    expect(part("awaited")?.textContent).toContain("≤ 8");
+    expect(part("awaited")?.textContent).toContain("≥ 3");
+    expect(part("board-words")?.textContent).toBe("2 × 9 + joker");
+    const seats = [...root.querySelectorAll('[data-part~="attend-seat"]')].map(({ textContent }) => textContent);
+    expect(seats[0]).toContain("16 cards");
+    expect(seats[2]).toMatch(/remote.*hand known/);
+    expect(seats[3]).toMatch(/at the table.*passed.*hand not known/);
+  });
+
+  test("can be paused and resumed", async () => {
+    await show(stateOf());
+    await press("❚❚ Pause");
+    await show(stateOf({ paused: true }));
+    expect(part("awaited")?.textContent).toContain("Clocks stand still");
+    await press("▶ Continue");
+    expect(sent).toEqual([
+      { case: "pause", value: { paused: true } },
+      { case: "pause", value: { paused: false } },
+    ]);
+  });
+});
+
+describe("entering by hand", () => {
+  test("a play: the face, how many, jokers", async () => {
+    await show(stateOf());
+    await press("5, chilli");
+    expect(button("Ada lays 3 × 5")).toBeTruthy();
+    await press("More: How many");
+    await press("More: Jokers with them");
+    await press("Ada lays 4 × 5 + joker");
+    expect(sent).toEqual([{ case: "laid", value: { seat: 0, cards: { cards: [5, 5, 5, 5, 12], golden: false } } }]);
+    expect(button("Report the play").getAttribute("aria-disabled")).toBe("true");
+  });
+
+  test("a play that is not allowed is marked, and can be reported all the same", async () => {
+    await show(stateOf());
+    await press("10, tomato, not allowed now");
+    await press("Ada lays 3 × 10");
+    expect(sent).toHaveLength(1);
+  });
+
+  test("keeps what was entered if it does not count", async () => {
+    await show(stateOf());
+    await press("5, chilli");
+    outcome = { kind: "violation" };
+    await press("Ada lays 3 × 5");
+    expect(button("Ada lays 3 × 5")).toBeTruthy();
+    outcome = { kind: "fault", words: "The server does not answer." };
+    await press("Ada lays 3 × 5");
+    expect(part("entry")?.querySelector("[role=alert]")?.textContent).toContain("The server does not answer.");
+  });
+
+  test("the opening is the Golden card's, of a seat that need not be known", async () => {
+    const playRequirement = { lowestFace: 11, highestFace: 11, fewestCards: 1, goldenCard: true };
+    await show(stateOf({ stage: TableStage.OPENING, seat: undefined, observation: DEALT, playRequirement }));
+    expect([...root.querySelectorAll("button")].map(nameOf)).not.toContain("Pass");
+    await press("11, mozzarella");
+    await press("Report the play");
+    await press("11, mozzarella");
+    await press("1 Bo");
+    await press("Bo lays 1 × 11, Golden");
+    expect(sent).toEqual([
+      { case: "laid", value: { cards: { cards: [11], golden: true } } },
+      { case: "laid", value: { seat: 1, cards: { cards: [11], golden: true } } },
+    ]);
+  });
+
+  test("a pass, a pass taken back, a cleared board", async () => {
+    await show(stateOf());
+    await press("Ada passes");
+    await press("Pass taken back");
+    await press("Dan takes the pass back");
+    await press("Board cleared");
+    await press("The board was cleared");
+    expect(sent).toEqual([
+      { case: "pass", value: { seat: 0 } },
+      { case: "passWithdrawn", value: { seat: 3 } },
+      { case: "cleared", value: {} },
+    ]);
+  });
+
+  test("a hand, typed and tapped, must have as many cards as the seat", async () => {
+    await show(
+      stateOf({ stage: TableStage.HAND, seat: 2, observation: { ...DEALT, cardsLeft: Uint8Array.of(4, 4, 4, 4) } }),
+    );
+    await type("Cards", "j, 2x7");
+    await press("This is the hand of Cleo");
+    expect(sent).toEqual([]);
+    await press("Add 11, mozzarella");
+    await act(() => root.querySelector<HTMLInputElement>('[data-part~="entry"] [type=checkbox]')?.click());
+    await press("This is the hand of Cleo");
+    expect(sent).toEqual([{ case: "hand", value: { seat: 2, cards: { cards: [7, 7, 11, 12], golden: true } } }]);
+  });
+
+  test("typed cards that the deck does not have are refused", async () => {
+    await show(stateOf({ stage: TableStage.HAND, seat: 2 }));
+    await type("Cards", "2 2 2");
+    expect(part("entry")?.querySelector("[role=alert]")?.textContent).toBe("The deck has only 2 cards of face 2.");
+    await type("Cards", "2 pizza");
+    expect(part("entry")?.querySelector("[role=alert]")?.textContent).toContain("“pizza” is not a card");
+  });
+
+  test("special actions, gifts and roles before the first turn of a later Shift", async () => {
+    const observation = { ...DEALT, shift: 2, pizza: 0, roles: Uint8Array.of(1, 2, 4, 5) };
+    await show(stateOf({ stage: TableStage.SPECIAL_ACTION, seat: undefined, observation }));
+    await press("Nobody declares");
+    await press("Dan declares");
+    await press("Gift");
+    await press("3 Dan");
+    await press("Dan gave, cards not seen");
+    await press("Gift");
+    await press("3 Dan");
+    await press("Add 1, truffle");
+    await press("Add 2, shrimp");
+    await press("Dan gave these cards");
+    await press("Role taken");
+    await press("0 Ada");
+    await press("Chef");
+    await press("Ada is Chef");
+    expect(sent).toEqual([
+      { case: "special", value: {} },
+      { case: "special", value: { seat: 3 } },
+      { case: "gift", value: { seat: 3 } },
+      { case: "gift", value: { seat: 3, cards: { cards: [1, 2], golden: false } } },
+      { case: "role", value: { seat: 0, role: 1 } },
+    ]);
+  });
+});
+
+describe("what is to be done for remote players", () => {
+  const toLay = [
+    { seat: 2, kind: DecisionKind.TURN, cards: { cards: [7, 7, 12], golden: false } },
+    { seat: 2, kind: DecisionKind.TURN, cards: { cards: [] } },
+    { seat: 2, kind: DecisionKind.EXCHANGE, cards: { cards: [3], golden: false }, receiver: 1 },
+    { seat: 2, kind: DecisionKind.SPECIAL_ACTION },
+  ];
+
+  test("has words, cards, and a button that reports it", async () => {
+    await show(stateOf({ toLay }));
+    const items = [...root.querySelectorAll('[data-part~="to-lay-item"]')];
+    const words = ["Lay for Cleo", "Show the pass card of Cleo", "Give from Cleo to Bo"];
+    expect(items.map(({ textContent }, index) => textContent?.includes(words[index] ?? "Dinner is Served"))).toEqual(
+      items.map(() => true),
+    );
+    expect(items[0]?.querySelectorAll('[data-part~="card"]')).toHaveLength(3);
+    for (const item of items) await press(nameOf(item.querySelector("button") ?? item), item);
+    expect(sent).toMatchObject([
+      { case: "laid", value: { seat: 2, cards: { cards: [7, 7, 12] } } },
+      { case: "pass", value: { seat: 2 } },
+      { case: "gift", value: { seat: 2, cards: { cards: [3] } } },
+      { case: "special", value: { seat: 2 } },
+    ]);
+  });
+});
+
+describe("a question", () => {
+  const question = { questionId: "q", text: "7 or 9 at place 4?", options: ["7", "9"] };
+
+  test("is answered with one of its options, or withdrawn", async () => {
+    await show(stateOf({ questions: [{ ...question, picture: Uint8Array.of(0xff, 0xd8) }] }));
+    const card = part("question-card");
+    if (!card) throw new Error("no question");
+    expect(card.querySelector("img")?.getAttribute("src")).toBe("data:image/jpeg;base64,/9g=");
+    await press("9", card);
+    await press("No answer", card);
+    expect(sent).toEqual([
+      { case: "answer", value: { questionId: "q", option: 1 } },
+      { case: "answer", value: { questionId: "q" } },
+    ]);
+  });
+
+  test.each([
+    ["Did Ada pass?", "Ada: ha passato?"],
+    ["Did Ada, Bo and Cleo pass?", "Ada, Bo e Cleo: hanno passato?"],
+    ["Who opened the Shift?", "Chi ha aperto lo Shift?"],
+    ["7 or 9 at place 4?", "7 or 9 at place 4?"],
+  ])("of the referee, %s, has Italian words", async (text, words) => {
+    await setLanguage("it");
+    await show(stateOf({ questions: [{ ...question, text }] }));
+    expect(part("question-card")?.querySelector("h2")?.textContent).toBe(words);
+    await setLanguage("en");
+  });
+
+  test("without a picture shows none", () => {
+    expect(pictureSource(new Uint8Array())).toBeUndefined();
+    expect(pictureSource(Uint8Array.of(0x89))).toMatch(/^data:image\/png/);
+  });
+});
+
+describe("a violation", () => {
+  const violation = { seat: 0, rule: ViolatedRule.FACE, text: "That pizza already shows 9s.", report: 4n };
+
+  test("is shown with what to do, until it is dismissed or another comes", async () => {
+    await show(stateOf({ violation }));
+    expect(part("violation")?.getAttribute("role")).toBe("alert");
+    expect(part("violation")?.textContent).toContain("Ada: That pizza already shows 9s.");
+    await press("Taken back");
+    expect(part("violation")).toBeNull();
+    await show(stateOf({ violation: { ...violation, report: 5n } }));
+    expect(part("violation")).not.toBeNull();
+    expect(sent).toEqual([]);
+  });
+
+  test("that was misread leads to entering what really lies there", async () => {
+    await show(stateOf({ violation: { ...violation, seat: 1 } }));
+    await press("Enter what really lies there");
+    expect(document.activeElement?.textContent).toBe("Enter by hand");
+    await press("3, anchovy");
+    await press("Bo lays 3 × 3");
+    expect(sent).toEqual([{ case: "laid", value: { seat: 1, cards: { cards: [3, 3, 3], golden: false } } }]);
+  });
+
+  test("has an Italian sentence", async () => {
+    await setLanguage("it");
+    await show(stateOf({ violation }));
+    expect(part("violation")?.textContent).toContain("Ada: Sul piatto ci sono già carte di valore 9");
+    await setLanguage("en");
+  });
+});
+
+describe("the reports of the Shift", () => {
+  const report = (number: bigint, kind: Happening) => ({ report: number, seat: 1, text: "…", content: { kind } });
+  const reports = [
+    report(1n, { case: "hand", value: { seat: 2 } }),
+    report(2n, { case: "laid", value: { seat: 1, cards: { cards: [9, 9, 12], golden: false } } }),
+    report(3n, { case: "pass", value: { seat: 3 } }),
+  ];
+  const item = (index: number) => {
+    const found = root.querySelectorAll('[data-part~="report"]')[index];
+    if (!found) throw new Error("no such report");
+    return found;
+  };
+
+  test("are listed, the newest first", async () => {
+    await show(stateOf({ reports }));
+    const words = [...root.querySelectorAll('[data-part~="report"] p')].map(({ textContent }) => textContent);
+    expect(words).toEqual(["1 Dan passed", "1 Bo laid 2 × 9 + joker", "1 The hand of Cleo was seen"]);
+  });
+
+  test("can be changed into what happened instead", async () => {
+    await show(stateOf({ reports }));
+    await press("Change: Bo laid 2 × 9 + joker", item(1));
+    const dialog = part("change");
+    if (!dialog) throw new Error("no dialog");
+    expect(button("Bo lays 2 × 9 + joker", dialog)).toBeTruthy();
+    await press("6, basil", dialog);
+    outcome = { kind: "violation" };
+    await press("Bo lays 2 × 6 + joker", dialog);
+    expect(part("change")?.querySelector("[role=alert]")).not.toBeNull();
+    outcome = { kind: "void", count: 2 };
+    await press("Bo passes", dialog);
+    expect(part("change")).toBeNull();
+    expect(part("entry")?.textContent).toContain("2 later reports no longer fit");
+    expect(sent).toEqual([
+      {
+        case: "correction",
+        value: {
+          report: 2n,
+          instead: { kind: { case: "laid", value: { seat: 1, cards: { cards: [6, 6, 12], golden: false } } } },
+        },
+      },
+      { case: "correction", value: { report: 2n, instead: { kind: { case: "pass", value: { seat: 1 } } } } },
+    ]);
+  });
+
+  test("can be removed, after a confirmation", async () => {
+    await show(stateOf({ reports }));
+    await press("Remove", item(0));
+    expect(sent).toEqual([]);
+    await press("Remove", item(0));
+    expect(sent).toEqual([{ case: "correction", value: { report: 3n } }]);
+  });
+});
+
+test("before the game there is nothing to enter", async () => {
+  await show(stateOf({ stage: TableStage.WAITING, seat: undefined, observation: undefined }));
+  expect(part("entry")).toBeNull();
+  expect(root.querySelectorAll('[data-part~="attend-seat"]')).toHaveLength(4);
+  expect(OBSERVATION.shift).toBe(1);
+});
+
+test("a second press while a report is under way sends nothing", async () => {
+  let answer = () => {};
+  const report = (what: Happening) => {
+    sent.push(what);
+    return new Promise<Outcome>((resolve) => {
+      answer = () => resolve({ kind: "accepted" });
+    });
+  };
+  await act(() => render(<AttendView state={stateOf()} lost={false} report={report} />, root));
+  await press("Ada passes");
+  await press("Ada passes");
+  expect(sent).toHaveLength(1);
+  await act(async () => answer());
+  await press("Ada passes");
+  expect(sent).toHaveLength(2);
+});
