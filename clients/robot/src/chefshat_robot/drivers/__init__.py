@@ -68,6 +68,7 @@ __all__ = [
 DRIVERS = {
     "simulated": "chefshat_robot.drivers.simulated.SimulatedDriver",
     "jsonlines": "chefshat_robot.drivers.jsonlines.JsonLinesDriver",
+    "ros2": "chefshat_robot.drivers.ros2.Ros2Driver",
 }
 
 
