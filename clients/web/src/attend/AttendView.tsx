@@ -158,7 +158,12 @@ function Awaited({ state, table, heading, onPause }: AwaitedProps) {
   const turn = (stage === TableStage.TURN || stage === TableStage.OPENING) && playRequirement;
   const running = state.observation !== undefined && stage !== TableStage.OVER;
   return (
-    <section class={`${css.now} sheet`} data-part="awaited" data-paused={paused && ""} aria-label={words.label}>
+    <section
+      class={`${css.now} sheet`}
+      data-part="awaited"
+      data-paused={paused ? "" : undefined}
+      aria-label={words.label}
+    >
       <div class={css.what}>
         <h1 class={css.heading} ref={heading} tabIndex={-1} data-part="awaited-heading">
           {seat !== undefined && <SeatNumber seat={seat} />}

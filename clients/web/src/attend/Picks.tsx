@@ -10,22 +10,24 @@ import { type Card as CardValue, stacks } from "../table/model/cards";
 import type { Requirement } from "../table/model/requirement";
 import type { TableState as Table } from "../table/model/state";
 import { cardWord, distinctName, playWords } from "../table/words";
-import { cardsOfDraft, type Deck, type HandProblem, handText, type PlayDraft, parseHand } from "./entries";
+import { type Deck, type HandProblem, handText, type PlayDraft, parseHand } from "./entries";
 import css from "./Picks.module.css";
 
 interface ChoiceProps {
   label: string;
   /** Hides the label for readers who see the buttons. */
   quiet?: boolean;
+  /** The options are cards. */
+  cards?: boolean;
   children: ComponentChildren;
 }
 
 /** A group of buttons of which one is chosen. */
-export function Choice({ label, quiet = false, children }: ChoiceProps) {
+export function Choice({ label, quiet = false, cards = false, children }: ChoiceProps) {
   return (
     <fieldset class={css.choice} data-part="choice">
       <legend class={quiet ? "visually-hidden" : ""}>{label}</legend>
-      <div class={css.options}>{children}</div>
+      <div class={cards ? css.faces : css.options}>{children}</div>
     </fieldset>
   );
 }
@@ -97,7 +99,7 @@ export function PlayPick({ deck, draft, requirement, golden, onChange }: PlayPic
   };
   return (
     <div class={css.play}>
-      <Choice label={words.face}>
+      <Choice label={words.face} cards>
         {numbers.map((face) => {
           const card: CardValue = face > faces ? { kind: "joker" } : { kind: "face", face };
           return (
@@ -143,7 +145,6 @@ export function PlayPick({ deck, draft, requirement, golden, onChange }: PlayPic
           )}
         </div>
       )}
-      <Cards cards={cardsOfDraft(draft, deck)} />
     </div>
   );
 }
@@ -235,7 +236,7 @@ export function HandPick({ deck, text, golden, asksGolden, expected, fault, onCh
         autoComplete="off"
         autoCapitalize="characters"
       />
-      <Choice label={words.tap}>
+      <Choice label={words.tap} cards>
         {all.map((card) => {
           const count = cards.filter((other) => other === card).length;
           const full = count >= (card > faces ? jokers : card);

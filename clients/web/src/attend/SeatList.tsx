@@ -19,6 +19,7 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
           const known = state.seats[seat.seat]?.handKnown ?? false;
           const role = roleWord(seat.role);
           const next = begun && state.seat === seat.seat && state.stage !== TableStage.OVER;
+          const toPlay = next && state.stage === TableStage.TURN;
           return (
             <li key={seat.seat} class={`${css.seat} ${next ? css.next : ""}`} data-part="attend-seat">
               <SeatNumber seat={seat.seat} />
@@ -41,7 +42,7 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
                   <p class={css.badges}>
                     {seat.place > 0 && <span class={css.chip}>{t().common.place(seat.place)}</span>}
                     {seat.passed && <span class={css.chip}>{words.passed}</span>}
-                    {next && <span class={`${css.chip} ${css.chipNext}`}>{words.next}</span>}
+                    {toPlay && <span class={`${css.chip} ${css.chipNext}`}>{words.next}</span>}
                     {seat.cardsLeft > 0 && (
                       <span class="soft">
                         <span aria-hidden="true">{known ? "◉" : "○"}</span>{" "}

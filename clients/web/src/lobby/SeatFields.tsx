@@ -45,7 +45,7 @@ export function SeatFields({ form, faults, change, agents }: FormProps & { agent
           onPick={(count) => change(withPlayers(form, Number(count)))}
         />
       </div>
-      <ol class={css.seatFields} aria-label={words.seats}>
+      <ol class={`${css.seatFields} ${real ? css.named : ""}`} aria-label={words.seats}>
         {form.seats.map((choice, seat) => {
           const name = form.seatNames[seat] ?? "";
           return (

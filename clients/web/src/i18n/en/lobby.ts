@@ -115,7 +115,7 @@ export const lobby = {
     real: "Real cards on a table",
     realHint:
       "Somebody attends to the table: a camera, a robot or a person at a screen reports what happens. The server deals nothing and checks the rules.",
-    nameOf: (seat: number) => `Name of the player of seat ${seat}`,
+    nameOf: (seat: number) => `Name, seat ${seat}`,
     nameMissing: "Enter the name of each player at the table.",
     players: "Players",
     seats: "Who sits where",

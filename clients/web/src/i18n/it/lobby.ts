@@ -116,7 +116,7 @@ export const lobby: Texts["lobby"] = {
     real: "Carte vere su un tavolo",
     realHint:
       "Qualcuno assiste al tavolo: una telecamera, un robot o una persona a uno schermo segnala che cosa succede. Il server non distribuisce carte e controlla le regole.",
-    nameOf: (seat) => `Nome di chi siede al posto ${seat}`,
+    nameOf: (seat) => `Nome, posto ${seat}`,
     nameMissing: "Scrivi il nome di ogni giocatore al tavolo.",
     players: "Giocatori",
     seats: "Chi si siede dove",

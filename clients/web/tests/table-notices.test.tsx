@@ -1,0 +1,63 @@
+// The table of a physical room as its remote players and spectators see it.
+
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test } from "vitest";
+import { tableOf } from "../src/attend/words";
+import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
+import { startLanguage } from "../src/i18n";
+import type { TableState } from "../src/table/model/state";
+import { TableView } from "../src/table/view/TableView";
+import { DEALT, stateOf } from "./table-state";
+
+const REMOTE = 2;
+let root: HTMLElement;
+
+beforeEach(async () => {
+  await startLanguage();
+  root = document.createElement("div");
+  document.body.append(root);
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  root.remove();
+});
+
+const show = (table: TableState, own: number | undefined, replayed = false) =>
+  act(() => render(<TableView table={table} own={own} replayed={replayed} />, root));
+const dealt = (): TableState => ({ ...tableOf(stateOf({ observation: DEALT })), phase: "dealt", next: undefined });
+const heading = () => root.querySelector('[data-part~="now-heading"]')?.textContent;
+const banner = () => root.querySelector('[data-part~="table-banner"]')?.textContent;
+
+test("a remote player reads why there are no cards yet", async () => {
+  await show(dealt(), REMOTE);
+  expect(heading()).toBe("Your cards are on their way");
+  expect(root.querySelector('[data-part~="own-cards"]')?.textContent).toContain("The attendant shows your cards");
+});
+
+test("others do not, nor the player once the hand is known", async () => {
+  await show(dealt(), undefined);
+  expect(heading()).toBe("The cards have been dealt");
+  const known = dealt();
+  const seats = known.seats.map((seat) =>
+    seat.seat === REMOTE ? { ...seat, hand: [{ kind: "joker" as const }] } : seat,
+  );
+  await show({ ...known, seats }, REMOTE);
+  expect(heading()).toBe("The cards have been dealt");
+});
+
+test("a replay says that a hand is not known", async () => {
+  await show(dealt(), REMOTE, true);
+  expect(root.querySelector('[data-part~="own-cards"]')?.textContent).toContain("This hand is not known.");
+});
+
+test("a pause and a violation are shown above the table", async () => {
+  await show(dealt(), REMOTE);
+  expect(banner()).toBe("");
+  const breach = { seat: 1, rule: ViolatedRule.SIZE, text: "That pizza has 3 cards." };
+  const demand = { highestFace: 8, fewestCards: 3, onBoard: true, opening: false, goldenCard: false, next: 0 };
+  await show({ ...dealt(), paused: true, violation: { kind: "violated", breach, demand } }, REMOTE);
+  expect(banner()).toContain("The game is paused at the table.");
+  expect(banner()).toContain("Bo: That pizza has 3 cards.");
+});
