@@ -69,6 +69,8 @@ DRIVERS = {
     "simulated": "chefshat_robot.drivers.simulated.SimulatedDriver",
     "jsonlines": "chefshat_robot.drivers.jsonlines.JsonLinesDriver",
     "ros2": "chefshat_robot.drivers.ros2.Ros2Driver",
+    "rosbridge": "chefshat_robot.drivers.rosbridge.RosbridgeDriver",
+    "yarp": "chefshat_robot.drivers.yarp.YarpDriver",
 }
 
 
