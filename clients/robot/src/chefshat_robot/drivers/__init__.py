@@ -71,6 +71,8 @@ DRIVERS = {
     "ros2": "chefshat_robot.drivers.ros2.Ros2Driver",
     "rosbridge": "chefshat_robot.drivers.rosbridge.RosbridgeDriver",
     "yarp": "chefshat_robot.drivers.yarp.YarpDriver",
+    "naoqi": "chefshat_robot.drivers.naoqi.NaoqiDriver",
+    "furhat": "chefshat_robot.drivers.furhat.FurhatDriver",
 }
 
 
