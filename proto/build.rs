@@ -28,6 +28,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .boxed(".chefshat.v1.GameEvent.kind.special_action_declared")
         .boxed(".chefshat.v1.GameEvent.kind.cards_exchanged")
         .boxed(".chefshat.v1.GameEvent.kind.seated")
+        .boxed(".chefshat.v1.GameEvent.kind.hand_reported")
+        .boxed(".chefshat.v1.GameEvent.kind.violation")
+        .boxed(".chefshat.v1.GameEvent.kind.correction")
         .boxed(".chefshat.v1.SeatUpdate.update.snapshot")
         // Columns are sent and viewed as they are, without copies.
         .bytes(".chefshat.v1.VectorActions")

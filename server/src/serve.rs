@@ -210,6 +210,7 @@ fn routes(
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
+    use v1::table_service_server::TableServiceServer;
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let recorded = grpc::Recorded::new(Arc::clone(rooms));
@@ -236,6 +237,10 @@ fn routes(
     )
     .add_service(
         SpectatorServiceServer::new(grpc::Spectate::new(Arc::clone(rooms), closing.clone()))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        TableServiceServer::new(grpc::TableCalls::new(Arc::clone(rooms)))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(

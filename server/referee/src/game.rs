@@ -103,7 +103,7 @@ impl PhysicalGame {
         let plan = self.plan.as_ref()?;
         let hand = plan.dealt[seat];
         let top = Face::new(self.rules.faces())?;
-        let golden = plan.dealt_known.golden || hand.count(top) == 0;
+        let golden = plan.dealt_known.golden[seat] || hand.count(top) == 0;
         (plan.dealt_known.hands[seat] && golden).then_some(hand)
     }
 
@@ -153,7 +153,7 @@ impl PhysicalGame {
         let top = Face::new(self.rules.faces());
         BySeat::from_fn(known.hands.len(), |seat| {
             let without = top.is_some_and(|top| game.hands()[seat].count(top) == 0);
-            known.hands[seat] && (known.golden || without)
+            known.hands[seat] && (known.golden[seat] || without)
         })
     }
 

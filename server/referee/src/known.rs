@@ -12,8 +12,8 @@ use crate::puzzle::{Kept, Puzzle};
 pub(crate) struct Known {
     /// Whether each hand is known, as counts.
     pub(crate) hands: BySeat<bool>,
-    /// Whether the holder of the Golden card is known.
-    pub(crate) golden: bool,
+    /// Whether it is known of each hand if it has the Golden card.
+    pub(crate) golden: BySeat<bool>,
 }
 
 /// Which cards are known, by seat.
@@ -116,13 +116,14 @@ impl Puzzle<'_> {
             })
     }
 
-    /// Whether the holder of the Golden card is known, as dealt and after the exchange.
+    /// Whether it is known of each hand if it has the Golden card, as dealt and after the
+    /// exchange.
     pub(crate) fn golden_known(
         &self,
         known: &KnownCards,
         dealt: &BySeat<Cards>,
         gifts: &BySeat<Counts>,
-    ) -> (bool, bool) {
+    ) -> (BySeat<bool>, BySeat<bool>) {
         let tally = &self.tally;
         let top = Face::new(self.rules.faces());
         let dealt_top = |seat: Seat| top.map_or(0, |top| dealt[seat].count(top));
@@ -154,6 +155,10 @@ impl Puzzle<'_> {
         let without = |seat: Seat| tally.held[seat].is_some_and(|hand| !hand.has_golden());
         holders.retain(|seat| !without(*seat));
         let one_holder = holders.windows(2).all(|two| two[0] == two[1]);
-        (from.len() == 1, tally.holder.is_some() || one_holder)
+        let held_known = tally.holder.is_some() || one_holder;
+        (
+            BySeat::from_fn(dealt.len(), |seat| from.len() == 1 || !from.contains(&seat)),
+            BySeat::from_fn(dealt.len(), |seat| held_known || !holders.contains(&seat)),
+        )
     }
 }

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use crate::journal::{Fill, SeatedParticipant};
-use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
+use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_REPORTS, MAX_SEATINGS};
+use chefshat_referee::MAX_QUESTIONS;
+pub use chefshat_referee::Verdict as ReportVerdict;
 
 /// The public state of a seat.
 #[derive(Debug, Clone, Copy)]
@@ -71,6 +73,34 @@ pub enum ExpressError {
     /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
     TooMany,
+}
+
+/// Why a report from a physical table is not accepted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReportError {
+    /// The game has not started.
+    #[error("the game has not started: seats are free or not attached yet")]
+    GameNotStarted,
+    /// The game is over.
+    #[error("the game is over")]
+    GameOver,
+    /// There are too many reports.
+    #[error("a game has at most {MAX_REPORTS} reports")]
+    TooMany,
+    /// There are too many open questions.
+    #[error("{MAX_QUESTIONS} questions are open; have one answered, or withdraw one")]
+    TooManyQuestions,
+}
+
+/// The referee's ruling on a report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportOutcome {
+    /// Number of the report.
+    pub number: u64,
+    /// The verdict.
+    pub verdict: ReportVerdict,
+    /// Of a correction: the reports that no longer fit.
+    pub void_reports: Vec<u64>,
 }
 
 /// An answer to a decision.

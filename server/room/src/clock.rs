@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
-use chefshat_engine::{ActionId, Game, Seat, Viewer};
+use chefshat_engine::{ActionId, Seat, Viewer};
 
 use super::{
     BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST,
@@ -23,7 +23,7 @@ impl Core {
                 Some(hold.map_or(given_up, |hold| hold.min(given_up)))
             }
             State::Playing => {
-                let open = self.open.as_ref()?;
+                let open = self.open.as_ref().filter(|_| !self.is_paused())?;
                 if self.next_taken_over().is_some() {
                     return Some(open.released);
                 }
@@ -73,7 +73,8 @@ impl Core {
             if self.state == State::Playing && self.is_too_long() {
                 self.abort(now, AbortReason::TooLong);
             }
-            let Some(open) = (self.open.as_ref()).filter(|_| self.state == State::Playing) else {
+            let runs = self.state == State::Playing && !self.is_paused();
+            let Some(open) = self.open.as_ref().filter(|_| runs) else {
                 return;
             };
             if let Some(action) = self.next_taken_over() {
@@ -149,6 +150,7 @@ impl Core {
         let Some(open) = &self.open else {
             return (Duration::ZERO, Duration::ZERO);
         };
+        let now = self.paused_since().map_or(now, |since| since.min(now));
         let used = now.saturating_sub(open.start.unwrap_or(now));
         (
             self.decision_time(open.decision.seat).saturating_sub(used),
@@ -207,7 +209,9 @@ impl Core {
         self.all_seats().filter_map(|seat| {
             let state = &self.seats[seat.index()];
             // A participant of a tournament keeps its seat, whenever it arrives.
-            let held = self.header.tournament.is_none() && !state.ever_attached;
+            let held = self.header.tournament.is_none()
+                && !state.ever_attached
+                && matches!(state.fill, Fill::Open { .. });
             (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
         })
     }
@@ -234,6 +238,9 @@ impl Core {
     }
 
     fn tick_playing(&mut self, now: Duration, handed: Option<Duration>) {
+        if self.is_paused() {
+            return;
+        }
         if self.next_taken_over().is_some() {
             return self.advance(now);
         }
@@ -280,9 +287,7 @@ impl Core {
         time: Duration,
     ) {
         let action = self
-            .game
-            .as_deref()
-            .and_then(Game::default_action)
+            .default_action()
             .expect("an open decision has a default");
         let bank_left = self.bank_after(seat, time);
         let decided = self.decided(seat, action, source, time, bank_left);
@@ -322,13 +327,12 @@ impl Core {
     }
 
     fn decide_automatically(&mut self, now: Duration) {
-        let (Some(open), Some(game)) = (&self.open, self.game.as_deref()) else {
-            return;
-        };
+        let Some(open) = &self.open else { return };
         let seat = open.decision.seat;
         let attempts = open.attempts;
-        let observation = game.observe(Viewer::Seat(seat));
-        let legal = game.legal_actions();
+        let observation = self.observe(Viewer::Seat(seat));
+        let observation = observation.expect("a decision is open");
+        let legal = self.legal_actions();
         let state = &mut self.seats[seat.index()];
         let agent = state
             .agent

@@ -8,6 +8,7 @@ use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::journal::{Change, Decided, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
+use crate::physical::{RoomGame, micros};
 
 impl Core {
     pub(super) fn fold(&mut self, at: Duration, change: &Change) {
@@ -72,6 +73,7 @@ impl Core {
                 }
             }
             Change::ServerRestarted => self.restart(at),
+            Change::Reported(reported) => self.fold_report(at, reported),
             Change::Aborted(reason) => {
                 self.state = State::Aborted(*reason);
                 self.open = None;
@@ -109,6 +111,16 @@ impl Core {
         self.state = State::Playing;
         self.log.push(at, RoomEvent::GameStarted);
         self.log_before_deal = self.log.len();
+        if self.header.is_physical() {
+            self.begin_physical(at);
+        } else {
+            self.begin_dealt(at);
+        }
+        self.note_decision();
+        self.open_next(at);
+    }
+
+    fn begin_dealt(&mut self, at: Duration) {
         let recorded = self.header.start.branch.as_ref();
         let seed = recorded
             .and_then(|branch| branch.taken_over.first())
@@ -120,21 +132,24 @@ impl Core {
             Some(script) => Game::scripted(self.header.rules, seed, script, note)
                 .expect("a script is checked before its room is created"),
         };
-        self.game = Some(Box::new(game));
+        self.game = Some(RoomGame::Dealt(Box::new(game)));
         self.reseed();
         self.events = events;
         self.log_events(at, Source::Agent, 0);
-        self.note_decision();
-        self.open_next(at);
     }
 
     fn decide(&mut self, at: Duration, decided: &Decided) {
+        let number = self.changes;
         let mut events = std::mem::take(&mut self.events);
-        self.game
-            .as_mut()
-            .expect("a decision is taken in a game that has started")
-            .apply(decided.action, |event| events.push(event))
-            .expect("only legal actions become changes");
+        let game = self.game.as_mut();
+        let ruling = match game.expect("a decision is taken in a game that has started") {
+            RoomGame::Dealt(game) => {
+                game.apply(decided.action, |event| events.push(event))
+                    .expect("only legal actions become changes");
+                None
+            }
+            RoomGame::Physical(table) => Some(table.decide(at, number, decided)),
+        };
         self.events = events;
         let seat = &mut self.seats[decided.seat.index()];
         seat.bank_left = Duration::from_millis(decided.bank_left_ms.into());
@@ -153,9 +168,17 @@ impl Core {
                 });
             }
             Source::Timeout | Source::Disconnected => seat.timeouts += 1,
-            Source::Invalid | Source::Substitute | Source::Recorded => {}
+            Source::Invalid | Source::Substitute | Source::Recorded | Source::Table => {}
         }
-        self.log_events(at, decided.source, decided.time_us);
+        let taken = (decided.source, decided.time_us);
+        match ruling {
+            // What the table reported before and had to wait follows the decision.
+            Some(ruling) => self.fold_ruling(at, ruling, |seat| match seat == decided.seat {
+                true => taken,
+                false => (Source::Table, 0),
+            }),
+            None => self.log_events(at, decided.source, decided.time_us),
+        }
         self.decisions += 1;
         if decided.source == Source::Recorded {
             self.reseed();
@@ -167,7 +190,7 @@ impl Core {
     /// Sets the seed of the following Shifts.
     fn reseed(&mut self) {
         let seed = self.seed_for(self.decisions);
-        if let Some(game) = &mut self.game {
+        if let Some(RoomGame::Dealt(game)) = &mut self.game {
             game.reseed(seed);
         }
     }
@@ -192,7 +215,7 @@ impl Core {
     }
 
     /// Records how far delayed spectators may see after this decision.
-    fn note_decision(&mut self) {
+    pub(super) fn note_decision(&mut self) {
         if self.header.policy.spectator_delay_decisions > 0 {
             self.log_after_decision
                 .push(u32::try_from(self.log.len()).unwrap_or(u32::MAX));
@@ -200,7 +223,7 @@ impl Core {
     }
 
     /// Moves the events of one action to the log, with their rewards.
-    fn log_events(&mut self, at: Duration, source: Source, time_us: u64) {
+    pub(super) fn log_events(&mut self, at: Duration, source: Source, time_us: u64) {
         let mut events = std::mem::take(&mut self.events);
         let mut rewards = Vec::new();
         if let Some(scheme) = self.header.policy.reward_scheme {
@@ -227,11 +250,11 @@ impl Core {
     }
 
     /// Opens the next decision of the game, if there is one.
-    fn open_next(&mut self, at: Duration) {
+    pub(super) fn open_next(&mut self, at: Duration) {
         self.open = self
             .game
             .as_ref()
-            .and_then(|game| game.decision())
+            .and_then(RoomGame::decision)
             .map(|decision| {
                 let seat = &mut self.seats[decision.seat.index()];
                 seat.decisions += 1;
@@ -266,7 +289,7 @@ impl Core {
             seat,
             action,
             source,
-            time_us: u64::try_from(time.as_micros()).unwrap_or(u64::MAX),
+            time_us: micros(time),
             bank_left_ms: u32::try_from(bank_left.as_millis()).unwrap_or(u32::MAX),
             annotations: None,
         }

@@ -114,6 +114,14 @@ impl Token {
         }
     }
 
+    /// The ticket of the physical table of a room, which follows from the owner token.
+    pub fn of_table(owner: &Self) -> Self {
+        Self {
+            room: owner.room,
+            secret: digest(b"chefshat.v1 table", &[&owner.secret]),
+        }
+    }
+
     /// Parses a token; `None` if the text is not one.
     pub fn parse(word: &str) -> Option<Self> {
         let mut bytes = [0; 48];
@@ -237,6 +245,9 @@ mod tests {
             Token::of_request(room, &SecretHash::of(b"other"), &[1; 32])
         );
         let request = RequestKey::new([1; 32], b"content");
+        let table = Token::of_table(&request.owner());
+        assert_eq!(table, Token::of_table(&request.owner()));
+        assert!(table.room == request.created_id() && table != request.owner());
         assert_eq!(
             request.owner(),
             RequestKey::new([1; 32], b"content").owner()

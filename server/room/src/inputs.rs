@@ -223,9 +223,8 @@ impl Core {
         self.settle_start(now, handed);
         let open = self.open.as_ref().expect("a decision is awaited");
         // The clock is paused while the seat waits for the server, as for the deadline.
-        let thought_until = open
-            .paused_since
-            .map_or(arrived, |since| since.min(arrived));
+        let paused_since = open.paused_since.into_iter().chain(self.paused_since());
+        let thought_until = paused_since.fold(arrived, Duration::min);
         let time = thought_until.saturating_sub(open.start.unwrap_or(open.released));
         let attempts = open.attempts + 1;
         if time >= self.time_allowed(seat) {
@@ -333,7 +332,7 @@ impl Core {
             && self
                 .seats
                 .iter()
-                .all(|seat| seat.fill.is_built_in() || seat.connection.is_some());
+                .all(|seat| !matches!(seat.fill, Fill::Open { .. }) || seat.connection.is_some());
         if complete {
             let entropy = self
                 .seats
@@ -358,7 +357,7 @@ impl Core {
     fn admits(&self, seat: Seat, kind: ParticipantKind) -> bool {
         match self.seats[seat.index()].fill {
             Fill::Open { reserved_for } => reserved_for.is_none_or(|wanted| wanted == kind),
-            Fill::BuiltIn(_) | Fill::Replay(_) => false,
+            Fill::BuiltIn(_) | Fill::Replay(_) | Fill::AtTable(_) => false,
         }
     }
 }

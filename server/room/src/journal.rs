@@ -9,6 +9,7 @@ use chefshat_agents::{AgentKind, RecordedPlayer};
 use chefshat_engine::SeedPlan;
 pub use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, RuleSet, Script, Seat};
+pub use chefshat_referee::Report;
 
 use crate::ids::{Id, SecretHash};
 use crate::policy::Policy;
@@ -26,12 +27,14 @@ pub enum Fill {
     BuiltIn(AgentKind),
     /// A built-in agent that imitates a recorded player.
     Replay(RecordedSeat),
+    /// A player of this kind who sits at the physical table with real cards. Nobody connects.
+    AtTable(ParticipantKind),
 }
 
 impl Fill {
     /// Whether a built-in agent has the seat.
     pub fn is_built_in(&self) -> bool {
-        !matches!(self, Self::Open { .. })
+        matches!(self, Self::BuiltIn(_) | Self::Replay(_))
     }
 }
 
@@ -108,12 +111,19 @@ pub struct GameHeader {
     pub owner: SecretHash,
     /// The tournament it belongs to, if any.
     pub tournament: Option<TournamentGame>,
+    /// The ticket of the physical table, hashed; `None`: the server deals the cards.
+    pub table: Option<SecretHash>,
 }
 
 impl GameHeader {
     /// The series of games with the same deals.
     pub fn series(&self) -> Option<Id> {
         self.tournament.and_then(|game| game.series)
+    }
+
+    /// Whether the cards are real.
+    pub fn is_physical(&self) -> bool {
+        self.table.is_some()
     }
 }
 
@@ -141,6 +151,8 @@ pub enum Source {
     Substitute,
     /// Taken over from the record that the game branches from.
     Recorded,
+    /// Reported from the physical table.
+    Table,
 }
 
 /// Why a game has no result.
@@ -203,6 +215,32 @@ pub enum Change {
     Aborted(AbortReason),
     /// The server was restarted; all connections were lost.
     ServerRestarted,
+    /// Something was reported from the physical table.
+    Reported(Box<Reported>),
+}
+
+/// Something reported from the physical table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reported {
+    /// Chosen by the client; identifies the report in its room.
+    pub id: String,
+    /// Who reports.
+    pub source: ReportSource,
+    /// The time between the happening and the report.
+    pub age: Duration,
+    /// The report.
+    pub report: Report,
+}
+
+/// Who reports from a physical table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReportSource {
+    /// A camera.
+    Camera,
+    /// A person who attends to the table.
+    Attendant,
+    /// A robot, by what it did itself.
+    Robot,
 }
 
 /// A participant that took a seat.

@@ -14,6 +14,7 @@ mod inputs;
 pub mod journal;
 mod limits;
 pub mod log;
+mod physical;
 pub mod policy;
 mod revive;
 #[cfg(any(test, feature = "testing"))]
@@ -29,13 +30,17 @@ use chefshat_engine::{
     ActionId, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
 
-pub use answers::{Answer, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict};
+pub use answers::{
+    Answer, Answered, ExpressError, JoinError, LeaveError, ReportError, ReportOutcome,
+    ReportVerdict, SeatStanding, Verdict,
+};
 
 pub use limits::{
     BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
-    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_SEATINGS,
-    RECALL_TIME,
+    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_REPORTS,
+    MAX_SEATINGS, RECALL_TIME,
 };
+pub use physical::{Made, PhysicalTable};
 pub use revive::BadJournal;
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
@@ -43,6 +48,7 @@ use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
 use crate::log::Log;
+use crate::physical::RoomGame;
 
 /// The state of a room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +80,7 @@ pub struct Core {
     header: Arc<GameHeader>,
     state: State,
     seats: Vec<SeatState>,
-    game: Option<Box<Game>>,
+    game: Option<RoomGame>,
     entropy: Vec<Vec<u8>>,
     open: Option<OpenDecision>,
     log: Log,
@@ -190,7 +196,7 @@ impl Core {
                                 |player| Box::new(BuiltInAgent::replay(Arc::clone(player))),
                             )
                             .into(),
-                        Fill::Open { .. } => None,
+                        Fill::Open { .. } | Fill::AtTable(_) => None,
                     },
                     substituted: false,
                     ever_substituted: false,
@@ -251,7 +257,7 @@ impl Core {
 
     /// The game, once it has started.
     pub fn game(&self) -> Option<&Game> {
-        self.game.as_deref()
+        self.game.as_ref().map(RoomGame::game)
     }
 
     /// The open decision.
@@ -293,7 +299,13 @@ impl Core {
         self.seats.iter().any(|seat| seat.ever_substituted)
     }
 
-    /// Number of decisions taken.
+    /// Number of changes.
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// Number of decisions taken, in a physical room only those of participants and built-in
+    /// agents.
     pub fn decisions(&self) -> u64 {
         self.decisions
     }
@@ -308,6 +320,28 @@ impl Core {
         (0..self.seats.len()).map(Seat::new)
     }
 
+    /// The display name of a seat; empty while it is free.
+    pub fn name_of(&self, seat: Seat) -> String {
+        let SeatStanding {
+            fill, participant, ..
+        } = self.standing(seat);
+        if let Some(participant) = participant {
+            return participant.name.clone();
+        }
+        if let Some(name) = self.header.display_names.get(&seat.index()) {
+            return name.clone();
+        }
+        match fill {
+            Fill::BuiltIn(kind) => kind.name().to_owned(),
+            // Named after the agent, which is what the reader of a record wants to know.
+            Fill::Replay(player) => {
+                let game = player.game.to_string();
+                format!("{} {}:{}", BuiltInAgent::REPLAY, &game[..8], player.seat)
+            }
+            Fill::Open { .. } | Fill::AtTable(_) => String::new(),
+        }
+    }
+
     /// The public state of a seat.
     pub fn standing(&self, seat: Seat) -> SeatStanding<'_> {
         let state = &self.seats[seat.index()];
@@ -319,9 +353,9 @@ impl Core {
         }
     }
 
-    /// The observation of a viewer.
+    /// The observation of a viewer. At a physical table it has only known cards.
     pub fn observe(&self, viewer: Viewer) -> Option<Observation> {
-        self.game().map(|game| game.observe(viewer))
+        self.game.as_ref().map(|game| game.observe(viewer))
     }
 
     /// Legal actions of the open decision.

@@ -3,7 +3,8 @@
 
 use std::time::Duration;
 
-use chefshat_engine::{Event, Seat, Viewer};
+use chefshat_engine::{Cards, Event, Seat, Viewer};
+use chefshat_referee::Violation;
 
 use crate::journal::{AbortReason, SeatedParticipant, Source};
 
@@ -42,6 +43,37 @@ pub enum RoomEvent {
     ServerRestarted,
     /// A seat expressed something publicly: the encoded `chefshat.v1.Expression`.
     Expressed(Seat, Box<[u8]>),
+    /// At a physical table, a hand became known.
+    HandReported(Box<HandReported>),
+    /// At a physical table, something that the rules or the cards do not allow, with the number of
+    /// its report.
+    Violation(Box<(u64, Violation)>),
+    /// At a physical table, a report was wrong.
+    Correction(Box<Correction>),
+    /// A physical table was paused (`true`) or resumed.
+    Paused(bool),
+}
+
+/// A hand that became known.
+#[derive(Debug, Clone)]
+pub struct HandReported {
+    /// The seat.
+    pub seat: Seat,
+    /// Its cards.
+    pub cards: Cards,
+    /// Whether it is the hand as dealt, rather than as it was then.
+    pub dealt: bool,
+}
+
+/// A correction of an earlier report.
+#[derive(Debug, Clone)]
+pub struct Correction {
+    /// Number of the corrected report.
+    pub report: u64,
+    /// Number of the first void event of the game; 0 if there is none.
+    pub first_void: u64,
+    /// For people.
+    pub text: String,
 }
 
 /// An event of the engine, with the decision that caused it and its rewards.
@@ -60,11 +92,15 @@ pub struct GameEvent {
 impl RoomEvent {
     /// Whether a viewer may see more of this event than the public: private cards, or a reward.
     pub fn shows_more_to(&self, viewer: Viewer) -> bool {
-        let Self::Game(game) = self else { return false };
         let is = |seat: Seat| match viewer {
             Viewer::Seat(own) => own == seat,
             Viewer::Spectator => false,
             Viewer::Everything => true,
+        };
+        let game = match self {
+            Self::Game(game) => game,
+            Self::HandReported(reported) => return is(reported.seat),
+            _ => return false,
         };
         let shows_cards = match &game.event {
             Event::ShiftStarted { .. } => viewer != Viewer::Spectator,

@@ -9,7 +9,7 @@ use chefshat_engine::MAX_ENTROPY;
 use chefshat_engine::{Seat, Viewer};
 
 use super::Core;
-use crate::journal::{Change, Entry, Fill, GameHeader, Source};
+use crate::journal::{Change, Entry, Fill, GameHeader, Report, Source};
 
 /// Why a game cannot be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -52,6 +52,9 @@ impl Core {
         }
         let begun = self.game.is_some();
         match change {
+            Change::Seated { seat, .. } if self.is_at_table(*seat) => {
+                check(!begun, "the game has already started")
+            }
             Change::Seated { seat, .. } | Change::Vacated(seat) => {
                 self.check_open_seat(*seat)?;
                 check(!begun, "the game has already started")
@@ -75,6 +78,13 @@ impl Core {
                 check(legal, "the action is not legal")
             }
             Change::Expressed { seat, .. } => self.check_seat(*seat),
+            Change::Reported(reported) => {
+                check(self.table().is_some(), "its room has no physical table")?;
+                check(
+                    (seats_of(&reported.report)).all(|seat| seat.index() < self.seats.len()),
+                    "a reported seat does not exist",
+                )
+            }
             Change::Aborted(_) | Change::ServerRestarted => Ok(()),
         }
     }
@@ -86,7 +96,12 @@ impl Core {
     fn check_open_seat(&self, seat: Seat) -> Result<(), &'static str> {
         self.check_seat(seat)?;
         let open = matches!(self.seats[seat.index()].fill, Fill::Open { .. });
-        check(open, "the seat belongs to a built-in agent")
+        check(open, "nobody can join this seat")
+    }
+
+    fn is_at_table(&self, seat: Seat) -> bool {
+        let state = self.seats.get(seat.index());
+        state.is_some_and(|state| matches!(state.fill, Fill::AtTable(_)))
     }
 
     fn check_decision(&self, seat: Seat) -> Result<(), &'static str> {
@@ -121,6 +136,24 @@ impl Core {
             agent.decide(&observation, &legal);
         }
     }
+}
+
+/// The seats named in a report.
+fn seats_of(report: &Report) -> impl Iterator<Item = Seat> {
+    let (seat, instead) = match report {
+        Report::Hand { seat, .. }
+        | Report::PassWithdrawn { seat }
+        | Report::Gift { seat, .. }
+        | Report::Role { seat, .. } => (Some(*seat), None),
+        Report::Laid { seat, .. } | Report::Pass { seat } | Report::Special { seat } => {
+            (*seat, None)
+        }
+        Report::Question(question) => (question.seat, None),
+        Report::Correction { instead, .. } => (None, instead.as_deref()),
+        Report::Cleared | Report::Answer { .. } | Report::Pause(_) => (None, None),
+    };
+    let nested: Vec<Seat> = instead.map(|it| seats_of(it).collect()).unwrap_or_default();
+    seat.into_iter().chain(nested)
 }
 
 fn check(holds: bool, problem: &'static str) -> Result<(), &'static str> {

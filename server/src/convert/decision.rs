@@ -22,6 +22,7 @@ pub(super) fn source_to_proto(source: Source) -> v1::DecisionSource {
         Source::Disconnected => v1::DecisionSource::Disconnected,
         Source::Substitute => v1::DecisionSource::Substitute,
         Source::Recorded => v1::DecisionSource::Recorded,
+        Source::Table => v1::DecisionSource::Table,
     }
 }
 

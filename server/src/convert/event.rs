@@ -5,14 +5,15 @@ use chefshat_engine::SeedPlan;
 use chefshat_engine::{Game, Seat, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
 use chefshat_record::convert::{
-    By, action_space, event_kind, final_table, rules_to_proto, seat_number,
+    By, action_space, event_kind, final_table, rules_to_proto, seat_cards, seat_number,
 };
 use prost::Message as _;
 
 use super::decision::source_to_proto;
 use super::kind::kind_to_proto;
 use super::policy::policy_of;
-use super::room::{abort_reason, participants};
+use super::room::{abort_reason, participants, seed_commitment};
+use super::table::violation_to_proto;
 use chefshat_room::Core;
 use chefshat_room::log::RoomEvent;
 
@@ -85,6 +86,29 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
             }))
         }
+        RoomEvent::HandReported(reported) => {
+            let (seat, faces) = (reported.seat, core.header().rules.faces());
+            Kind::HandReported(Box::new(v1::HandReported {
+                hand: Some(match event.shows_more_to(viewer) {
+                    true => seat_cards(seat, reported.cards, faces),
+                    false => v1::SeatCards {
+                        seat: seat_number(seat),
+                        ..v1::SeatCards::default()
+                    },
+                }),
+                dealt: reported.dealt,
+            }))
+        }
+        RoomEvent::Violation(violation) => {
+            let (report, violation) = &**violation;
+            Kind::Violation(Box::new(violation_to_proto(*report, violation)))
+        }
+        RoomEvent::Correction(correction) => Kind::Correction(Box::new(v1::Correction {
+            first_void: correction.first_void,
+            text: correction.text.clone(),
+            report: correction.report,
+        })),
+        RoomEvent::Paused(paused) => Kind::TablePaused(v1::TablePaused { paused: *paused }),
     }
 }
 
@@ -99,10 +123,7 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
         seats: participants(core),
         action_space: Some(action_space(&header.rules.actions())),
         hand_size: header.rules.hand_size().into(),
-        seed_commitment: header
-            .seed
-            .commitment(&header.game_id.0)
-            .map_or_else(Vec::new, |hash| hash.to_vec()),
+        seed_commitment: seed_commitment(header),
     }
 }
 
@@ -112,10 +133,10 @@ pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
         .map_or_else(Vec::new, |standings| final_table(&standings))
 }
 
-/// The seed, public once a game has ended. In a series of games with the same deals it is only in
+/// The seed, public once a game has ended; nothing in a physical room. In a series of games with the same deals it is only in
 /// the record, which stays closed until all of them have ended.
 fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
-    let game = core.game()?;
+    let game = core.game().filter(|_| !core.header().is_physical())?;
     if core.header().series().is_some() && viewer != Viewer::Everything {
         return None;
     }

@@ -12,6 +12,7 @@ mod record;
 mod room;
 mod standings;
 mod start;
+mod table;
 mod tournament;
 mod vector;
 
@@ -29,6 +30,7 @@ pub use room::{
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
+pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,
     tournament_plan, tournament_state, tournament_state_from_proto,

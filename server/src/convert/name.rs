@@ -1,5 +1,7 @@
 //! Checks the names of rooms, tournaments and participants.
 
+use std::ops::RangeInclusive;
+
 use chefshat_record::convert::FieldProblem;
 
 use crate::config::MAX_NAME_CHARS;
@@ -9,15 +11,31 @@ use crate::config::MAX_NAME_CHARS;
 /// # Errors
 /// It has fewer than `least` or too many characters, or contains invisible characters.
 pub fn checked_name(field: &'static str, name: &str, least: usize) -> Result<String, FieldProblem> {
-    let name = name.trim();
-    let length = name.chars().count();
-    if !(least..=MAX_NAME_CHARS).contains(&length) {
+    checked_text(field, name, least..=MAX_NAME_CHARS)
+}
+
+/// Checks a line of text and trims it.
+///
+/// # Errors
+/// Its number of characters is not in `length`, or it contains invisible characters.
+pub(super) fn checked_text(
+    field: &'static str,
+    text: &str,
+    length: RangeInclusive<usize>,
+) -> Result<String, FieldProblem> {
+    let text = text.trim();
+    let characters = text.chars().count();
+    if !length.contains(&characters) {
         return Err(FieldProblem::new(
             field,
-            format!("{length} characters are not in {least}..={MAX_NAME_CHARS}"),
+            format!(
+                "{characters} characters are not in {}..={}",
+                length.start(),
+                length.end()
+            ),
         ));
     }
-    if name
+    if text
         .chars()
         .any(|letter| letter.is_control() || is_invisible(letter))
     {
@@ -26,7 +44,7 @@ pub fn checked_name(field: &'static str, name: &str, least: usize) -> Result<Str
             "invisible characters and direction marks are not allowed: they make names look alike",
         ));
     }
-    Ok(name.to_owned())
+    Ok(text.to_owned())
 }
 
 /// Whether a character is invisible: joiners, direction marks, fillers, tags (Unicode's category

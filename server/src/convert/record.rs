@@ -12,7 +12,9 @@ use prost::Message as _;
 use super::decision::{mask_bytes, source_to_proto};
 use super::event::{event_to_proto, standings};
 use super::policy::policy_of;
-use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
+use super::room::{
+    aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
+};
 use super::start::{origin, start_to_proto};
 use crate::store::StoredGame;
 use chefshat_record::convert::decision_kind;
@@ -66,7 +68,6 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
 
 fn record_header(core: &Core) -> v1::RecordHeader {
     let header = core.header();
-    let commitment = header.seed.commitment(&header.game_id.0);
     v1::RecordHeader {
         format_version: FORMAT_VERSION,
         game_id: header.game_id.to_string(),
@@ -77,7 +78,7 @@ fn record_header(core: &Core) -> v1::RecordHeader {
         rules_version: header.rules_version,
         policy: Some(policy_of(core)),
         seats: participants(core),
-        seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
+        seed_commitment: seed_commitment(header),
         created_at_ms: header.created_at_ms,
         server_version: env!("CARGO_PKG_VERSION").into(),
         action_space: Some(action_space(&header.rules.actions())),

@@ -44,10 +44,11 @@ pub fn fills_from_proto(
                 reserved_for: kind_from_proto("seats", *kind)?,
             }),
             Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
-            Some(FilledBy::AtTable(_)) => Err(FieldProblem::new(
-                "seats",
-                "only a physical room has players at the table",
-            )),
+            Some(FilledBy::AtTable(kind)) => kind_from_proto("seats", *kind)?
+                .map(Fill::AtTable)
+                .ok_or_else(|| {
+                    FieldProblem::new("seats", "set the kind of the player at the table")
+                }),
             Some(FilledBy::BuiltInAgent(name)) => agent("seats", name)?
                 .map(Fill::BuiltIn)
                 .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
@@ -55,26 +56,30 @@ pub fn fills_from_proto(
         .collect()
 }
 
-/// The display names of built-in agents, by seat.
+/// The display names of built-in agents and players at the table, by seat.
 ///
 /// # Errors
-/// An open seat with a name, or a name that is not allowed.
+/// An open seat with a name, a player at the table without one, or a name that is not allowed.
 pub fn display_names_from_proto(
     seats: &[v1::SeatConfig],
 ) -> Result<BTreeMap<usize, String>, FieldProblem> {
     let named = seats
         .iter()
         .enumerate()
-        .filter(|(_, it)| !it.name.is_empty());
+        .filter(|(_, it)| !it.name.is_empty() || is_at_table(it));
     named
         .map(|(seat, config)| {
             if matches!(config.filled_by, None | Some(FilledBy::ReservedFor(_))) {
-                let problem = "only a built-in agent takes a name here; participants choose theirs when they join";
+                let problem = "only a built-in agent or a player at the table takes a name here; participants choose theirs when they join";
                 return Err(FieldProblem::new("seats", problem));
             }
             Ok((seat, checked_name("seats", &config.name, 1)?))
         })
         .collect()
+}
+
+fn is_at_table(config: &v1::SeatConfig) -> bool {
+    matches!(config.filled_by, Some(FilledBy::AtTable(_)))
 }
 
 /// How the seats of a room were requested to be filled.
@@ -96,6 +101,7 @@ fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
             Fill::Open { reserved_for } => FilledBy::ReservedFor(kind_to_proto(*reserved_for)),
             Fill::BuiltIn(kind) => FilledBy::BuiltInAgent(kind.name().into()),
             Fill::Replay(player) => FilledBy::Replay(player_to_proto(*player)),
+            Fill::AtTable(kind) => FilledBy::AtTable(kind_to_proto(Some(*kind))),
         }),
     }
 }
@@ -122,7 +128,7 @@ fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
 /// The public view of a room.
 pub fn describe(core: &Core) -> v1::Room {
     let header = core.header();
-    let commitment = header.seed.commitment(&header.game_id.0);
+    let seed_commitment = seed_commitment(header);
     v1::Room {
         room_id: header.room_id.to_string(),
         game_id: header.game_id.to_string(),
@@ -131,8 +137,8 @@ pub fn describe(core: &Core) -> v1::Room {
         rules: Some(rules_to_proto(&header.rules)),
         policy: Some(policy_of(core)),
         seats: participants(core),
-        seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
-        seed_fixed: commitment.is_none(),
+        seed_fixed: seed_commitment.is_empty() && !header.is_physical(),
+        seed_commitment,
         created_at_ms: header.created_at_ms,
         origin: origin(header).into(),
         branched_from: header.start.branch.as_ref().map(branch_point),
@@ -140,6 +146,15 @@ pub fn describe(core: &Core) -> v1::Room {
         tournament_id: tournament_id(header),
         series_id: series_id(header),
     }
+}
+
+/// The commitment to the seed of a game; empty if its creator fixed the seed, or if nothing is
+/// dealt.
+pub(super) fn seed_commitment(header: &GameHeader) -> Vec<u8> {
+    let commitment = header.seed.commitment(&header.game_id.0);
+    commitment
+        .filter(|_| !header.is_physical())
+        .map_or_else(Vec::new, |hash| hash.to_vec())
 }
 
 /// The id of the game's tournament, or an empty string.
@@ -183,29 +198,20 @@ pub(super) fn state_to_proto(state: State) -> v1::RoomState {
 
 /// The seats of a room.
 pub fn participants(core: &Core) -> Vec<v1::Participant> {
-    let display_names = &core.header().display_names;
     core.all_seats()
         .map(|seat| {
-            let display_name = display_names.get(&seat.index());
             let standing = core.standing(seat);
             let (reserved_for, built_in) = match standing.fill {
                 Fill::Open { reserved_for } => (reserved_for, None),
                 Fill::BuiltIn(kind) => (None, Some(kind.name())),
                 Fill::Replay(_) => (None, Some(BuiltInAgent::REPLAY)),
+                Fill::AtTable(_) => (None, None),
             };
             let participant = standing.participant;
+            let at_table = matches!(standing.fill, Fill::AtTable(_));
             v1::Participant {
                 seat: seat_number(seat),
-                name: match (participant, standing.fill) {
-                    (Some(participant), _) => participant.name.clone(),
-                    _ if let Some(name) = display_name => name.clone(),
-                    // Named after the agent, which is what the reader of a record wants to know.
-                    (None, Fill::Replay(player)) => {
-                        let game = player.game.to_string();
-                        format!("{} {}:{}", BuiltInAgent::REPLAY, &game[..8], player.seat)
-                    }
-                    (None, _) => built_in.unwrap_or_default().to_owned(),
-                },
+                name: core.name_of(seat),
                 kind: kind_to_proto(
                     participant
                         .map(|participant| participant.kind)
@@ -213,13 +219,13 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 ),
                 reserved_for: kind_to_proto(reserved_for),
                 built_in_agent: built_in.unwrap_or_default().to_owned(),
-                connected: standing.connected || built_in.is_some(),
+                connected: standing.connected || built_in.is_some() || at_table,
                 substituted: standing.substituted,
                 replay: match standing.fill {
                     Fill::Replay(player) => Some(player_to_proto(player)),
                     _ => None,
                 },
-                at_table: false,
+                at_table,
             }
         })
         .collect()

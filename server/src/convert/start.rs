@@ -9,7 +9,9 @@ use chefshat_room::journal::{Branch, GameHeader, GameStart, TakenOver};
 
 /// Where a game comes from.
 pub(super) fn origin(header: &GameHeader) -> v1::GameOrigin {
-    if header.start.branch.is_some() {
+    if header.is_physical() {
+        v1::GameOrigin::Physical
+    } else if header.start.branch.is_some() {
         v1::GameOrigin::Branched
     } else if header.start.script.is_some() {
         v1::GameOrigin::Scripted

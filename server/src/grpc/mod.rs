@@ -11,6 +11,7 @@ mod records;
 mod room_service;
 mod spectate;
 pub mod status;
+mod table;
 mod tournaments;
 mod vector;
 
@@ -20,5 +21,6 @@ pub use recorded::Recorded;
 pub use records::Records;
 pub use room_service::RoomCalls;
 pub use spectate::Spectate;
+pub use table::TableCalls;
 pub use tournaments::TournamentCalls;
 pub use vector::Vectors;

@@ -8,6 +8,7 @@ use chefshat_engine::{RuleSet, Stop};
 use chefshat_proto::v1::{self, create_room_request::Start};
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_number};
+use chefshat_referee::Referee;
 use prost::Message as _;
 use tonic::{Code, Status};
 
@@ -34,16 +35,9 @@ pub(super) async fn new_room(
 ) -> Result<NewRoom, Status> {
     let request_id = request_id(&std::mem::take(&mut request.request_id))?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
-    if request.physical {
-        let problem = "this server does not host physical rooms yet";
-        return Err(field(
-            "SEATS_REFUSED",
-            &FieldProblem::new("physical", problem),
-        ));
-    }
     let name = convert::checked_name("name", &request.name, 0)
         .map_err(|problem| field("NAME_REFUSED", &problem))?;
-    let policy = supported_policy(recorded, &request.policy.unwrap_or_default())
+    let policy = supported_policy(recorded, &request.policy.clone().unwrap_or_default())
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
     let game_seed = game_seed(&request.game_seed)?;
     let beginning = match &request.start {
@@ -51,7 +45,7 @@ pub(super) async fn new_room(
             branched(recorded, point, request.rules.as_ref(), game_seed).await?
         }
         start => {
-            let rules = hosted_rules(&request.rules.unwrap_or_default())?;
+            let rules = hosted_rules(&request.rules.clone().unwrap_or_default())?;
             let script = match start {
                 Some(Start::Scripted(script)) => Some(
                     script_from_proto(script, &rules)
@@ -71,6 +65,7 @@ pub(super) async fn new_room(
     };
     let refused = |problem: FieldProblem| field("SEATS_REFUSED", &problem);
     let fills = convert::fills_from_proto(&request.seats, &beginning.rules).map_err(refused)?;
+    check_table(&request, &fills, &beginning.rules)?;
     Ok(NewRoom {
         name,
         recorded: recorded_players(recorded, &fills).await?,
@@ -80,9 +75,48 @@ pub(super) async fn new_room(
         display_names: convert::display_names_from_proto(&request.seats).map_err(refused)?,
         start: beginning.start,
         game_seed: beginning.game_seed,
+        physical: request.physical,
         seating: None,
         request: request_key,
     })
+}
+
+/// Checks the seats, rules and start of a room with real cards, and that only such a room has
+/// players at the table.
+fn check_table(
+    request: &v1::CreateRoomRequest,
+    fills: &[Fill],
+    rules: &RuleSet,
+) -> Result<(), Status> {
+    let refused = |reason, name, message: &str| {
+        Err(field(reason, &FieldProblem::new(name, message.to_owned())))
+    };
+    let any_at_table = (fills.iter()).any(|fill| matches!(fill, Fill::AtTable(_)));
+    if !request.physical {
+        return match any_at_table {
+            true => refused(
+                "SEATS_REFUSED",
+                "seats",
+                "only a physical room has players at the table; set `physical`",
+            ),
+            false => Ok(()),
+        };
+    }
+    if !any_at_table {
+        let problem = "a physical room needs at least one seat with `at_table`";
+        return refused("SEATS_REFUSED", "seats", problem);
+    }
+    if !request.game_seed.is_empty() {
+        let problem = "leave it unset: in a physical room the server deals nothing";
+        return refused("SEED_REFUSED", "game_seed", problem);
+    }
+    let problem = "leave it unset: the game of a physical room starts with real cards";
+    match &request.start {
+        Some(Start::Scripted(_)) => return refused("SCRIPT_REFUSED", "scripted", problem),
+        Some(Start::Branch(_)) => return refused("BRANCH_REFUSED", "branch", problem),
+        None => {}
+    }
+    Referee::check_rules(rules).or_else(|problem| refused("RULE_SET_REFUSED", "rules", problem))
 }
 
 /// A policy that promises no more than the server's store supports.

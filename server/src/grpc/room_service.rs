@@ -82,13 +82,17 @@ impl RoomService for RoomCalls {
         request: Request<v1::CreateRoomRequest>,
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
         let new = new_room(&self.recorded, request.into_inner()).await?;
+        let physical = new.physical;
         let created = self.rooms.create(new).await.map_err(Refusal::from)?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
             room: Some(room),
             join_code: created.join_code,
             owner_token: created.owner.to_text(),
-            table_ticket: String::new(),
+            table_ticket: match physical {
+                true => Token::of_table(&created.owner).to_text(),
+                false => String::new(),
+            },
         }))
     }
 

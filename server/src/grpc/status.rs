@@ -11,9 +11,9 @@ use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::convert;
 use crate::outbox::StreamEnd;
-use crate::room::{RoomGone, SpectateError};
+use crate::room::{ReportRefusal, RoomGone, SpectateError};
 use crate::rooms::CreateError;
-use chefshat_room::{ExpressError, JoinError, LeaveError};
+use chefshat_room::{ExpressError, JoinError, LeaveError, ReportError};
 
 /// Domain of every `ErrorInfo`.
 const DOMAIN: &str = "chefshat";
@@ -93,6 +93,16 @@ pub fn ticket_unknown() -> Status {
         "TICKET_UNKNOWN",
         "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again",
         [("field", "ticket")],
+    )
+}
+
+/// No physical table has this ticket.
+pub fn table_unknown() -> Status {
+    status(
+        Code::Unauthenticated,
+        "TICKET_UNKNOWN",
+        "no physical table has this ticket: it is mistyped, or the room is gone; `table_ticket` of CreateRoom is its ticket",
+        [("field", "table_ticket")],
     )
 }
 
@@ -260,6 +270,22 @@ impl From<CreateError> for Refusal {
                 store_failed()
             }
         })
+    }
+}
+
+impl From<ReportRefusal> for Refusal {
+    fn from(refusal: ReportRefusal) -> Self {
+        let error = match refusal {
+            ReportRefusal::Malformed(problem) => return Self(field("REPORT_REFUSED", &problem)),
+            ReportRefusal::Refused(error) => error,
+        };
+        let (code, reason) = match error {
+            ReportError::GameNotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
+            ReportError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
+            ReportError::TooMany => (Code::ResourceExhausted, "TOO_MANY_REPORTS"),
+            ReportError::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
+        };
+        Self(status(code, reason, error.to_string(), []))
     }
 }
 

@@ -9,7 +9,8 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
 use super::message::{
-    Acted, AttachRequest, JoinRequest, Joined, Message, SeatAction, SpectateError, SpectateRequest,
+    Acted, AttachRequest, JoinRequest, Joined, Message, Ruled, SeatAction, SpectateError,
+    SpectateRequest, Watching,
 };
 use super::task::{self, Resting, TaskContext};
 use crate::clock::RoomClock;
@@ -215,6 +216,27 @@ impl Handle {
         };
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(message).await;
+    }
+
+    /// Reports something from the physical table; `None` if its ticket is another.
+    ///
+    /// # Errors
+    /// The room is gone, or (inner result) the report is refused.
+    pub async fn report(
+        &self,
+        secret: [u8; 32],
+        request: v1::ReportRequest,
+    ) -> Result<Option<Ruled>, RoomGone> {
+        self.ask(|reply| Message::Report(secret, Box::new(request), reply))
+            .await
+    }
+
+    /// Watches the physical table; `None` if its ticket is another.
+    ///
+    /// # Errors
+    /// The room is gone, or (inner result) too many watch it.
+    pub async fn watch_table(&self, secret: [u8; 32]) -> Result<Option<Watching>, RoomGone> {
+        self.ask(|reply| Message::WatchTable(secret, reply)).await
     }
 
     /// Closes the room because its tournament is closed; a running game is aborted.

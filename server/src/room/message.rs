@@ -5,14 +5,16 @@ use std::sync::atomic::AtomicBool;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 
 use super::subscriber::DeliveryOptions;
+use super::table_view::SentState;
 use crate::outbox::{OnSpace, Outbox};
+use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::{AbortReason, ParticipantKind};
-use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError};
+use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError, ReportError};
 
 /// A request for a seat.
 #[derive(Debug)]
@@ -102,6 +104,20 @@ pub enum SeatAction {
 /// The result of a command without a stream.
 pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
 
+/// Why a report from a physical table is refused.
+#[derive(Debug)]
+pub enum ReportRefusal {
+    /// A field is malformed.
+    Malformed(FieldProblem),
+    /// The room takes no such report now.
+    Refused(ReportError),
+}
+
+/// The result of a report.
+pub type Ruled = Result<Box<v1::ReportResponse>, ReportRefusal>;
+/// The states of a table, from the current one on.
+pub type Watching = Result<watch::Receiver<SentState>, SpectateError>;
+
 /// A message to a room.
 pub(super) enum Message {
     Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
@@ -127,6 +143,13 @@ pub(super) enum Message {
         [u8; 32],
         oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
     ),
+    /// A report, with the secret of the table's ticket.
+    Report(
+        [u8; 32],
+        Box<v1::ReportRequest>,
+        oneshot::Sender<Option<Ruled>>,
+    ),
+    WatchTable([u8; 32], oneshot::Sender<Option<Watching>>),
     Abort(AbortReason),
     Suspend,
     /// Delivers and sets the timer again: a stream has space, or an answer was handled in place.

@@ -1,17 +1,21 @@
 //! Rooms. Each is a task that owns one game. `chefshat-room` decides; `task` commits and publishes;
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
-//! which sends it the messages in `message`.
+//! which sends it the messages in `message`; `table_view` is what those who attend to a physical
+//! table see.
 
 mod handle;
 mod message;
 pub mod subscriber;
+mod table_view;
 mod task;
 #[cfg(test)]
 mod tests;
 
 pub use handle::{Handle, RoomGone, spawn_room};
 pub use message::{
-    Acted, AttachRequest, JoinRequest, Joined, SeatAction, SpectateError, SpectateRequest,
+    Acted, AttachRequest, JoinRequest, Joined, ReportRefusal, Ruled, SeatAction, SpectateError,
+    SpectateRequest, Watching,
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
+pub use table_view::SentState;
 pub use task::{RoomWatcher, TaskContext};

@@ -487,11 +487,11 @@ fn spectator_view(core: &Core) -> Viewer {
 }
 
 /// Whether an event is always sent to a seat at once: its own finishing, substitution and return,
-/// the end of a Shift and of the game.
+/// the end of a Shift and of the game, corrections and pauses at a physical table.
 pub fn is_urgent(event: &RoomEvent, seat: Seat) -> bool {
     match event {
         RoomEvent::Substituted(own) | RoomEvent::Returned(own) => *own == seat,
-        RoomEvent::GameAborted(_) => true,
+        RoomEvent::GameAborted(_) | RoomEvent::Correction(_) | RoomEvent::Paused(_) => true,
         RoomEvent::Game(game) => match &game.event {
             Event::SeatFinished { seat: own, .. } => *own == seat,
             Event::ShiftEnded(_) | Event::GameEnded { .. } => true,

@@ -15,22 +15,23 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, SeatedParticipant};
-use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, State};
+use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
 use tracing::{debug, error, info};
 
 use super::message::{
-    Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, SeatAction, SpectateError,
-    SpectateRequest,
+    Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
+    SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::subscriber::{
     MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
 };
+use super::table_view::TableView;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
-use crate::convert;
+use crate::convert::{self, Deck};
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::store::{Journal, Store, StoreError};
@@ -75,6 +76,7 @@ pub(super) fn spawn(
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
     let resting = Arc::new(Resting::default());
     let seats = core.header().fills.len();
+    let physical = core.header().is_physical();
     let room = Box::new(Room {
         core,
         journal,
@@ -92,6 +94,7 @@ pub(super) fn spawn(
         suspended: false,
         timer_at: None,
         answers_in_place: false,
+        table: physical.then(|| Box::new(TableView::new())),
         context: context.clone(),
     });
     context
@@ -125,6 +128,8 @@ enum Release {
         Box<SpectateRequest>,
         oneshot::Sender<Result<(), SpectateError>>,
     ),
+    Reported(oneshot::Sender<Option<Ruled>>, ReportOutcome),
+    WatchTable(oneshot::Sender<Option<Watching>>),
 }
 
 /// The state of a room: its core, journal and subscribers.
@@ -152,6 +157,8 @@ pub(super) struct Room {
     /// When the timer of the task fires.
     timer_at: Option<Duration>,
     answers_in_place: bool,
+    /// The physical table, if the room has one.
+    table: Option<Box<TableView>>,
     context: TaskContext,
 }
 
@@ -359,6 +366,15 @@ impl Room {
                 }
                 None => answer(reply, None),
             },
+            Message::Report(secret, request, reply) => match self.report(&secret, *request) {
+                Some(Ok(outcome)) => self.releases.push(Release::Reported(reply, outcome)),
+                Some(Err(refusal)) => answer(reply, Some(Err(refusal))),
+                None => answer(reply, None),
+            },
+            Message::WatchTable(secret, reply) => match self.has_table(&secret) {
+                true => self.releases.push(Release::WatchTable(reply)),
+                false => answer(reply, None),
+            },
             Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::Suspend => self.suspended = true,
             Message::Wake => {}
@@ -490,6 +506,34 @@ impl Room {
         }
     }
 
+    /// Whether a secret is that of the table's ticket.
+    fn has_table(&self, secret: &[u8]) -> bool {
+        (self.core.header().table).is_some_and(|table| table.matches(secret))
+    }
+
+    /// Takes a report from the physical table; `None` if the secret is not its ticket's.
+    fn report(
+        &mut self,
+        secret: &[u8],
+        request: v1::ReportRequest,
+    ) -> Option<Result<ReportOutcome, ReportRefusal>> {
+        if !self.has_table(secret) {
+            return None;
+        }
+        let deck = Deck::of(&self.core.header().rules);
+        let message = request.report.unwrap_or_default();
+        let outcome = convert::reported_from_proto(&request.report_id, &message, deck)
+            .map_err(ReportRefusal::Malformed)
+            .and_then(|reported| {
+                let outcome = self.core.report(self.now, reported);
+                outcome.map_err(ReportRefusal::Refused)
+            });
+        if let (Ok(_), Some(table)) = (&outcome, &mut self.table) {
+            table.keep_picture(&self.core, message);
+        }
+        Some(outcome)
+    }
+
     fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
         let policy = &self.core.header().policy;
         if !policy.spectators {
@@ -550,6 +594,9 @@ impl Room {
             self.release(release);
         }
         self.releases = releases;
+        if let Some(table) = &self.table {
+            table.follow(&self.core, self.now);
+        }
         self.deliver();
     }
 
@@ -578,6 +625,18 @@ impl Room {
             }
             Release::Describe(reply) => answer(reply, convert::describe(&self.core)),
             Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
+            Release::Reported(reply, outcome) => {
+                let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));
+                let state = state.map_or_else(v1::TableState::default, Arc::unwrap_or_clone);
+                let response = convert::report_response(&outcome, state);
+                answer(reply, Some(Ok(Box::new(response))));
+            }
+            Release::WatchTable(reply) => {
+                let watching = (self.table.as_ref())
+                    .and_then(|table| table.watch(&self.core, self.now))
+                    .ok_or(SpectateError::Full);
+                answer(reply, Some(watching));
+            }
         }
     }
 

@@ -68,6 +68,7 @@ async fn room_with(
         join_code: "CODE".into(),
         owner: SecretHash::of(b"owner"),
         tournament: None,
+        table: None,
     });
     let store = Arc::new(MemoryStore::default());
     let journal = store

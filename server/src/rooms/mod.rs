@@ -48,6 +48,8 @@ pub struct NewRoom {
     pub start: GameStart,
     /// The game seed, if its creator sets it.
     pub game_seed: Option<[u8; 32]>,
+    /// Whether the cards are real.
+    pub physical: bool,
     /// The participants seated from the start, if a tournament creates the room.
     pub seating: Option<Seating>,
     /// The request for it, if it can be repeated.
@@ -335,6 +337,23 @@ impl std::fmt::Debug for Rooms {
     }
 }
 
+/// The players at the physical table of a room.
+fn at_table(header: &GameHeader) -> impl Iterator<Item = (Seat, SeatedParticipant)> {
+    let fills = header.fills.iter().enumerate();
+    fills.filter_map(|(seat, fill)| {
+        let Fill::AtTable(kind) = *fill else {
+            return None;
+        };
+        let participant = SeatedParticipant {
+            name: header.display_names.get(&seat).cloned().unwrap_or_default(),
+            kind,
+            // Nobody has it: nobody connects to this seat.
+            ticket: Token::random(header.room_id).hash(),
+        };
+        Some((Seat::new(seat), participant))
+    })
+}
+
 /// The outcome of a reservation.
 enum Claim {
     /// There is space for it.
@@ -402,8 +421,12 @@ impl Reservation {
             join_code: join_code(),
             owner: owner.hash(),
             tournament: seating.map(|seating| seating.game),
+            table: new.physical.then(|| Token::of_table(&owner).hash()),
         });
         let mut core = Core::new(Arc::clone(&header));
+        for (seat, participant) in at_table(&header) {
+            core.seat(seat, participant);
+        }
         for (seat, participant) in new.seating.into_iter().flat_map(|it| it.participants) {
             core.seat(Seat::new(seat), participant);
         }

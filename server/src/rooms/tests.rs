@@ -29,6 +29,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         game_seed: None,
+        physical: false,
         request: None,
         seating: Some(Seating {
             game: TournamentGame {

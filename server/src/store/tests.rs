@@ -39,6 +39,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
         join_code: "ABCDEFGH".into(),
         owner: SecretHash::of(b"owner"),
         tournament: None,
+        table: None,
     })
 }
 

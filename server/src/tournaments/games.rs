@@ -222,6 +222,7 @@ impl Task {
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.handle.game_seed(number, game.deal),
+            physical: false,
             request: None,
             seating: Some(Seating {
                 game: TournamentGame {

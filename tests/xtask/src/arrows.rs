@@ -42,7 +42,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "chefshat-render",
         &["chefshat-engine", "chefshat-proto", "chefshat-record"],
     ),
-    ("chefshat-room", &["chefshat-engine", "chefshat-agents"]),
+    (
+        "chefshat-room",
+        &["chefshat-engine", "chefshat-agents", "chefshat-referee"],
+    ),
     (
         "chefshat-server",
         &[

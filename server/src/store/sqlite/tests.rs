@@ -79,6 +79,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         join_code: "ABCDEFGH".into(),
         owner: SecretHash::of(b"owner"),
         tournament: None,
+        table: None,
     }
 }
 

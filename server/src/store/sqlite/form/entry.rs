@@ -3,10 +3,12 @@
 use std::time::Duration;
 
 use chefshat_engine::Seat;
+use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use prost::Message;
 
 use super::{Unreadable, action, array};
+use crate::convert::{self, Deck};
 use chefshat_room::ids::SecretHash;
 use chefshat_room::journal::{
     AbortReason, Change, Decided, Entry, ParticipantKind, SeatedParticipant, Source,
@@ -17,7 +19,7 @@ struct EntryForm {
     /// Microseconds since the room was created.
     #[prost(uint64, tag = "1")]
     at_us: u64,
-    #[prost(oneof = "ChangeForm", tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12")]
+    #[prost(oneof = "ChangeForm", tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13")]
     change: Option<ChangeForm>,
 }
 
@@ -45,6 +47,8 @@ enum ChangeForm {
     Aborted(u32),
     #[prost(bool, tag = "12")]
     ServerRestarted(bool),
+    #[prost(message, tag = "13")]
+    Reported(ReportedForm),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -99,19 +103,29 @@ struct ExpressedForm {
     expression: Vec<u8>,
 }
 
+#[derive(Clone, PartialEq, Message)]
+struct ReportedForm {
+    #[prost(string, tag = "1")]
+    id: String,
+    /// Without the picture of a question.
+    #[prost(message, optional, tag = "2")]
+    report: Option<v1::TableReport>,
+}
+
 /// The numbers of kinds, sources and reasons. A released number never changes.
 pub(super) const KINDS: [(u32, ParticipantKind); 3] = [
     (1, ParticipantKind::Agent),
     (2, ParticipantKind::Human),
     (3, ParticipantKind::Robot),
 ];
-const SOURCES: [(u32, Source); 6] = [
+const SOURCES: [(u32, Source); 7] = [
     (1, Source::Agent),
     (2, Source::Timeout),
     (3, Source::Invalid),
     (4, Source::Disconnected),
     (5, Source::Substitute),
     (6, Source::Recorded),
+    (7, Source::Table),
 ];
 const REASONS: [(u32, AbortReason); 5] = [
     (1, AbortReason::Closed),
@@ -176,6 +190,10 @@ pub(in crate::store::sqlite) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         }),
         Change::Aborted(reason) => ChangeForm::Aborted(number_of(&REASONS, reason)),
         Change::ServerRestarted => ChangeForm::ServerRestarted(true),
+        Change::Reported(reported) => ChangeForm::Reported(ReportedForm {
+            id: reported.id.clone(),
+            report: Some(convert::report_to_proto(reported, Deck::LARGEST)),
+        }),
     };
     EntryForm {
         at_us: u64::try_from(entry.at.as_micros()).unwrap_or(u64::MAX),
@@ -244,6 +262,13 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             Change::Aborted(value_of(&REASONS, number, "reason of an abort")?)
         }
         ChangeForm::ServerRestarted(_) => Change::ServerRestarted,
+        ChangeForm::Reported(form) => {
+            let report = form.report.unwrap_or_default();
+            let reported = convert::reported_from_proto(&form.id, &report, Deck::LARGEST);
+            Change::Reported(Box::new(
+                reported.map_err(|problem| Unreadable::new(problem.to_string()))?,
+            ))
+        }
     })
 }
 

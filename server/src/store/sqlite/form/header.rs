@@ -49,6 +49,9 @@ struct HeaderForm {
     tournament: Vec<u8>,
     #[prost(bytes = "vec", tag = "17")]
     series: Vec<u8>,
+    /// The hash of the table's ticket; empty unless the room is physical.
+    #[prost(bytes = "vec", tag = "18")]
+    table: Vec<u8>,
 }
 
 /// Encodes a header.
@@ -81,6 +84,7 @@ pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> 
             .collect(),
         tournament: (header.tournament).map_or_else(Vec::new, |game| game.tournament.0.to_vec()),
         series: (header.series()).map_or_else(Vec::new, |series| series.0.to_vec()),
+        table: (header.table).map_or_else(Vec::new, |table| table.bytes().to_vec()),
     }
     .encode_to_vec()
 }
@@ -124,6 +128,10 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
         created_at_ms: form.created_at_ms,
         join_code: form.join_code,
         owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
+        table: match form.table.as_slice() {
+            [] => None,
+            hash => Some(SecretHash::from_bytes(array(hash, "the table's hash")?)),
+        },
         tournament: if form.tournament.is_empty() {
             None
         } else {

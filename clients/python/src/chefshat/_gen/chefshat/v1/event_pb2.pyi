@@ -8,6 +8,7 @@ may not see are redacted.
 from chefshat._gen.chefshat.v1 import decision_pb2 as _decision_pb2
 from chefshat._gen.chefshat.v1 import room_pb2 as _room_pb2
 from chefshat._gen.chefshat.v1 import rules_pb2 as _rules_pb2
+from chefshat._gen.chefshat.v1 import table_pb2 as _table_pb2
 from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
@@ -44,6 +45,8 @@ class _DecisionSourceEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Decisi
     """A built-in agent that substitutes the seat's participant."""
     DECISION_SOURCE_RECORDED: _DecisionSource.ValueType  # 6
     """Copied from the recorded game that this game branched from."""
+    DECISION_SOURCE_TABLE: _DecisionSource.ValueType  # 7
+    """Reported from a physical table: the seat's player laid it with real cards."""
 
 class DecisionSource(_DecisionSource, metaclass=_DecisionSourceEnumTypeWrapper):
     """Who or what took a decision."""
@@ -62,6 +65,8 @@ DECISION_SOURCE_SUBSTITUTE: DecisionSource.ValueType  # 5
 """A built-in agent that substitutes the seat's participant."""
 DECISION_SOURCE_RECORDED: DecisionSource.ValueType  # 6
 """Copied from the recorded game that this game branched from."""
+DECISION_SOURCE_TABLE: DecisionSource.ValueType  # 7
+"""Reported from a physical table: the seat's player laid it with real cards."""
 Global___DecisionSource: _TypeAlias = DecisionSource  # noqa: Y015
 
 @_typing.final
@@ -92,6 +97,10 @@ class GameEvent(_message.Message):
     EXPRESSION_SHOWN_FIELD_NUMBER: _builtins.int
     VACATED_FIELD_NUMBER: _builtins.int
     SERVER_RESTARTED_FIELD_NUMBER: _builtins.int
+    HAND_REPORTED_FIELD_NUMBER: _builtins.int
+    VIOLATION_FIELD_NUMBER: _builtins.int
+    CORRECTION_FIELD_NUMBER: _builtins.int
+    TABLE_PAUSED_FIELD_NUMBER: _builtins.int
     sequence: _builtins.int
     """Number of the event in its game, from 1, gap-free."""
     elapsed_ms: _builtins.int
@@ -174,6 +183,22 @@ class GameEvent(_message.Message):
     def server_restarted(self) -> Global___ServerRestarted:
         """The server was restarted."""
 
+    @_builtins.property
+    def hand_reported(self) -> Global___HandReported:
+        """At a physical table: the hand of a seat became known."""
+
+    @_builtins.property
+    def violation(self) -> _table_pb2.Violation:
+        """At a physical table: something that the rules or the cards do not allow. It does not count."""
+
+    @_builtins.property
+    def correction(self) -> Global___Correction:
+        """At a physical table: earlier events are void."""
+
+    @_builtins.property
+    def table_paused(self) -> Global___TablePaused:
+        """At a physical table: the game was paused or resumed."""
+
     def __init__(
         self,
         *,
@@ -198,12 +223,16 @@ class GameEvent(_message.Message):
         expression_shown: Global___ExpressionShown | None = ...,
         vacated: Global___Vacated | None = ...,
         server_restarted: Global___ServerRestarted | None = ...,
+        hand_reported: Global___HandReported | None = ...,
+        violation: _table_pb2.Violation | None = ...,
+        correction: Global___Correction | None = ...,
+        table_paused: Global___TablePaused | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "correction", b"correction", "disconnected", b"disconnected", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "hand_reported", b"hand_reported", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "table_paused", b"table_paused", "vacated", b"vacated", "violation", b"violation"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "elapsed_ms", b"elapsed_ms", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "rewards", b"rewards", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "sequence", b"sequence", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "correction", b"correction", "disconnected", b"disconnected", "elapsed_ms", b"elapsed_ms", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "hand_reported", b"hand_reported", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "rewards", b"rewards", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "sequence", b"sequence", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "table_paused", b"table_paused", "vacated", b"vacated", "violation", b"violation"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["seated", "disconnected", "returned", "substituted", "game_started", "shift_started", "roles_assigned", "special_action_declared", "cards_exchanged", "play", "pass", "pizza_done", "seat_finished", "shift_ended", "game_ended", "game_aborted", "expression_shown", "vacated", "server_restarted"]  # noqa: Y015
+    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["seated", "disconnected", "returned", "substituted", "game_started", "shift_started", "roles_assigned", "special_action_declared", "cards_exchanged", "play", "pass", "pizza_done", "seat_finished", "shift_ended", "game_ended", "game_aborted", "expression_shown", "vacated", "server_restarted", "hand_reported", "violation", "correction", "table_paused"]  # noqa: Y015
     _WhichOneofArgType_kind: _TypeAlias = _typing.Literal["kind", b"kind"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_kind) -> _WhichOneofReturnType_kind | None: ...
 
@@ -916,3 +945,87 @@ class ExpressionShown(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___ExpressionShown: _TypeAlias = ExpressionShown  # noqa: Y015
+
+@_typing.final
+class HandReported(_message.Message):
+    """At a physical table, the hand of a seat became known."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    HAND_FIELD_NUMBER: _builtins.int
+    DEALT_FIELD_NUMBER: _builtins.int
+    dealt: _builtins.bool
+    """Whether it is the hand as dealt, before the exchange. Otherwise the hand at that moment."""
+    @_builtins.property
+    def hand(self) -> _rules_pb2.SeatCards:
+        """The hand as it was then; a viewer that may not see it receives no cards."""
+
+    def __init__(
+        self,
+        *,
+        hand: _rules_pb2.SeatCards | None = ...,
+        dealt: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["hand", b"hand"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["dealt", b"dealt", "hand", b"hand"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___HandReported: _TypeAlias = HandReported  # noqa: Y015
+
+@_typing.final
+class Correction(_message.Message):
+    """At a physical table, a report was wrong. The events of the game (plays, passes, and what follows
+    from them) from number `first_void` to this event are void; those that follow replace them.
+    Events of the room (seats, connections, expressions, violations) stay. A record has the game as
+    corrected: there, no events are void.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    FIRST_VOID_FIELD_NUMBER: _builtins.int
+    TEXT_FIELD_NUMBER: _builtins.int
+    REPORT_FIELD_NUMBER: _builtins.int
+    first_void: _builtins.int
+    """Number of the first void event; 0 in a record, or if no event is void."""
+    text: _builtins.str
+    """For people: "Bo laid two 6s, not two 9s"."""
+    report: _builtins.int
+    """Number of the corrected report."""
+    def __init__(
+        self,
+        *,
+        first_void: _builtins.int = ...,
+        text: _builtins.str = ...,
+        report: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["first_void", b"first_void", "report", b"report", "text", b"text"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Correction: _TypeAlias = Correction  # noqa: Y015
+
+@_typing.final
+class TablePaused(_message.Message):
+    """At a physical table, the game was paused or resumed."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    PAUSED_FIELD_NUMBER: _builtins.int
+    paused: _builtins.bool
+    """Paused from now on; false: resumed."""
+    def __init__(
+        self,
+        *,
+        paused: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["paused", b"paused"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___TablePaused: _TypeAlias = TablePaused  # noqa: Y015

@@ -25,39 +25,39 @@ _sym_db = _symbol_database.Default()
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x16\x63hefshat/v1/room.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/rules.proto\"\xa6\x01\n\nSeatConfig\x12\x34\n\x0creserved_for\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKindH\x00\x12\x18\n\x0e\x62uilt_in_agent\x18\x02 \x01(\tH\x00\x12-\n\x06replay\x18\x03 \x01(\x0b\x32\x1b.chefshat.v1.RecordedPlayerH\x00\x12\x0c\n\x04name\x18\x04 \x01(\tB\x0b\n\tfilled_by\"/\n\x0eRecordedPlayer\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x0c\n\x04seat\x18\x02 \x01(\r\"E\n\x0b\x42ranchPoint\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x11\n\tdecisions\x18\x02 \x01(\x04\x12\x12\n\nsame_deals\x18\x03 \x01(\x08\"\x8c\x05\n\nRoomPolicy\x12\x1d\n\x10\x64\x65\x63ision_time_ms\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\x14\n\x07\x62\x61nk_ms\x18\x02 \x01(\rH\x01\x88\x01\x01\x12!\n\x14max_invalid_attempts\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x19\n\x0cmax_timeouts\x18\x04 \x01(\rH\x03\x88\x01\x01\x12\x12\n\nsubstitute\x18\x05 \x01(\t\x12\'\n\x05\x61\x62ort\x18\x06 \x01(\x0e\x32\x18.chefshat.v1.AbortPolicy\x12\x30\n\rreward_scheme\x18\x07 \x01(\x0e\x32\x19.chefshat.v1.RewardScheme\x12\x14\n\x07pace_ms\x18\x08 \x01(\rH\x04\x88\x01\x01\x12\x1c\n\x0fwaiting_time_ms\x18\t \x01(\rH\x05\x88\x01\x01\x12\x17\n\nspectators\x18\n \x01(\x08H\x06\x88\x01\x01\x12&\n\x19spectator_delay_decisions\x18\x0b \x01(\rH\x07\x88\x01\x01\x12!\n\x14spectators_see_hands\x18\x0c \x01(\x08H\x08\x88\x01\x01\x12+\n\ndurability\x18\r \x01(\x0e\x32\x17.chefshat.v1.Durability\x12&\n\x06\x63locks\x18\x0e \x03(\x0b\x32\x16.chefshat.v1.KindClockB\x13\n\x11_decision_time_msB\n\n\x08_bank_msB\x17\n\x15_max_invalid_attemptsB\x0f\n\r_max_timeoutsB\n\n\x08_pace_msB\x12\n\x10_waiting_time_msB\r\n\x0b_spectatorsB\x1c\n\x1a_spectator_delay_decisionsB\x17\n\x15_spectators_see_hands\"\x8d\x01\n\tKindClock\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x1d\n\x10\x64\x65\x63ision_time_ms\x18\x02 \x01(\rH\x00\x88\x01\x01\x12\x14\n\x07\x62\x61nk_ms\x18\x03 \x01(\rH\x01\x88\x01\x01\x42\x13\n\x11_decision_time_msB\n\n\x08_bank_ms\"\xf6\x01\n\x0bParticipant\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0c\n\x04name\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x32\n\x0creserved_for\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x16\n\x0e\x62uilt_in_agent\x18\x05 \x01(\t\x12\x11\n\tconnected\x18\x06 \x01(\x08\x12\x13\n\x0bsubstituted\x18\x07 \x01(\x08\x12+\n\x06replay\x18\x08 \x01(\x0b\x32\x1b.chefshat.v1.RecordedPlayer\"\xcc\x03\n\x04Room\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x0f\n\x07game_id\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12%\n\x05state\x18\x04 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12#\n\x05rules\x18\x05 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\'\n\x06policy\x18\x06 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\x07 \x03(\x0b\x32\x18.chefshat.v1.Participant\x12\x17\n\x0fseed_commitment\x18\x08 \x01(\x0c\x12\x12\n\nseed_fixed\x18\t \x01(\x08\x12\x15\n\rcreated_at_ms\x18\n \x01(\x04\x12\'\n\x06origin\x18\x0b \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12/\n\rbranched_from\x18\x0c \x01(\x0b\x32\x18.chefshat.v1.BranchPoint\x12.\n\x0c\x61\x62ort_reason\x18\r \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\x15\n\rtournament_id\x18\x0e \x01(\t\x12\x11\n\tseries_id\x18\x0f \x01(\t*\x87\x01\n\x0fParticipantKind\x12 \n\x1cPARTICIPANT_KIND_UNSPECIFIED\x10\x00\x12\x1a\n\x16PARTICIPANT_KIND_AGENT\x10\x01\x12\x1a\n\x16PARTICIPANT_KIND_HUMAN\x10\x02\x12\x1a\n\x16PARTICIPANT_KIND_ROBOT\x10\x03*Z\n\nDurability\x12\x1a\n\x16\x44URABILITY_UNSPECIFIED\x10\x00\x12\x16\n\x12\x44URABILITY_DURABLE\x10\x01\x12\x18\n\x14\x44URABILITY_EPHEMERAL\x10\x02*\xaa\x01\n\nGameOrigin\x12\x1b\n\x17GAME_ORIGIN_UNSPECIFIED\x10\x00\x12\x15\n\x11GAME_ORIGIN_DEALT\x10\x01\x12\x1a\n\x16GAME_ORIGIN_FIXED_SEED\x10\x02\x12\x18\n\x14GAME_ORIGIN_SCRIPTED\x10\x03\x12\x18\n\x14GAME_ORIGIN_BRANCHED\x10\x04\x12\x18\n\x14GAME_ORIGIN_IMPORTED\x10\x05*\xb9\x01\n\x0cRewardScheme\x12\x1d\n\x19REWARD_SCHEME_UNSPECIFIED\x10\x00\x12\x1a\n\x16REWARD_SCHEME_VALIDITY\x10\x01\x12\x17\n\x13REWARD_SCHEME_PAPER\x10\x02\x12 \n\x1cREWARD_SCHEME_PAPER_INTENDED\x10\x03\x12\x19\n\x15REWARD_SCHEME_WINNING\x10\x04\x12\x18\n\x14REWARD_SCHEME_POINTS\x10\x05*y\n\x0b\x41\x62ortPolicy\x12\x1c\n\x18\x41\x42ORT_POLICY_UNSPECIFIED\x10\x00\x12\x19\n\x15\x41\x42ORT_POLICY_ALL_LOST\x10\x01\x12\x19\n\x15\x41\x42ORT_POLICY_ANY_LOST\x10\x02\x12\x16\n\x12\x41\x42ORT_POLICY_NEVER\x10\x03*\x88\x01\n\tRoomState\x12\x1a\n\x16ROOM_STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12ROOM_STATE_WAITING\x10\x01\x12\x16\n\x12ROOM_STATE_PLAYING\x10\x02\x12\x17\n\x13ROOM_STATE_FINISHED\x10\x03\x12\x16\n\x12ROOM_STATE_ABORTED\x10\x04*\xbe\x01\n\x0b\x41\x62ortReason\x12\x1c\n\x18\x41\x42ORT_REASON_UNSPECIFIED\x10\x00\x12\x17\n\x13\x41\x42ORT_REASON_CLOSED\x10\x01\x12\x19\n\x15\x41\x42ORT_REASON_SHUTDOWN\x10\x02\x12\"\n\x1e\x41\x42ORT_REASON_PARTICIPANTS_LOST\x10\x03\x12\x1e\n\x1a\x41\x42ORT_REASON_NEVER_STARTED\x10\x04\x12\x19\n\x15\x41\x42ORT_REASON_TOO_LONG\x10\x05\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x16\x63hefshat/v1/room.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/rules.proto\"\xd8\x01\n\nSeatConfig\x12\x34\n\x0creserved_for\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKindH\x00\x12\x18\n\x0e\x62uilt_in_agent\x18\x02 \x01(\tH\x00\x12-\n\x06replay\x18\x03 \x01(\x0b\x32\x1b.chefshat.v1.RecordedPlayerH\x00\x12\x30\n\x08\x61t_table\x18\x05 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKindH\x00\x12\x0c\n\x04name\x18\x04 \x01(\tB\x0b\n\tfilled_by\"/\n\x0eRecordedPlayer\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x0c\n\x04seat\x18\x02 \x01(\r\"E\n\x0b\x42ranchPoint\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x11\n\tdecisions\x18\x02 \x01(\x04\x12\x12\n\nsame_deals\x18\x03 \x01(\x08\"\x8c\x05\n\nRoomPolicy\x12\x1d\n\x10\x64\x65\x63ision_time_ms\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\x14\n\x07\x62\x61nk_ms\x18\x02 \x01(\rH\x01\x88\x01\x01\x12!\n\x14max_invalid_attempts\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x19\n\x0cmax_timeouts\x18\x04 \x01(\rH\x03\x88\x01\x01\x12\x12\n\nsubstitute\x18\x05 \x01(\t\x12\'\n\x05\x61\x62ort\x18\x06 \x01(\x0e\x32\x18.chefshat.v1.AbortPolicy\x12\x30\n\rreward_scheme\x18\x07 \x01(\x0e\x32\x19.chefshat.v1.RewardScheme\x12\x14\n\x07pace_ms\x18\x08 \x01(\rH\x04\x88\x01\x01\x12\x1c\n\x0fwaiting_time_ms\x18\t \x01(\rH\x05\x88\x01\x01\x12\x17\n\nspectators\x18\n \x01(\x08H\x06\x88\x01\x01\x12&\n\x19spectator_delay_decisions\x18\x0b \x01(\rH\x07\x88\x01\x01\x12!\n\x14spectators_see_hands\x18\x0c \x01(\x08H\x08\x88\x01\x01\x12+\n\ndurability\x18\r \x01(\x0e\x32\x17.chefshat.v1.Durability\x12&\n\x06\x63locks\x18\x0e \x03(\x0b\x32\x16.chefshat.v1.KindClockB\x13\n\x11_decision_time_msB\n\n\x08_bank_msB\x17\n\x15_max_invalid_attemptsB\x0f\n\r_max_timeoutsB\n\n\x08_pace_msB\x12\n\x10_waiting_time_msB\r\n\x0b_spectatorsB\x1c\n\x1a_spectator_delay_decisionsB\x17\n\x15_spectators_see_hands\"\x8d\x01\n\tKindClock\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x1d\n\x10\x64\x65\x63ision_time_ms\x18\x02 \x01(\rH\x00\x88\x01\x01\x12\x14\n\x07\x62\x61nk_ms\x18\x03 \x01(\rH\x01\x88\x01\x01\x42\x13\n\x11_decision_time_msB\n\n\x08_bank_ms\"\x88\x02\n\x0bParticipant\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0c\n\x04name\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x32\n\x0creserved_for\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x16\n\x0e\x62uilt_in_agent\x18\x05 \x01(\t\x12\x11\n\tconnected\x18\x06 \x01(\x08\x12\x13\n\x0bsubstituted\x18\x07 \x01(\x08\x12+\n\x06replay\x18\x08 \x01(\x0b\x32\x1b.chefshat.v1.RecordedPlayer\x12\x10\n\x08\x61t_table\x18\t \x01(\x08\"\xcc\x03\n\x04Room\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x0f\n\x07game_id\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12%\n\x05state\x18\x04 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12#\n\x05rules\x18\x05 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\'\n\x06policy\x18\x06 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\x07 \x03(\x0b\x32\x18.chefshat.v1.Participant\x12\x17\n\x0fseed_commitment\x18\x08 \x01(\x0c\x12\x12\n\nseed_fixed\x18\t \x01(\x08\x12\x15\n\rcreated_at_ms\x18\n \x01(\x04\x12\'\n\x06origin\x18\x0b \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12/\n\rbranched_from\x18\x0c \x01(\x0b\x32\x18.chefshat.v1.BranchPoint\x12.\n\x0c\x61\x62ort_reason\x18\r \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\x15\n\rtournament_id\x18\x0e \x01(\t\x12\x11\n\tseries_id\x18\x0f \x01(\t*\x87\x01\n\x0fParticipantKind\x12 \n\x1cPARTICIPANT_KIND_UNSPECIFIED\x10\x00\x12\x1a\n\x16PARTICIPANT_KIND_AGENT\x10\x01\x12\x1a\n\x16PARTICIPANT_KIND_HUMAN\x10\x02\x12\x1a\n\x16PARTICIPANT_KIND_ROBOT\x10\x03*Z\n\nDurability\x12\x1a\n\x16\x44URABILITY_UNSPECIFIED\x10\x00\x12\x16\n\x12\x44URABILITY_DURABLE\x10\x01\x12\x18\n\x14\x44URABILITY_EPHEMERAL\x10\x02*\xc4\x01\n\nGameOrigin\x12\x1b\n\x17GAME_ORIGIN_UNSPECIFIED\x10\x00\x12\x15\n\x11GAME_ORIGIN_DEALT\x10\x01\x12\x1a\n\x16GAME_ORIGIN_FIXED_SEED\x10\x02\x12\x18\n\x14GAME_ORIGIN_SCRIPTED\x10\x03\x12\x18\n\x14GAME_ORIGIN_BRANCHED\x10\x04\x12\x18\n\x14GAME_ORIGIN_IMPORTED\x10\x05\x12\x18\n\x14GAME_ORIGIN_PHYSICAL\x10\x06*\xb9\x01\n\x0cRewardScheme\x12\x1d\n\x19REWARD_SCHEME_UNSPECIFIED\x10\x00\x12\x1a\n\x16REWARD_SCHEME_VALIDITY\x10\x01\x12\x17\n\x13REWARD_SCHEME_PAPER\x10\x02\x12 \n\x1cREWARD_SCHEME_PAPER_INTENDED\x10\x03\x12\x19\n\x15REWARD_SCHEME_WINNING\x10\x04\x12\x18\n\x14REWARD_SCHEME_POINTS\x10\x05*y\n\x0b\x41\x62ortPolicy\x12\x1c\n\x18\x41\x42ORT_POLICY_UNSPECIFIED\x10\x00\x12\x19\n\x15\x41\x42ORT_POLICY_ALL_LOST\x10\x01\x12\x19\n\x15\x41\x42ORT_POLICY_ANY_LOST\x10\x02\x12\x16\n\x12\x41\x42ORT_POLICY_NEVER\x10\x03*\x88\x01\n\tRoomState\x12\x1a\n\x16ROOM_STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12ROOM_STATE_WAITING\x10\x01\x12\x16\n\x12ROOM_STATE_PLAYING\x10\x02\x12\x17\n\x13ROOM_STATE_FINISHED\x10\x03\x12\x16\n\x12ROOM_STATE_ABORTED\x10\x04*\xbe\x01\n\x0b\x41\x62ortReason\x12\x1c\n\x18\x41\x42ORT_REASON_UNSPECIFIED\x10\x00\x12\x17\n\x13\x41\x42ORT_REASON_CLOSED\x10\x01\x12\x19\n\x15\x41\x42ORT_REASON_SHUTDOWN\x10\x02\x12\"\n\x1e\x41\x42ORT_REASON_PARTICIPANTS_LOST\x10\x03\x12\x1e\n\x1a\x41\x42ORT_REASON_NEVER_STARTED\x10\x04\x12\x19\n\x15\x41\x42ORT_REASON_TOO_LONG\x10\x05\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.room_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_PARTICIPANTKIND']._serialized_start=1865
-  _globals['_PARTICIPANTKIND']._serialized_end=2000
-  _globals['_DURABILITY']._serialized_start=2002
-  _globals['_DURABILITY']._serialized_end=2092
-  _globals['_GAMEORIGIN']._serialized_start=2095
-  _globals['_GAMEORIGIN']._serialized_end=2265
-  _globals['_REWARDSCHEME']._serialized_start=2268
-  _globals['_REWARDSCHEME']._serialized_end=2453
-  _globals['_ABORTPOLICY']._serialized_start=2455
-  _globals['_ABORTPOLICY']._serialized_end=2576
-  _globals['_ROOMSTATE']._serialized_start=2579
-  _globals['_ROOMSTATE']._serialized_end=2715
-  _globals['_ABORTREASON']._serialized_start=2718
-  _globals['_ABORTREASON']._serialized_end=2908
+  _globals['_PARTICIPANTKIND']._serialized_start=1933
+  _globals['_PARTICIPANTKIND']._serialized_end=2068
+  _globals['_DURABILITY']._serialized_start=2070
+  _globals['_DURABILITY']._serialized_end=2160
+  _globals['_GAMEORIGIN']._serialized_start=2163
+  _globals['_GAMEORIGIN']._serialized_end=2359
+  _globals['_REWARDSCHEME']._serialized_start=2362
+  _globals['_REWARDSCHEME']._serialized_end=2547
+  _globals['_ABORTPOLICY']._serialized_start=2549
+  _globals['_ABORTPOLICY']._serialized_end=2670
+  _globals['_ROOMSTATE']._serialized_start=2673
+  _globals['_ROOMSTATE']._serialized_end=2809
+  _globals['_ABORTREASON']._serialized_start=2812
+  _globals['_ABORTREASON']._serialized_end=3002
   _globals['_SEATCONFIG']._serialized_start=65
-  _globals['_SEATCONFIG']._serialized_end=231
-  _globals['_RECORDEDPLAYER']._serialized_start=233
-  _globals['_RECORDEDPLAYER']._serialized_end=280
-  _globals['_BRANCHPOINT']._serialized_start=282
-  _globals['_BRANCHPOINT']._serialized_end=351
-  _globals['_ROOMPOLICY']._serialized_start=354
-  _globals['_ROOMPOLICY']._serialized_end=1006
-  _globals['_KINDCLOCK']._serialized_start=1009
-  _globals['_KINDCLOCK']._serialized_end=1150
-  _globals['_PARTICIPANT']._serialized_start=1153
-  _globals['_PARTICIPANT']._serialized_end=1399
-  _globals['_ROOM']._serialized_start=1402
-  _globals['_ROOM']._serialized_end=1862
+  _globals['_SEATCONFIG']._serialized_end=281
+  _globals['_RECORDEDPLAYER']._serialized_start=283
+  _globals['_RECORDEDPLAYER']._serialized_end=330
+  _globals['_BRANCHPOINT']._serialized_start=332
+  _globals['_BRANCHPOINT']._serialized_end=401
+  _globals['_ROOMPOLICY']._serialized_start=404
+  _globals['_ROOMPOLICY']._serialized_end=1056
+  _globals['_KINDCLOCK']._serialized_start=1059
+  _globals['_KINDCLOCK']._serialized_end=1200
+  _globals['_PARTICIPANT']._serialized_start=1203
+  _globals['_PARTICIPANT']._serialized_end=1467
+  _globals['_ROOM']._serialized_start=1470
+  _globals['_ROOM']._serialized_end=1930
 # @@protoc_insertion_point(module_scope)

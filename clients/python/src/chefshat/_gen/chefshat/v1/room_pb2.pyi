@@ -94,6 +94,8 @@ class _GameOriginEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_GameOrigin
     """Branched from the record of another game."""
     GAME_ORIGIN_IMPORTED: _GameOrigin.ValueType  # 5
     """Played elsewhere with real cards and imported. What was not written down is unknown."""
+    GAME_ORIGIN_PHYSICAL: _GameOrigin.ValueType  # 6
+    """Played in a physical room, with real cards. What was not reported is unknown."""
 
 class GameOrigin(_GameOrigin, metaclass=_GameOriginEnumTypeWrapper):
     """Where a game came from."""
@@ -110,6 +112,8 @@ GAME_ORIGIN_BRANCHED: GameOrigin.ValueType  # 4
 """Branched from the record of another game."""
 GAME_ORIGIN_IMPORTED: GameOrigin.ValueType  # 5
 """Played elsewhere with real cards and imported. What was not written down is unknown."""
+GAME_ORIGIN_PHYSICAL: GameOrigin.ValueType  # 6
+"""Played in a physical room, with real cards. What was not reported is unknown."""
 Global___GameOrigin: _TypeAlias = GameOrigin  # noqa: Y015
 
 class _RewardScheme:
@@ -253,14 +257,20 @@ class SeatConfig(_message.Message):
     RESERVED_FOR_FIELD_NUMBER: _builtins.int
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     REPLAY_FIELD_NUMBER: _builtins.int
+    AT_TABLE_FIELD_NUMBER: _builtins.int
     NAME_FIELD_NUMBER: _builtins.int
     reserved_for: Global___ParticipantKind.ValueType
     """Participants of this kind, with the room's join code; UNSPECIFIED admits every kind."""
     built_in_agent: _builtins.str
     """A built-in agent of the server: "random", "random_unmasked", "greedy" or "trained"."""
+    at_table: Global___ParticipantKind.ValueType
+    """A player of this kind who sits at the physical table with real cards. Nobody connects: what the
+    player does is reported. Only in a physical room.
+    """
     name: _builtins.str
     """Display name of a built-in agent, 1..=64 characters; empty: its own name. Ratings and filters
-    use the agent, not this name. Must be empty for an open seat: its participant chooses a name.
+    use the agent, not this name. Required for a player at the table. Must be empty for an open
+    seat: its participant chooses a name.
     """
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
@@ -272,13 +282,14 @@ class SeatConfig(_message.Message):
         reserved_for: Global___ParticipantKind.ValueType = ...,
         built_in_agent: _builtins.str = ...,
         replay: Global___RecordedPlayer | None = ...,
+        at_table: Global___ParticipantKind.ValueType = ...,
         name: _builtins.str = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay"]  # noqa: Y015
+    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay", "at_table"]  # noqa: Y015
     _WhichOneofArgType_filled_by: _TypeAlias = _typing.Literal["filled_by", b"filled_by"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_filled_by) -> _WhichOneofReturnType_filled_by | None: ...
 
@@ -527,6 +538,7 @@ class Participant(_message.Message):
     CONNECTED_FIELD_NUMBER: _builtins.int
     SUBSTITUTED_FIELD_NUMBER: _builtins.int
     REPLAY_FIELD_NUMBER: _builtins.int
+    AT_TABLE_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """Seat number, from 0."""
     name: _builtins.str
@@ -541,6 +553,8 @@ class Participant(_message.Message):
     """Whether the seat is attached to a stream now; always true for a built-in agent."""
     substituted: _builtins.bool
     """Whether a substitute plays for the seat now."""
+    at_table: _builtins.bool
+    """Whether the player sits at the physical table with real cards."""
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """The recorded player that the built-in agent "replay" imitates; unset for all others."""
@@ -556,10 +570,11 @@ class Participant(_message.Message):
         connected: _builtins.bool = ...,
         substituted: _builtins.bool = ...,
         replay: Global___RecordedPlayer | None = ...,
+        at_table: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["replay", b"replay"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "substituted", b"substituted"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "substituted", b"substituted"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -34,6 +34,7 @@ class CreateRoomRequest(_message.Message):
     SCRIPTED_FIELD_NUMBER: _builtins.int
     BRANCH_FIELD_NUMBER: _builtins.int
     REQUEST_ID_FIELD_NUMBER: _builtins.int
+    PHYSICAL_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Display name, at most 64 characters."""
     game_seed: _builtins.bytes
@@ -45,6 +46,10 @@ class CreateRoomRequest(_message.Message):
     lost response, creates nothing and gets the same response with the same secrets, as long as the
     created object is listed; if it survives a restart of the server, then too. The same id with other
     content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """
+    physical: _builtins.bool
+    """Whether the cards are real: the server deals nothing, and a bridge reports what happens
+    (TableService). Leave `game_seed` and `start` unset.
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -79,10 +84,11 @@ class CreateRoomRequest(_message.Message):
         scripted: _rules_pb2.ScriptedShift | None = ...,
         branch: _room_pb2.BranchPoint | None = ...,
         request_id: _builtins.bytes = ...,
+        physical: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "policy", b"policy", "rules", b"rules", "scripted", b"scripted", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "game_seed", b"game_seed", "name", b"name", "policy", b"policy", "request_id", b"request_id", "rules", b"rules", "scripted", b"scripted", "seats", b"seats", "start", b"start"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "game_seed", b"game_seed", "name", b"name", "physical", b"physical", "policy", b"policy", "request_id", b"request_id", "rules", b"rules", "scripted", b"scripted", "seats", b"seats", "start", b"start"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch"]  # noqa: Y015
     _WhichOneofArgType_start: _TypeAlias = _typing.Literal["start", b"start"]  # noqa: Y015
@@ -99,10 +105,15 @@ class CreateRoomResponse(_message.Message):
     ROOM_FIELD_NUMBER: _builtins.int
     JOIN_CODE_FIELD_NUMBER: _builtins.int
     OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    TABLE_TICKET_FIELD_NUMBER: _builtins.int
     join_code: _builtins.str
     """The join code: what participants need to join."""
     owner_token: _builtins.str
     """Secret that authorises the room's creator, for CloseRoom."""
+    table_ticket: _builtins.str
+    """Of a physical room: secret that authorises reports about its table and following it
+    (TableService). Empty for other rooms.
+    """
     @_builtins.property
     def room(self) -> _room_pb2.Room:
         """The room."""
@@ -113,10 +124,11 @@ class CreateRoomResponse(_message.Message):
         room: _room_pb2.Room | None = ...,
         join_code: _builtins.str = ...,
         owner_token: _builtins.str = ...,
+        table_ticket: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["room", b"room"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "owner_token", b"owner_token", "room", b"room"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "owner_token", b"owner_token", "room", b"room", "table_ticket", b"table_ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

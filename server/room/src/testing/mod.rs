@@ -1,6 +1,8 @@
 //! A room under a simulated clock, for tests of the core and of the server.
 #![allow(missing_docs, reason = "test support")]
 
+pub mod real_table;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,11 +13,13 @@ use chefshat_engine::{
 
 use crate::ids::{Id, SecretHash};
 use crate::journal::{
-    Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, SeatedParticipant,
+    Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, Report, ReportSource,
+    Reported, SeatedParticipant,
 };
 use crate::log::RoomEvent;
+use crate::physical::RoomGame;
 use crate::policy::Policy;
-use crate::{Answer, Answered, ConnectionId, Core, JoinError, Verdict};
+use crate::{Answer, Answered, ConnectionId, Core, JoinError, ReportOutcome, Verdict};
 
 pub const OPEN: Fill = Fill::Open { reserved_for: None };
 
@@ -56,6 +60,7 @@ impl Table {
             join_code: "CODE".into(),
             owner: SecretHash::of(b"owner"),
             tournament: None,
+            table: None,
         });
         Self {
             core: Core::new(header),
@@ -64,6 +69,47 @@ impl Table {
             connections: 0,
             store_takes: Duration::ZERO,
         }
+    }
+
+    /// Creates a physical room: players at the table sit there from the start.
+    pub fn physical(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> Self {
+        let mut table = Self::with_rules(policy, fills, rules);
+        let mut header = GameHeader::clone(table.core.header());
+        header.table = Some(SecretHash::of(b"table"));
+        table.core = Core::new(Arc::new(header));
+        for seat in table.core.all_seats() {
+            if let Fill::AtTable(kind) = table.core.standing(seat).fill {
+                table.core.seat(
+                    seat,
+                    SeatedParticipant {
+                        name: format!("player {seat}"),
+                        kind,
+                        ticket: SecretHash::of(b"nobody"),
+                    },
+                );
+            }
+        }
+        table.core.begin_if_all_built_in(table.now);
+        table.commit();
+        table
+    }
+
+    /// Reports something from the table.
+    pub fn report(&mut self, report: Report) -> ReportOutcome {
+        self.report_late(report, Duration::ZERO)
+    }
+
+    /// Reports something that happened `age` ago.
+    pub fn report_late(&mut self, report: Report, age: Duration) -> ReportOutcome {
+        let reported = Reported {
+            id: format!("report {}", self.core.changes()),
+            source: ReportSource::Camera,
+            age,
+            report,
+        };
+        let outcome = self.core.report(self.now, reported);
+        self.commit();
+        outcome.expect("the report is accepted")
     }
 
     /// Creates a room of four remote agents whose game has started.
@@ -221,9 +267,10 @@ impl Core {
         &mut self,
         change: impl FnOnce(&Game) -> Option<BySeat<Cards>>,
     ) -> Option<()> {
-        let game = self.game.as_ref().expect("the game has started");
+        let game = self.game().expect("the game has started");
         let hands = change(game)?;
-        self.game = Some(Box::new(game.with_hands(hands).ok()?));
+        let game = game.with_hands(hands).ok()?;
+        self.game = Some(RoomGame::Dealt(Box::new(game)));
         self.log.replace_hands(&hands);
         Some(())
     }

@@ -1,0 +1,485 @@
+//! Physical rooms: reports, their rulings and what follows, mixed tables, corrections, pauses.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, RuleSetSpec, Seat, Seed, Stop};
+use chefshat_referee::{MAX_QUESTIONS, Question, Stage, ViolatedRule};
+
+use super::{Core, OPEN, ParticipantKind, Source, State, Table, ms};
+use crate::journal::{Fill, Report, ReportSource, Reported};
+use crate::log::RoomEvent;
+use crate::policy::Policy;
+use crate::testing::real_table::RealTable;
+use crate::{ReportError, ReportVerdict};
+
+const PERSON: Fill = Fill::AtTable(ParticipantKind::Human);
+
+fn policy() -> Policy {
+    Policy {
+        decision_time: ms(1_000),
+        bank: ms(500),
+        pace: Some(ms(0)),
+        ..Policy::default()
+    }
+}
+
+fn shifts(count: u32) -> RuleSetSpec {
+    RuleSetSpec {
+        stop: Stop::Shifts(count),
+        ..RuleSetSpec::default()
+    }
+}
+
+/// A room with players at the table, a remote agent and a built-in agent, beside the truth.
+struct Mixed {
+    table: Table,
+    real: RealTable,
+}
+
+impl Mixed {
+    fn new(fills: [Fill; 4], count: u32, seed: u8) -> Self {
+        let at_table = BySeat::from_fn(4, |seat: Seat| {
+            matches!(fills[seat.index()], Fill::AtTable(_))
+        });
+        let mut table = Table::physical(policy(), fills.to_vec(), shifts(count));
+        for seat in table.core.all_seats() {
+            if matches!(fills[seat.index()], Fill::Open { .. }) {
+                table.join(ParticipantKind::Agent).expect("a free seat");
+                table.attach(seat);
+            }
+        }
+        let real = RealTable::new(table.core.header().rules, Seed([seed; 32]), at_table);
+        Self { table, real }
+    }
+
+    fn stage(&self) -> Stage {
+        self.table
+            .core
+            .table()
+            .expect("a physical room")
+            .referee()
+            .stage()
+    }
+
+    /// Lets the next thing happen: a report, or the answer of the remote agent.
+    fn step(&mut self) {
+        self.follow();
+        self.table.now += ms(10);
+        if let Some(open) = self.table.core.awaited() {
+            let (seat, id) = (open.decision.seat, open.id);
+            let action = self.table.legal(id as usize);
+            self.table.answer(seat, id, action);
+        } else {
+            let stage = self.stage();
+            let report = self.real.next_report(stage);
+            let report = report.unwrap_or_else(|| panic!("nobody acts, but {stage:?}"));
+            let outcome = self.table.report(report.clone());
+            assert_eq!(outcome.verdict, ReportVerdict::Accepted, "{report:?}");
+        }
+        self.follow();
+    }
+
+    /// Applies the decisions of remote seats to the truth.
+    fn follow(&mut self) {
+        self.table.pass_time(ms(0));
+        let decided: Vec<ActionId> = (self.table.journal.iter())
+            .filter_map(|entry| match &entry.change {
+                crate::journal::Change::Decided(decided) => Some(decided.action),
+                _ => None,
+            })
+            .collect();
+        let at_table = |seat: Seat| matches!(self.table.core.standing(seat).fill, Fill::AtTable(_));
+        let known = (self.real.decisions.iter()).filter(|(seat, _)| !at_table(*seat));
+        for action in decided.into_iter().skip(known.count()) {
+            self.real.decide(action);
+        }
+    }
+
+    fn until(&mut self, done: impl Fn(&Self) -> bool) {
+        for _ in 0..5_000 {
+            if done(self) {
+                return;
+            }
+            self.step();
+        }
+        panic!("it never came: {:?}", self.stage());
+    }
+
+    /// The standing events of the game.
+    fn events(&self) -> Vec<Event> {
+        let mut events: Vec<Option<Event>> = Vec::new();
+        for entry in self.table.core.log().since(0) {
+            if let RoomEvent::Correction(correction) = &entry.event
+                && let Some(from) = correction.first_void.checked_sub(1)
+            {
+                events[usize::try_from(from).expect("small")..].fill(None);
+            }
+            events.push(match &entry.event {
+                RoomEvent::Game(game) => Some(game.event.clone()),
+                _ => None,
+            });
+        }
+        events.into_iter().flatten().collect()
+    }
+
+    fn sources(&self) -> Vec<(Source, u64)> {
+        let turns = self.table.core.log().since(0);
+        turns
+            .filter_map(|entry| match &entry.event {
+                RoomEvent::Game(game)
+                    if matches!(game.event, Event::Played { .. } | Event::Passed { .. }) =>
+                {
+                    Some((game.source, game.time_us))
+                }
+                _ => None,
+            })
+            .collect()
+    }
+}
+
+const MIXED: [Fill; 4] = [PERSON, OPEN, Fill::BuiltIn(AgentKind::Greedy), PERSON];
+
+#[test]
+fn a_mixed_game_is_the_one_at_the_table() {
+    for seed in 0..6 {
+        let mut mixed = Mixed::new(MIXED, 2, seed);
+        mixed.until(|it| it.table.core.state().is_over());
+        assert_eq!(mixed.table.core.state(), State::Finished);
+        let game = mixed.table.core.game().expect("it started");
+        assert_eq!(game.standings(), mixed.real.truth.standings());
+        mixed.table.assert_replays();
+        let sources = mixed.sources();
+        for source in [Source::Table, Source::Agent] {
+            assert!(sources.iter().any(|(it, _)| *it == source));
+        }
+        assert_eq!(
+            mixed
+                .table
+                .happened(|it| matches!(it, RoomEvent::Violation(_))),
+            0
+        );
+    }
+}
+
+#[test]
+fn players_at_the_table_are_present_and_nobody_can_join_for_them() {
+    let mut table = Table::physical(policy(), vec![PERSON, PERSON, OPEN, PERSON], shifts(1));
+    assert_eq!(table.core.state(), State::Waiting);
+    assert_eq!(table.happened(|it| matches!(it, RoomEvent::Seated(..))), 3);
+    let early = Reported {
+        id: "a".into(),
+        source: ReportSource::Camera,
+        age: Duration::ZERO,
+        report: Report::Cleared,
+    };
+    let refused = table.core.report(table.now, early);
+    assert_eq!(refused, Err(ReportError::GameNotStarted));
+    // They keep their seats, however long the others take.
+    table.pass_time(Duration::from_secs(600));
+    assert_eq!(table.happened(|it| matches!(it, RoomEvent::Vacated(_))), 0);
+    let seat = table.join(ParticipantKind::Agent).expect("the free seat");
+    assert_eq!(seat, Seat::new(2));
+    assert!(table.join(ParticipantKind::Human).is_err());
+    table.attach(seat);
+    assert_eq!(table.core.state(), State::Playing);
+}
+
+#[test]
+fn all_at_the_table_start_at_once_and_no_clock_runs() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 3);
+    assert_eq!(mixed.table.core.state(), State::Playing);
+    assert_eq!(mixed.table.core.deadline(), None);
+    assert!(mixed.table.core.open().is_none());
+    mixed.until(|it| it.table.core.state().is_over());
+    let standings = mixed.table.core.game().expect("a game").standings();
+    assert_eq!(standings, mixed.real.truth.standings());
+}
+
+#[test]
+fn a_remote_seat_decides_only_when_its_hand_is_known() {
+    let mut mixed = Mixed::new(MIXED, 1, 1);
+    assert_eq!(mixed.stage(), Stage::Hand(Seat::new(1)));
+    assert!(mixed.table.core.open().is_none());
+    let observed = mixed
+        .table
+        .core
+        .observe(chefshat_engine::Viewer::Seat(Seat::new(1)));
+    assert!(observed.expect("a game").hand.is_empty(), "an assumed hand");
+    let report = mixed.real.hand(Seat::new(1));
+    mixed.table.report(report);
+    let observed = mixed
+        .table
+        .core
+        .observe(chefshat_engine::Viewer::Seat(Seat::new(1)));
+    assert_eq!(
+        observed.expect("a game").hand,
+        mixed.real.truth.hands()[Seat::new(1)]
+    );
+    assert_eq!(
+        mixed
+            .table
+            .happened(|it| matches!(it, RoomEvent::HandReported(_))),
+        1
+    );
+}
+
+#[test]
+fn a_repeated_report_gets_the_same_ruling_and_changes_nothing() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+    let stage = mixed.stage();
+    let report = mixed.real.next_report(stage).expect("the opening");
+    let reported = Reported {
+        id: "once".into(),
+        source: ReportSource::Attendant,
+        age: Duration::ZERO,
+        report,
+    };
+    let now = mixed.table.now;
+    let first = mixed.table.core.report(now, reported.clone());
+    mixed.table.commit();
+    let changes = mixed.table.core.changes();
+    let again = mixed.table.core.report(now + ms(50), reported);
+    assert_eq!(first, again);
+    assert!(matches!(first, Ok(outcome) if outcome.number == changes));
+    assert_eq!(mixed.table.core.changes(), changes);
+}
+
+#[test]
+fn the_time_at_the_table_counts_from_the_turn_to_the_happening() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+    mixed.until(|it| it.sources().len() == 3);
+    // The last turn was reported when it happened; the next one late.
+    mixed.table.now += ms(2_000);
+    let stage = mixed.stage();
+    let report = mixed.real.next_report(stage).expect("a turn");
+    mixed.table.report_late(report, ms(300));
+    assert_eq!(mixed.sources().last(), Some(&(Source::Table, 1_700_000)));
+    // That turn began when the one before happened, not when it was reported.
+    mixed.table.now += ms(400);
+    let stage = mixed.stage();
+    let report = mixed.real.next_report(stage).expect("a turn");
+    mixed.table.report_late(report, ms(100));
+    assert_eq!(mixed.sources().last(), Some(&(Source::Table, 600_000)));
+}
+
+#[test]
+fn a_pause_stops_the_clock_and_gives_the_full_time_again() {
+    let mut mixed = Mixed::new(MIXED, 1, 1);
+    mixed.until(|it| it.table.core.awaited().is_some());
+    let (seat, id) = mixed.table.open();
+    mixed.table.pass_time(ms(900));
+    mixed.table.report(Report::Pause(true));
+    assert!(mixed.table.core.is_paused());
+    assert_eq!(mixed.table.core.deadline(), None);
+    mixed.table.pass_time(Duration::from_secs(3_600));
+    assert_eq!(mixed.table.open(), (seat, id));
+    mixed.table.report(Report::Pause(false));
+    let (left, bank) = mixed.table.core.time_left(mixed.table.now);
+    assert_eq!((left, bank), (ms(1_000), ms(500)));
+    mixed.table.pass_time(ms(1_499));
+    assert_eq!(mixed.table.open(), (seat, id));
+    mixed.table.pass_time(ms(1));
+    assert_ne!(mixed.table.core.open().map(|open| open.id), Some(id));
+    let timed_out = (mixed.table.journal.iter()).any(|entry| {
+        matches!(&entry.change, crate::journal::Change::Decided(decided)
+            if decided.seat == seat && decided.source == Source::Timeout)
+    });
+    assert!(timed_out);
+    assert_eq!(
+        mixed
+            .table
+            .happened(|it| matches!(it, RoomEvent::Paused(_))),
+        2
+    );
+    mixed.table.assert_replays();
+}
+
+#[test]
+fn a_violation_is_an_event_and_the_game_stands() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+    mixed.until(|it| it.sources().len() == 2);
+    let (events, open) = (mixed.events(), mixed.stage());
+    let report = Report::Laid {
+        seat: None,
+        cards: chefshat_referee::SeenCards {
+            counts: {
+                let mut counts = [0; 16];
+                counts[10] = 11;
+                counts
+            },
+            golden: None,
+        },
+    };
+    let outcome = mixed.table.report(report);
+    assert!(
+        matches!(outcome.verdict, ReportVerdict::Violation(_)),
+        "{outcome:?}"
+    );
+    assert_eq!((mixed.events(), mixed.stage()), (events, open));
+    let violations = mixed.table.happened(
+        |it| matches!(it, RoomEvent::Violation(violation) if violation.0 == outcome.number),
+    );
+    assert_eq!(violations, 1);
+}
+
+/// A play that was misread as one with other cards, and the report that states it.
+fn misread(mixed: &mut Mixed) -> (u64, Report) {
+    for _ in 0..200 {
+        let stage = mixed.stage();
+        let at_table = matches!(stage, Stage::Turn(seat) if matches!(mixed.table.core.standing(seat).fill, Fill::AtTable(_)));
+        if at_table && mixed.table.core.open().is_none() && mixed.sources().len() > 1 {
+            mixed.table.now += ms(10);
+            let right = mixed.real.next_report(stage).expect("a turn");
+            if let Report::Laid { seat, cards } = &right
+                && let Some(face) = (3..11).find(|face| cards.counts[*face] == 1)
+            {
+                let mut wrong = *cards;
+                wrong.counts[face] = 0;
+                wrong.counts[face - 1] = 1;
+                let outcome = mixed.table.report(Report::Laid {
+                    seat: *seat,
+                    cards: wrong,
+                });
+                if outcome.verdict == ReportVerdict::Accepted {
+                    return (outcome.number, right);
+                }
+            }
+            mixed.table.report(right);
+            mixed.follow();
+            continue;
+        }
+        mixed.step();
+    }
+    panic!("nothing to misread");
+}
+
+#[test]
+fn a_correction_voids_what_followed_and_reopens_the_decision() {
+    let mut reopened = 0;
+    for seed in 0..12 {
+        let mut mixed = Mixed::new([PERSON, PERSON, OPEN, PERSON], 1, seed);
+        let (number, right) = misread(&mut mixed);
+        let before = mixed
+            .table
+            .core
+            .open()
+            .map(|open| (open.decision.seat, open.id));
+        let outcome = mixed.table.report(Report::Correction {
+            number,
+            instead: Some(Box::new(right)),
+        });
+        assert_eq!(outcome.verdict, ReportVerdict::Accepted);
+        assert_eq!(
+            mixed
+                .table
+                .happened(|it| matches!(it, RoomEvent::Correction(_))),
+            1
+        );
+        if let (Some((seat, id)), Some(open)) = (before, mixed.table.core.open())
+            && open.decision.seat == seat
+        {
+            reopened += 1;
+            assert_eq!(open.id, id + 1, "a new decision, because the board changed");
+            let action = mixed.table.legal(0);
+            let closed = mixed.table.answer(seat, id, action);
+            assert_eq!(closed.verdict, crate::Verdict::Closed);
+        }
+        mixed.until(|it| it.table.core.state().is_over());
+        let standings = mixed.table.core.game().expect("a game").standings();
+        assert_eq!(standings, mixed.real.truth.standings());
+        let plays = |events: &[Event]| {
+            let turn = |it: &&Event| matches!(it, Event::Played { .. } | Event::Passed { .. });
+            events.iter().filter(turn).count()
+        };
+        let turns = (mixed.real.decisions.len(), plays(&mixed.events()));
+        assert_eq!(turns.0, turns.1, "each turn stands once");
+        mixed.table.assert_replays();
+    }
+    assert!(reopened > 0, "no correction met an open decision");
+}
+
+#[test]
+fn questions_are_bounded_and_answered() {
+    let mut table = Table::physical(policy(), vec![PERSON; 4], shifts(1));
+    let question = |number: usize| {
+        Report::Question(Question {
+            id: format!("question {number}"),
+            text: "7 or 9 at place 4?".into(),
+            options: vec!["7".into(), "9".into()],
+            seat: None,
+        })
+    };
+    for number in 0..MAX_QUESTIONS {
+        assert_eq!(
+            table.report(question(number)).verdict,
+            ReportVerdict::Accepted
+        );
+    }
+    let one_more = Reported {
+        id: "one more".into(),
+        source: ReportSource::Camera,
+        age: Duration::ZERO,
+        report: question(MAX_QUESTIONS),
+    };
+    let refused = table.core.report(table.now, one_more);
+    assert_eq!(refused, Err(ReportError::TooManyQuestions));
+    table.report(Report::Answer {
+        id: "question 3".into(),
+        option: Some(1),
+    });
+    let open = table.core.table().expect("a table").referee().questions();
+    assert_eq!(open.len(), MAX_QUESTIONS - 1);
+    table.assert_replays();
+}
+
+#[test]
+fn a_restart_resumes_the_table() {
+    for seed in 0..4 {
+        let mut mixed = Mixed::new(MIXED, 2, seed);
+        for steps in [3, 20, 25] {
+            for _ in 0..steps {
+                if !mixed.table.core.state().is_over() {
+                    mixed.step();
+                }
+            }
+            if mixed.table.core.state().is_over() {
+                break;
+            }
+            let stage = mixed.stage();
+            let header = Arc::clone(mixed.table.core.header());
+            mixed.table.core = Core::revived(header, &mixed.table.journal, mixed.table.now)
+                .expect("a consistent journal");
+            mixed.table.commit();
+            assert_eq!(mixed.stage(), stage);
+            mixed.table.attach(Seat::new(1));
+        }
+        mixed.until(|it| it.table.core.state().is_over());
+        let standings = mixed.table.core.game().expect("a game").standings();
+        assert_eq!(standings, mixed.real.truth.standings());
+        mixed.table.assert_replays();
+    }
+}
+
+#[test]
+fn a_play_for_a_remote_seat_that_it_did_not_decide_is_a_violation() {
+    let mut mixed = Mixed::new(MIXED, 1, 1);
+    mixed.until(|it| {
+        let turn = it.table.core.awaited();
+        turn.is_some_and(|open| open.decision.kind == DecisionKind::Turn)
+    });
+    let (seat, _) = mixed.table.open();
+    let action = mixed
+        .table
+        .core
+        .legal_actions()
+        .nth(0)
+        .expect("one is legal");
+    let outcome = mixed.table.report(mixed.real.turn(seat, action));
+    let ReportVerdict::Violation(violation) = outcome.verdict else {
+        panic!("{:?}", outcome.verdict);
+    };
+    assert_eq!(violation.rule, ViolatedRule::Decision);
+    assert_eq!(mixed.table.open().0, seat, "its decision is still open");
+}

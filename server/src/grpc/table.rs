@@ -1,0 +1,80 @@
+//! `TableService`: reports from physical tables, and their states.
+
+use std::pin::Pin;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{self, table_service_server::TableService};
+use futures::{Stream, stream};
+use tokio::sync::watch;
+use tokio::time::timeout;
+use tonic::{Request, Response, Status};
+
+use super::status::{Refusal, room_gone, table_unknown};
+use crate::config::HEARTBEAT;
+use crate::room::{Handle, SentState};
+use crate::rooms::Rooms;
+use chefshat_room::ids::Token;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct TableCalls {
+    rooms: Arc<Rooms>,
+}
+
+impl TableCalls {
+    /// Creates the service for these rooms.
+    pub fn new(rooms: Arc<Rooms>) -> Self {
+        Self { rooms }
+    }
+
+    /// The room of a table's ticket, and the ticket's secret.
+    fn find(&self, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
+        let token = Token::parse(ticket).ok_or_else(table_unknown)?;
+        let room = self.rooms.get(token.room).ok_or_else(table_unknown)?;
+        Ok((room, token.secret))
+    }
+}
+
+#[tonic::async_trait]
+impl TableService for TableCalls {
+    type WatchStream =
+        Pin<Box<dyn Stream<Item = Result<v1::TableServiceWatchResponse, Status>> + Send>>;
+
+    async fn report(
+        &self,
+        request: Request<v1::ReportRequest>,
+    ) -> Result<Response<v1::ReportResponse>, Status> {
+        let request = request.into_inner();
+        let (room, secret) = self.find(&request.table_ticket)?;
+        let ruled = room.report(secret, request).await.map_err(Refusal::from)?;
+        let response = ruled.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
+        Ok(Response::new(*response))
+    }
+
+    async fn watch(
+        &self,
+        request: Request<v1::TableServiceWatchRequest>,
+    ) -> Result<Response<Self::WatchStream>, Status> {
+        let (room, secret) = self.find(&request.into_inner().table_ticket)?;
+        let watching = room.watch_table(secret).await.map_err(Refusal::from)?;
+        let states = watching.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
+        Ok(Response::new(Box::pin(followed(states))))
+    }
+}
+
+/// The states of a table, with heartbeats while nothing changes, until its game is over.
+fn followed(
+    states: watch::Receiver<SentState>,
+) -> impl Stream<Item = Result<v1::TableServiceWatchResponse, Status>> {
+    stream::unfold(Some(states), |states| async move {
+        let mut states = states?;
+        let state = match timeout(HEARTBEAT, states.changed()).await {
+            Err(_) => None,
+            Ok(Ok(())) => Some(states.borrow_and_update().as_ref().clone()),
+            Ok(Err(_)) => return Some((Err(room_gone()), None)),
+        };
+        let over = (state.as_ref()).is_some_and(|state| state.stage() == v1::TableStage::Over);
+        let response = v1::TableServiceWatchResponse { state };
+        Some((Ok(response), (!over).then_some(states)))
+    })
+}
