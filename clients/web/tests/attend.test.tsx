@@ -33,7 +33,7 @@ const show = (state: TableState) =>
     render(
       <AttendView
         state={state}
-        lost={false}
+        trouble=""
         report={async (what) => {
           sent.push(what);
           return outcome;
@@ -359,6 +359,18 @@ describe("the reports of the Shift", () => {
     await press("Remove", item(0));
     expect(sent).toEqual([{ case: "correction", value: { report: 3n } }]);
   });
+
+  test("can be removed again if that was refused", async () => {
+    await show(
+      stateOf({ reports, violation: { rule: ViolatedRule.CORRECTION, text: "Its pizza is over.", report: 9n } }),
+    );
+    await press("Remove", item(1));
+    outcome = { kind: "violation" };
+    await press("Remove", item(1));
+    expect(item(1).querySelector("[role=alert]")?.textContent).toContain("Its pizza is over.");
+    await press("Remove", item(1));
+    expect(sent).toHaveLength(2);
+  });
 });
 
 test("before the game there is nothing to enter", async () => {
@@ -376,7 +388,7 @@ test("a second press while a report is under way sends nothing", async () => {
       answer = () => resolve({ kind: "accepted" });
     });
   };
-  await act(() => render(<AttendView state={stateOf()} lost={false} report={report} />, root));
+  await act(() => render(<AttendView state={stateOf()} trouble="" report={report} />, root));
   await press("Ada passes");
   await press("Ada passes");
   expect(sent).toHaveLength(1);

@@ -30,9 +30,9 @@ export function faultOf(thrown: unknown): Fault {
   };
 }
 
-/** Whether a retry may succeed soon: the server is unreachable or shutting down. */
+/** Whether a retry may succeed soon: the server is unreachable, restarting or shutting down. */
 export function isPassing(fault: Fault): boolean {
-  if (fault.reason === "SHUTTING_DOWN" || fault.reason === "STORE_FAILED") return true;
+  if (["SHUTTING_DOWN", "STORE_FAILED", "ROOM_GONE"].includes(fault.reason)) return true;
   return (
     fault.reason === "" && [Code.Unavailable, Code.Unknown, Code.DeadlineExceeded, Code.Internal].includes(fault.code)
   );

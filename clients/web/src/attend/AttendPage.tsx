@@ -4,6 +4,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
+import { TableStage } from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
 import { CopyLine, HostInvite, QrCode } from "../lobby/Invite";
 import { isForAgents, isOpen } from "../lobby/rooms";
@@ -23,7 +24,11 @@ export function AttendPage({ route }: PageProps<"attend">) {
     if (ticket === null) return;
     const started = startAttending(ticket);
     setAttending(started);
-    return () => started.stop();
+    return () => {
+      started.stop();
+      // A reload shows the end again; a reader who leaves it is done.
+      if (started.state.peek()?.stage === TableStage.OVER) keepTableTicket(roomId, null);
+    };
   }, [ticket]);
   if (ticket === null) return <ErrorPage title={t().attend.title} words={t().attend.noTicket} />;
   return attending ? <Attended roomId={roomId} ticket={ticket} attending={attending} /> : null;
@@ -43,9 +48,8 @@ function Attended({ roomId, ticket, attending }: AttendedProps) {
   useEffect(() => {
     if (unknown) keepTableTicket(roomId, null);
   }, [unknown]);
-  if (failed && !state) {
-    return <ErrorPage title={t().attend.title} words={unknown ? t().attend.gone : wordsOf(failed)} />;
-  }
+  const trouble = failed ? (unknown ? t().attend.gone : wordsOf(failed)) : "";
+  if (failed && !state) return <ErrorPage title={t().attend.title} words={trouble} />;
   if (!state?.room) return <p class="soft">{t().common.loading}</p>;
   const { room } = state;
   const early = isBeforePlay(state) && (state.observation?.shift ?? 1) === 1;
@@ -54,7 +58,11 @@ function Attended({ roomId, ticket, attending }: AttendedProps) {
       <p class={css.room}>
         {t().attend.heading(room.name)} <span class="soft">· {t().attend.room.realCards}</span>
       </p>
-      <AttendView state={state} report={attending.report} lost={link.value === "lost"} />
+      <AttendView
+        state={state}
+        report={attending.report}
+        trouble={link.value === "lost" ? t().table.link.lost : trouble}
+      />
       {isOpen(room) && <HostInvite roomId={roomId} forAgents={isForAgents(room.seats)} />}
       <details class={`${css.link} sheet`} open={early} data-part="attendant-link">
         <summary>

@@ -27,12 +27,12 @@ import { awaitedWords, lastViolationWords, tableOf, toLayWords } from "./words";
 interface AttendViewProps {
   state: TableState;
   report: Report;
-  /** Whether the connection is lost. */
-  lost: boolean;
+  /** What is wrong with the connection; empty if nothing is. */
+  trouble: string;
 }
 
 /** The view. */
-export function AttendView({ state, report, lost }: AttendViewProps) {
+export function AttendView({ state, report, trouble }: AttendViewProps) {
   const table = useMemo(() => tableOf(state), [state]);
   const [draft, setDraft] = useState<Draft>(NO_DRAFT);
   const [outcome, setOutcome] = useState<Outcome | undefined>(undefined);
@@ -69,7 +69,7 @@ export function AttendView({ state, report, lost }: AttendViewProps) {
   const begun = state.observation !== undefined;
   return (
     <div class={css.attend} data-part="attend" {...keepFocus}>
-      {lost && <Notice kind="fault">{t().table.link.lost}</Notice>}
+      {trouble && <Notice kind="fault">{trouble}</Notice>}
       <Awaited
         state={state}
         table={table}
@@ -249,9 +249,8 @@ function ToLay({ table, one, onDone }: { table: Table; one: CardsToLay; onDone: 
         <SeatNumber seat={one.seat} /> {what}
       </p>
       {one.cards && <Cards cards={cardsOfSeen(one.cards, deckOf(table.rules))} />}
-      <Button look="main" onClick={onDone}>
-        ✓ {words.done}
-        <span class="visually-hidden">: {what}</span>
+      <Button look="main" aria-label={`${words.done}: ${what}`} onClick={onDone}>
+        {words.done}
       </Button>
     </li>
   );

@@ -247,13 +247,17 @@ export function HandPick({ deck, text, golden, asksGolden, expected, fault, onCh
                 class={`${css.face} ${full ? css.dim : ""}`}
                 data-part="hand-option"
                 data-face={card > faces ? "J" : card}
-                aria-label={words.add(cardWord(asCard(card)))}
+                aria-label={`${words.add(cardWord(asCard(card)))}${count > 0 ? `, ${count}` : ""}`}
                 aria-disabled={full}
                 onClick={() => !full && put([...cards, card])}
               >
                 <Card card={asCard(card)} />
-                {count > 0 && <b class={`${css.count} number`}>{count}</b>}
               </button>
+              {count > 0 && (
+                <b class={`${css.count} number`} aria-hidden="true">
+                  {count}
+                </b>
+              )}
               {count > 0 && (
                 <button
                   type="button"

@@ -7,6 +7,7 @@ import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { Dialog } from "../parts/Dialog";
+import { Notice } from "../parts/Notice";
 import { SeatNumber } from "../parts/SeatNumber";
 import type { TableState as Table } from "../table/model/state";
 import css from "./Attend.module.css";
@@ -27,6 +28,8 @@ interface ReportsProps {
 export function Reports({ state, table, report, onOutcome }: ReportsProps) {
   const words = t().attend.reports;
   const [changing, setChanging] = useState<AcceptedReport | undefined>(undefined);
+  /** The report whose removal was refused. */
+  const [refused, setRefused] = useState<bigint | undefined>(undefined);
   const correct = async (number: bigint, instead: Happening | undefined): Promise<Outcome> => {
     const outcome = await report({
       case: "correction",
@@ -34,6 +37,12 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
     });
     onOutcome(outcome);
     return outcome;
+  };
+  const remove = async (number: bigint): Promise<boolean> => {
+    setRefused(undefined);
+    const { kind } = await correct(number, undefined);
+    if (kind === "violation") setRefused(number);
+    return kind === "accepted" || kind === "void";
   };
   return (
     <section class={`${css.part} sheet`} data-part="reports" aria-labelledby="reports-title">
@@ -51,15 +60,15 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
               </p>
               <div class={css.reportActions}>
                 {isChangeable(one) && (
-                  <Button look="quiet" onClick={() => setChanging(one)}>
+                  <Button look="quiet" aria-label={`${words.change}: ${text}`} onClick={() => setChanging(one)}>
                     {words.change}
-                    <span class="visually-hidden">: {text}</span>
                   </Button>
                 )}
-                <ConfirmButton label={words.remove} act={async () => void (await correct(one.report, undefined))}>
+                <ConfirmButton label={words.remove} act={() => remove(one.report)}>
                   {words.removeSure}
                 </ConfirmButton>
               </div>
+              {refused === one.report && <Notice kind="fault">{refusal(state)}</Notice>}
             </li>
           );
         })}

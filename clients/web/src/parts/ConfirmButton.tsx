@@ -16,7 +16,8 @@ interface ConfirmButtonProps {
   confirm?: string;
   /** How prominent the button is at first; quiet by default. */
   look?: ButtonLook;
-  act: () => Promise<void>;
+  /** One that resolves to false may be confirmed again. */
+  act: () => Promise<unknown>;
   /** The consequence, shown with the confirmation. */
   children: ComponentChildren;
 }

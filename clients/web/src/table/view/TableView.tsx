@@ -112,7 +112,8 @@ export function TableView(props: TableViewProps) {
     }
     props.onAnswer?.(action);
   };
-  const wholeMs = props.untimed || !table.policy ? 0 : clockOfPeople(table.policy).decisionTimeMs;
+  // While a physical table is paused, the clock stands still.
+  const wholeMs = props.untimed || table.paused || !table.policy ? 0 : clockOfPeople(table.policy).decisionTimeMs;
 
   // A remote player at a table with real cards waits until somebody has shown them.
   const handAwaited = awaitsHand(table, own) && !props.replayed;
