@@ -200,7 +200,7 @@ def test_events_and_states_of_the_game_are_shown() -> None:
             await until(lambda: len(peer.got) == 3)
         dealt, shown = peer.got[1:]
         assert (dealt["type"], dealt["kind"], dealt["sequence"], dealt["elapsed_ms"]) == ("event", "shift_started", 2, 200)
-        assert dealt["hands"][0]["golden"] is True
+        assert dealt["fields"]["hands"][0]["golden"] is True
         assert (shown["type"], shown["seat"], shown["hand"][10], shown["golden"]) == ("state", 1, 5, True)
 
     run(test())

@@ -139,6 +139,8 @@ class Body:
         times: Times | None = None,
         stand: Stand | None = None,
         handles_cards: bool = True,
+        small_talk: bool = True,
+        announces: bool = True,
         finish_s: float = FINISH_S,
     ) -> None:
         """Creates the body.
@@ -152,6 +154,8 @@ class Body:
             times: limits of acts.
             stand: where its cards are; None: in front of its seat.
             handles_cards: whether there are real cards. Otherwise it only speaks, looks and expresses.
+            small_talk: whether it comments on the game, and shows what it feels about it.
+            announces: whether it says what it plays.
             finish_s: seconds for acts that still wait at the end.
         """
         self.driver = driver
@@ -163,6 +167,8 @@ class Body:
         self._times = times or Times()
         self._stand = stand
         self._handles_cards = handles_cards
+        self._small_talk = small_talk
+        self._announces = announces
         self._finish_s = finish_s
         self._pass_is_down = False
         # The own turn that is being performed and that the game has not confirmed yet.
@@ -240,7 +246,9 @@ class Body:
         self._forward_work.set()
         if not live:
             return
-        self._react(event, before, after)
+        self._follow_turns(event, before, after)
+        if self._small_talk:
+            self._react(event, after)
         if after.to_act is not None and after.to_act != before.to_act and after.to_act != after.seat:
             face = layout.face_of(after.to_act, after.players)
             self._reaction(Gaze(face.x, face.y, face.z))
@@ -297,7 +305,7 @@ class Body:
             last = bool(state.hand) and sum(state.hand) == turn.quantity + turn.jokers
             said = words.say("last_cards" if last else "play", cards=cards)
             plea = words.say("please_lay", cards=words.my_cards(turn.face, turn.quantity, turn.jokers))
-        acts: list[Act] = [Say(said, words.language)]
+        acts: list[Act] = [Say(said, words.language)] if self._announces else []
         if self._handles_cards and (moves := self._moves(turn, state)):
             end = moves[0].end
             acts += [Gaze(end.x, end.y), Pick(moves)]
@@ -335,21 +343,28 @@ class Body:
         if self._stand is not None and after.hand:
             self._stand.settle(after.hand, after.golden)
 
-    # Reactions.
-
-    def _react(self, event: pb.GameEvent, before: TableState, after: TableState) -> None:
-        words, own = self.words, after.seat
+    def _follow_turns(self, event: pb.GameEvent, before: TableState, after: TableState) -> None:
+        """Performs what the own seat did."""
+        own = after.seat
         match event.WhichOneof("kind"):
-            case "game_started" if own is not None:
-                self._reaction(Express("joy", 0.6, 0.4), self._line("hello", name=after.name(own)))
             case "play" if event.play.seat == own:
                 play = event.play
                 self._own_turn(Turn(play.face if play.quantity else 0, play.quantity, play.jokers), before, after)
             case "pass" if getattr(event, "pass").seat == own:
                 self._own_turn(PASS, before, after)
-            case "special_action_declared" if event.special_action_declared.seat == own:
+            case "special_action_declared" if event.special_action_declared.seat == own and self._announces:
                 food_fight = event.special_action_declared.action == pb.SPECIAL_ACTION_FOOD_FIGHT
-                self.say(words.say("food_fight" if food_fight else "dinner"))
+                self.say(self.words.say("food_fight" if food_fight else "dinner"))
+
+    # Reactions.
+
+    def _react(self, event: pb.GameEvent, after: TableState) -> None:
+        """Comments on the game, and shows what the robot feels about it."""
+        own = after.seat
+        match event.WhichOneof("kind"):
+            case "game_started" if own is not None:
+                self._reaction(Express("joy", 0.6, 0.4), self._line("hello", name=after.name(own)))
+            case "special_action_declared" if event.special_action_declared.seat == own:
                 self.express("amusement", 0.6, 0.7)
             case "special_action_declared":
                 self._reaction(Express("surprise", 0.1, 0.8))

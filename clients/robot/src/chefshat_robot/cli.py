@@ -49,6 +49,9 @@ class Entry:
 
 COMMANDS = {
     "robot": Entry("robot", "robots", "play a seat with a robot, whose decisions an agent makes"),
+    "wizard": Entry("wizard", "robots", "let a robot do what a person on the page plays for it (Wizard of Oz)"),
+    "affect": Entry("affect", "lsl", "forward what analysers of faces and voices read to the game"),
+    "markers": Entry("markers", "lsl", "send the events of games as markers of Lab Streaming Layer"),
     "print": Entry("printing.command", "print", "write the cards, the playing field and the calibration sheet as a PDF"),
 }
 

@@ -6,15 +6,12 @@ Acts are in `body`, decisions in `player`, robots in `drivers`.
 from __future__ import annotations
 
 import argparse
-import asyncio
 import json
-import logging
 import os
 import sys
 from collections.abc import Callable
-from typing import Any
 
-from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
+from chefshat import Agent, PlayOptions, SeatResult, aio, pb
 from chefshat.agent import make_agent
 from chefshat.join_options import TICKET
 from chefshat.outcome import Played
@@ -23,8 +20,9 @@ from chefshat.outcome import report as report_result
 from chefshat_robot import drivers, speech, wire
 from chefshat_robot.body import Body, Notice
 from chefshat_robot.cli import CommandError
-from chefshat_robot.drivers.driver import LOG, Act, Done, Driver, Outcome, RobotError, RobotEvent, Say
+from chefshat_robot.drivers.driver import LOG, Act, Done, Driver, Outcome, RobotEvent, Say
 from chefshat_robot.player import RobotPlayer
+from chefshat_robot.running import run_command
 from chefshat_robot.words import LANGUAGES, Words
 
 DESCRIPTION = """\
@@ -73,6 +71,8 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs the subcommand. Returns 0 if the game finished."""
+    if arguments.list_drivers:
+        return print_drivers()
     ticket = arguments.ticket or os.environ.get(TICKET)
 
     async def play() -> int:
@@ -93,22 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
             return report_result(Played([result]), as_json=arguments.json)
 
-    return with_robot(arguments, play)
-
-
-def with_robot(arguments: argparse.Namespace, command: Callable[[], Any]) -> int:
-    """Runs a command's coroutine function with logging to standard error, and turns its errors into messages."""
-    if arguments.list_drivers:
-        print_drivers()
-        return 0
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
-    LOG.setLevel(logging.WARNING if arguments.quiet else logging.INFO)
-    try:
-        return int(asyncio.run(command()))
-    except (ChefsHatError, RobotError, OSError) as error:
-        raise CommandError(str(error)) from error
-    except KeyboardInterrupt:
-        return 130
+    return run_command(play, quiet=arguments.quiet)
 
 
 async def play_seat(
@@ -177,12 +162,13 @@ def attendant(as_json: bool) -> Callable[[Notice], None]:
     return show
 
 
-def print_drivers() -> None:
-    """Prints every driver with its options."""
+def print_drivers() -> int:
+    """Prints every driver with its options. Returns 0."""
     for name in drivers.DRIVERS:
         print(f"{name:12} {drivers.summary(name)}")
         for option, (kind, default) in drivers.options_of(drivers.find(name)).items():
             print(f"{'':12}   {option}={kind.__name__.upper()}  (default: {default})")
+    return 0
 
 
 async def _join(client: aio.Client, arguments: argparse.Namespace) -> str:

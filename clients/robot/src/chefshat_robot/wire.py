@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from chefshat import pb
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.json_format import MessageToDict
 
 from chefshat_robot.drivers.driver import Act, Affect, Button, CardMove, Heard, RobotEvent
@@ -48,14 +49,17 @@ def state_to_json(state: TableState) -> dict[str, Any]:
 
 
 def event_to_json(event: pb.GameEvent) -> dict[str, Any]:
-    """Converts an event of the game to `sequence`, `elapsed_ms`, `kind` and the fields of that kind, as named in event.proto."""
+    """Converts an event of the game: `sequence`, `elapsed_ms`, `kind`, and the `fields` of that kind, as named in event.proto.
+
+    Enums are their names, bytes are in base64.
+    """
     kind = event.WhichOneof("kind") or ""
-    fields = (
-        MessageToDict(getattr(event, kind), preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
-        if kind
-        else {}
-    )
-    return {"sequence": event.sequence, "elapsed_ms": event.elapsed_ms, "kind": kind, **fields}
+    fields: dict[str, Any] = {}
+    if kind:
+        message = getattr(event, kind)
+        fields = MessageToDict(message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
+        _with_integers(fields, message.DESCRIPTOR)
+    return {"sequence": event.sequence, "elapsed_ms": event.elapsed_ms, "kind": kind, "fields": fields}
 
 
 def robot_event_from_json(message: Mapping[str, Any]) -> RobotEvent:
@@ -121,3 +125,17 @@ def _number(message: Mapping[str, Any], name: str, least: float) -> float | None
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _with_integers(fields: dict[str, Any], descriptor: Descriptor) -> None:
+    """Replaces the texts, as which protobuf's JSON writes integers of 64 bits, by integers."""
+    for field in descriptor.fields:
+        value = fields.get(field.name)
+        if value is None:
+            continue
+        if field.cpp_type in (FieldDescriptor.CPPTYPE_INT64, FieldDescriptor.CPPTYPE_UINT64):
+            fields[field.name] = [int(item) for item in value] if isinstance(value, list) else int(value)
+        elif field.message_type is not None:
+            for item in value if isinstance(value, list) else [value]:
+                if isinstance(item, dict):
+                    _with_integers(item, field.message_type)

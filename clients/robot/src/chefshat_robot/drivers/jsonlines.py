@@ -4,7 +4,7 @@ The robot listens; the driver connects. To the robot:
 
     {"type": "act", "id": "7", "act": "say", "text": "I pass.", "language": "en"}    acts as in `chefshat_robot.wire`
     {"type": "stop"}                                                                 the act took too long: stop it
-    {"type": "event", "sequence": 12, "elapsed_ms": 3456, "kind": "play", ...}       an event of the game
+    {"type": "event", "sequence": 12, "elapsed_ms": 3456, "kind": "play", "fields": {...}}   an event
     {"type": "state", "seat": 2, "hand": [0, 1, ...], "to_act": 3, ...}              the table after it
 
 From the robot, in any order:

@@ -49,9 +49,8 @@ def act_message(act: Act) -> dict[str, Any]:
 
 def event_message(event: pb.GameEvent) -> dict[str, Any]:
     """Returns an event as `GameEvent`."""
-    fields = wire.event_to_json(event)
-    known = {name: fields.pop(name) for name in ("sequence", "elapsed_ms", "kind")}
-    return {**known, "fields": json.dumps(fields, ensure_ascii=False)}
+    message = wire.event_to_json(event)
+    return {**message, "fields": json.dumps(message["fields"], ensure_ascii=False)}
 
 
 def state_message(state: TableState) -> dict[str, Any]:

@@ -116,9 +116,9 @@ class YarpDriver(Driver):
         """Sends the event."""
         if self._writer is None:
             return
-        fields = wire.event_to_json(event)
-        known: list[Item] = [fields.pop("sequence"), fields.pop("elapsed_ms"), fields.pop("kind")]
-        text = bottle.write([Word("event"), *known, json.dumps(fields, ensure_ascii=False)])
+        message = wire.event_to_json(event)
+        fields = json.dumps(message.pop("fields"), ensure_ascii=False)
+        text = bottle.write([Word("event"), *message.values(), fields])
         self._writer.write(f"do\n{text}\n".encode())
         await self._writer.drain()
 
