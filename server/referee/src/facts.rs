@@ -34,6 +34,8 @@ pub struct ShiftFacts {
     pub facts: Vec<(usize, Fact)>,
     /// A seat whose gift is awaited: its decision stays open although later gifts are stated.
     pub choosing: Option<Seat>,
+    /// Whether nobody declares a special action any more.
+    pub special_is_settled: bool,
 }
 
 /// Facts, added up.

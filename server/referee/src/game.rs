@@ -274,11 +274,10 @@ impl PhysicalGame {
             Fact::Gives(..) => kind == DecisionKind::SpecialAction,
             Fact::Held(..) | Fact::Given(..) | Fact::Turn(..) => true,
         };
-        let special_is_over = kind == DecisionKind::SpecialAction && self.choosing().is_some();
-        special_is_over
-            || self
-                .current()
-                .is_some_and(|shift| shift.facts.iter().any(later))
+        let is_special = kind == DecisionKind::SpecialAction;
+        self.current().is_some_and(|shift| {
+            (is_special && shift.special_is_settled) || shift.facts.iter().any(later)
+        })
     }
 
     /// The next card of the planned gift.

@@ -12,7 +12,7 @@ use crate::puzzle::{Kept, Puzzle};
 pub(crate) struct Known {
     /// Whether each hand is known, as counts.
     pub(crate) hands: BySeat<bool>,
-    /// Whether it is known of each hand if it has the Golden card.
+    /// Of each seat, whether it is known that it holds the Golden card, or that it does not.
     pub(crate) golden: BySeat<bool>,
 }
 
@@ -116,7 +116,7 @@ impl Puzzle<'_> {
             })
     }
 
-    /// Whether it is known of each hand if it has the Golden card, as dealt and after the
+    /// Of each seat, whether it is known that it holds the Golden card or not, as dealt and after the
     /// exchange.
     pub(crate) fn golden_known(
         &self,
@@ -154,11 +154,14 @@ impl Puzzle<'_> {
         }
         let without = |seat: Seat| tally.held[seat].is_some_and(|hand| !hand.has_golden());
         holders.retain(|seat| !without(*seat));
-        let one_holder = holders.windows(2).all(|two| two[0] == two[1]);
-        let held_known = tally.holder.is_some() || one_holder;
-        (
-            BySeat::from_fn(dealt.len(), |seat| from.len() == 1 || !from.contains(&seat)),
-            BySeat::from_fn(dealt.len(), |seat| held_known || !holders.contains(&seat)),
-        )
+        let certain = |possible: &[Seat]| {
+            let only = possible.windows(2).all(|two| two[0] == two[1]);
+            BySeat::from_fn(dealt.len(), |seat| only || !possible.contains(&seat))
+        };
+        let held = match tally.holder {
+            Some(_) => BySeat::filled(dealt.len(), true),
+            None => certain(&holders),
+        };
+        (certain(&from), held)
     }
 }

@@ -1,7 +1,7 @@
 //! A Shift to complete: its facts, and what follows from them for the hands when gifts are assumed.
 //! The search for gifts and hands that fit is in `search`.
 
-use chefshat_engine::{BySeat, ExchangePair, RuleSet, Seat, SeatOrder};
+use chefshat_engine::{BySeat, Cards, ExchangePair, RuleSet, Seat, SeatOrder};
 
 use crate::counts::{
     Counts, JOKER, NOTHING, add, at_least, contains, counts_of, highest, size_of, take,
@@ -168,6 +168,13 @@ impl<'a> Puzzle<'a> {
                 }
                 let determined = size_of(&kept.counts).checked_add(size_of(given))?;
                 kept.missing = self.rules.hand_size().checked_sub(determined)?;
+            }
+        }
+        // The Golden card goes last of its face.
+        if tally.given[seat].is_some_and(Cards::has_golden) {
+            kept.no_top = true;
+            if kept.counts[self.top] > 0 {
+                return None;
             }
         }
         let mut held = kept.counts;

@@ -211,7 +211,12 @@ impl Shift {
                 }
             }
         }
-        (ShiftFacts { facts, choosing }, decisions)
+        let facts = ShiftFacts {
+            facts,
+            choosing,
+            special_is_settled: self.open_special(rules).is_none(),
+        };
+        (facts, decisions)
     }
 
     /// Whether a special action may still be declared, and by whom, if only one seat can.

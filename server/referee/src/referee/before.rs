@@ -82,7 +82,7 @@ impl Referee {
             let declared = Act::Special(seat, true);
             let index = self.shift().acts().position(|act| act == declared);
             if let Some(index) = index {
-                return Ok(self.confirm(index));
+                return Ok(self.confirm(self.shifts.len() - 1, index));
             }
         }
         let Some(only) = self.shift().open_special(&self.rules) else {
@@ -206,9 +206,8 @@ impl Referee {
     }
 
     /// Marks a decision of a remote seat as carried out.
-    pub(super) fn confirm(&mut self, index: usize) -> Verdict {
-        let shift = self.shifts.last_mut().expect("a game has a Shift");
-        let entry = &mut shift.entries[index];
+    pub(super) fn confirm(&mut self, shift: usize, index: usize) -> Verdict {
+        let entry = &mut self.shifts[shift].entries[index];
         if entry.confirmed || entry.report.is_some() {
             return Verdict::Known;
         }

@@ -56,7 +56,8 @@ impl Referee {
                 Some(instead) => self.held[index].1 = instead.clone(),
                 None => drop(self.held.remove(index)),
             }
-            self.reopen(ruling);
+            self.held = self.drop_question();
+            self.judge_held(ruling);
             return Ok(Verdict::Accepted);
         }
         if !self.has(number) && self.shift().entries.is_empty() && self.shifts.len() > 1 {
@@ -72,36 +73,37 @@ impl Referee {
             return refuse("This report cannot be corrected any more: its pizza is over.");
         }
         let entries = self.shift().entries.clone();
-        let first = entries
-            .iter()
-            .position(|entry| entry.number == number && entry.report.is_some())
+        let of_report = |entry: &Entry| entry.number == number;
+        let index = (entries.iter())
+            .position(|entry| of_report(entry) && entry.report.is_some())
             .expect("it counts");
-        let old = entries[first].report.clone().expect("it is a report");
+        let old = entries[index].report.clone().expect("it is a report");
+        // Passes that were inferred from the report fall with it.
+        let first = entries.iter().position(of_report).unwrap_or(index);
         if instead.is_some_and(|instead| !is_alike(&old, instead)) {
             return refuse("A report can be replaced only by one of the same kind.");
         }
+        let waiting = self.drop_question();
         self.set_entries(entries[..first].to_vec())
             .map_err(|problem| (None, (ViolatedRule::Correction, problem)))?;
+        let mut verdict = Verdict::Accepted;
         if let Some(instead) = instead {
             let instead = match (seat_of(&old), seat_of(instead)) {
                 (Some(seat), None) => with_seat(instead, seat),
                 _ => instead.clone(),
             };
-            // The question that this would raise is what the correction must answer.
-            self.asked = None;
-            let held = std::mem::take(&mut self.held);
-            match self.judge(number, &instead, ruling) {
-                Verdict::Accepted => {}
+            verdict = self.judge(number, &instead, ruling);
+            match &verdict {
+                Verdict::Accepted | Verdict::Held { .. } => {}
                 Verdict::Violation(violation) => {
-                    return Err((violation.seat, (violation.rule, violation.text)));
+                    return Err((violation.seat, (violation.rule, violation.text.clone())));
                 }
-                Verdict::Known | Verdict::Held { .. } => {
+                Verdict::Known => {
                     return refuse("With this correction it would not be this player's turn.");
                 }
             }
-            self.held = held;
         }
-        let void_reports = self.replay(&entries[first + 1..]);
+        let void_reports = self.replay(&entries[index + 1..]);
         let text = match instead {
             Some(instead) => {
                 let instead = match seat_of(&old) {
@@ -123,37 +125,50 @@ impl Referee {
             text,
         });
         self.violation = None;
-        self.reopen(ruling);
-        Ok(Verdict::Accepted)
+        self.held.extend(waiting);
+        if self.asked.is_none() {
+            self.judge_held(ruling);
+        }
+        Ok(verdict)
     }
 
-    /// Adds what came after a corrected report, as far as it still fits.
+    /// Judges again what came after a corrected report; what no longer fits is void.
     fn replay(&mut self, later: &[Entry]) -> Vec<u64> {
         let mut void = Vec::new();
-        let mut turns_fit = true;
         for entry in later {
-            let is_turn = matches!(entry.act, Act::Turn(..));
-            let mut entries = self.shift().entries.clone();
-            let pizza = self.game().observe(Viewer::Spectator).pizza;
-            entries.push(Entry {
-                pizza,
-                ..entry.clone()
-            });
-            let fits = (turns_fit || !is_turn) && self.set_entries(entries).is_ok();
+            let fits = match (&entry.report, entry.act) {
+                (Some(report), Act::Turn(..)) if self.asked.is_some() => {
+                    self.held.push((entry.number, report.clone()));
+                    true
+                }
+                (Some(report), Act::Turn(..)) => self.take_turn(entry.number, report).is_ok(),
+                // A pass that followed from reports is inferred again, if it still follows.
+                (None, Act::Turn(seat, _)) if !self.remote[seat] => true,
+                (None, Act::Turn(..)) if self.asked.is_some() || !void.is_empty() => false,
+                _ => self.add(entry).is_ok(),
+            };
             if !fits {
                 void.push(entry.number);
-                turns_fit &= !is_turn;
             }
         }
         void
     }
 
-    /// Withdraws the referee's question and judges again what waited for it.
-    fn reopen(&mut self, ruling: &mut Ruling) {
+    fn add(&mut self, entry: &Entry) -> Result<(), String> {
+        let mut entries = self.shift().entries.clone();
+        entries.push(Entry {
+            pizza: self.game().observe(Viewer::Spectator).pizza,
+            ..entry.clone()
+        });
+        self.set_entries(entries)
+    }
+
+    /// Withdraws the referee's question; the reports that waited for its answer.
+    fn drop_question(&mut self) -> Vec<(u64, Report)> {
         if let Some(asked) = self.asked.take() {
             self.questions.retain(|question| question.id != asked.id);
         }
-        self.judge_held(ruling);
+        std::mem::take(&mut self.held)
     }
 
     fn has(&self, number: u64) -> bool {
@@ -161,8 +176,8 @@ impl Referee {
         self.shift().entries.iter().any(counts)
     }
 
-    /// Whether a report of this Shift can still be corrected: turns within their pizza, or while
-    /// nobody has acted since it ended.
+    /// Whether a report of this Shift can still be corrected: of turns, those of the pizza in progress
+    /// and of the one before.
     pub(super) fn is_correctable(&self, number: u64) -> bool {
         let entries = &self.shift().entries;
         let last = entries
@@ -172,7 +187,7 @@ impl Referee {
             entry.number == number
                 && entry.report.is_some()
                 && (!matches!(entry.act, Act::Turn(..))
-                    || last.is_some_and(|last| last.pizza == entry.pizza))
+                    || last.is_some_and(|last| last.pizza <= entry.pizza + 1))
         })
     }
 }

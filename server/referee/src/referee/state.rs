@@ -42,13 +42,13 @@ impl Referee {
         if let Some(seat) = self.remote.seats().find(unknown) {
             return Stage::Hand(seat);
         }
-        if !shift.exchange_is_over(rules, &self.remote) {
-            if let Some(seat) = shift.open_special(rules) {
-                return Stage::Special(seat);
-            }
-            if let Some(seat) = shift.next_giver(rules, &self.remote) {
-                return Stage::Gift(seat);
-            }
+        if let Some(seat) = shift.open_special(rules) {
+            return Stage::Special(seat);
+        }
+        if !shift.exchange_is_over(rules, &self.remote)
+            && let Some(seat) = shift.next_giver(rules, &self.remote)
+        {
+            return Stage::Gift(seat);
         }
         match self.opener() {
             Some(seat) => Stage::Turn(seat),
@@ -201,7 +201,25 @@ impl Referee {
 
     /// Lists the decisions of remote seats that nobody has carried out.
     pub(super) fn update_to_lay(&mut self) {
-        let shift = self.shift();
+        let turns = self
+            .recent_shifts()
+            .flat_map(|shift| self.turns_to_lay(shift));
+        let list: Vec<ToLay> = turns.collect();
+        self.to_lay = self.gifts_to_lay().into_iter().chain(list).collect();
+    }
+
+    /// The Shift in progress and, before its first turn, the one before it, whose last cards may
+    /// still have to be laid.
+    pub(super) fn recent_shifts(&self) -> std::ops::Range<usize> {
+        let current = self.shifts.len() - 1;
+        match self.shift().has_turns() {
+            true => current..current + 1,
+            false => current.saturating_sub(1)..current + 1,
+        }
+    }
+
+    fn turns_to_lay(&self, shift: usize) -> Vec<ToLay> {
+        let shift = &self.shifts[shift];
         let last_turn =
             (shift.entries.iter()).rposition(|entry| matches!(entry.act, Act::Turn(..)));
         let mut list: Vec<ToLay> = Vec::new();
@@ -224,8 +242,7 @@ impl Referee {
                 }));
             }
         }
-        let gifts = self.gifts_to_lay();
-        self.to_lay = gifts.into_iter().chain(list).collect();
+        list
     }
 
     /// The gifts of remote seats that nobody has carried out.

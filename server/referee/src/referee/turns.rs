@@ -1,13 +1,15 @@
 //! Plays, passes and cleared boards: whose turn it is, what was missed, and what must be asked.
 
-use chefshat_engine::{Action, DecisionKind, Game, PlayRequirement, Requirement, Seat, Viewer};
+use chefshat_engine::{
+    Action, DecisionKind, Face, Game, PlayRequirement, Requirement, Seat, Viewer,
+};
 
 use super::before::counts_of_action;
 use super::{Asked, Doubt, Judged, MAX_HELD, Referee};
 use crate::judge::{as_play, check_play};
 use crate::shift::{Act, Entry, Shift, play};
 use crate::words::turn_text;
-use crate::{Question, Report, Ruling, Verdict, ViolatedRule, Violation};
+use crate::{Question, Report, Ruling, ToLay, Verdict, ViolatedRule, Violation};
 
 /// The most turns that may have been missed before a report.
 const MAX_MISSED: usize = 24;
@@ -63,7 +65,8 @@ impl Referee {
         }
     }
 
-    fn take_turn(&mut self, number: u64, report: &Report) -> Judged {
+    /// Judges a report about a turn while no question is open.
+    pub(super) fn take_turn(&mut self, number: u64, report: &Report) -> Judged {
         let turn = match report {
             Report::Laid { seat, cards } => TurnReport::Acted {
                 seat: *seat,
@@ -97,18 +100,27 @@ impl Referee {
 
     /// A report of what a remote seat decided; `None` if the report is not about a remote seat.
     fn confirm_turn(&mut self, seat: Option<Seat>, action: Action) -> Option<Judged> {
+        let awaited = |of: Seat| {
+            let open = |it: &ToLay| it.seat == of && it.kind == DecisionKind::Turn;
+            self.to_lay.iter().any(open)
+        };
         let same = |entry: &Entry| match entry.act {
             Act::Turn(of, done) => {
-                self.remote[of] && seat.is_none_or(|seat| seat == of) && done == action
+                let named = seat.map_or_else(|| awaited(of), |seat| seat == of);
+                self.remote[of] && named && done == action
             }
             _ => false,
         };
-        let entries = &self.shift().entries;
-        let open = entries
-            .iter()
-            .position(|entry| same(entry) && !entry.confirmed);
-        if let Some(index) = open {
-            return Some(Ok(self.confirm(index)));
+        let of_shift = |shift: usize| {
+            let entries = self.shifts[shift].entries.iter();
+            let open = entries
+                .enumerate()
+                .find(|(_, entry)| same(entry) && !entry.confirmed);
+            open.map(|(index, _)| (shift, index))
+        };
+        let open = self.recent_shifts().find_map(of_shift);
+        if let Some((shift, index)) = open {
+            return Some(Ok(self.confirm(shift, index)));
         }
         let seat = seat.filter(|seat| self.remote[*seat])?;
         if self.is_repeated(Some(seat), action) {
@@ -131,14 +143,27 @@ impl Referee {
     /// still out of the pizza.
     fn is_repeated(&self, seat: Option<Seat>, action: Action) -> bool {
         let shift = self.shift();
+        if !shift.has_turns() {
+            // A late second report of the turn that ended the last Shift, unless it can open this one.
+            let opens = |face: Face| face.get() == self.rules.faces();
+            if matches!(action, Action::Pass)
+                || matches!(action, Action::Play { face, .. } if opens(face))
+            {
+                return false;
+            }
+            let last = self.recent_shifts().rev().nth(1);
+            let last = last.and_then(|last| self.shifts[last].turns().next_back());
+            return last
+                .is_some_and(|(of, done)| done == action && seat.is_none_or(|seat| seat == of));
+        }
         let last_play = shift.turns().rfind(|(_, done)| *done != Action::Pass);
         let now = self.game().observe(Viewer::Spectator);
         match (action, seat) {
             (Action::Pass, Some(seat)) => {
-                let last = shift.turns().rfind(|(of, _)| *of == seat);
-                now.passed[seat]
-                    && last == Some((seat, Action::Pass))
-                    && self.to_act() != Some(seat)
+                let pass = Some((seat, Action::Pass));
+                let is_out = now.passed[seat] && shift.turns().rfind(|(of, _)| *of == seat) == pass;
+                let was_last = shift.turns().next_back() == pass;
+                (is_out || was_last) && self.to_act() != Some(seat)
             }
             (Action::Pass, None) => false,
             (action, seat) => {
@@ -208,17 +233,17 @@ impl Referee {
             return refuse(seat, out_of_turn());
         };
         let required = self.requirement(&game);
+        let pizza = |game: &Game| game.observe(Viewer::Spectator).pizza;
+        let same_pizza = pizza(&game) == pizza(self.game());
         if let Err(broken) = check_play(&self.rules, &required, action, golden) {
             // The play would break a rule even if the others had passed: say the simpler thing.
-            let same_pizza = game.observe(Viewer::Spectator).pizza
-                == self.game().observe(Viewer::Spectator).pizza;
             return refuse(seat, if same_pizza { broken } else { out_of_turn() });
         }
         if let Some(remote) = missed.iter().find(|seat| self.remote[**seat]) {
             let text = format!("It is {}'s turn.", self.names.of(*remote));
             return refuse(seat, (ViolatedRule::Turn, text));
         }
-        self.miss(number, report, missed, Some((seat, action)))
+        self.miss(number, report, missed, Some((seat, action)), !same_pizza)
     }
 
     fn accept_turn(&mut self, number: u64, report: &Report, seat: Seat, action: Action) -> Judged {
@@ -247,8 +272,15 @@ impl Referee {
         seat: Option<Seat>,
     ) -> Result<(), (Option<Seat>, crate::judge::Broken)> {
         let shift = self.shift();
-        if shift.has_turns() || shift.exchange_is_over(&self.rules, &self.remote) {
+        let special = shift.open_special(&self.rules);
+        let over = special.is_none() && shift.exchange_is_over(&self.rules, &self.remote);
+        if shift.has_turns() || over {
             return Ok(());
+        }
+        if let Some(remote) = special.flatten().filter(|seat| self.remote[*seat]) {
+            let name = self.names.of(remote);
+            let text = format!("{name} has not decided about a special action yet.");
+            return Err((seat, (ViolatedRule::Turn, text)));
         }
         let pairs = shift.pairs(&self.rules);
         let undecided = pairs.iter().find(|pair| {
@@ -288,7 +320,7 @@ impl Referee {
             );
             return Err((to_act, (ViolatedRule::Turn, text)));
         }
-        self.miss(number, report, missed, None)
+        self.miss(number, report, missed, None, true)
     }
 
     /// The seats that would have to pass until `done`, and the game then.
@@ -316,8 +348,11 @@ impl Referee {
         report: &Report,
         missed: Vec<Seat>,
         then: Option<(Seat, Action)>,
+        ends_pizza: bool,
     ) -> Judged {
-        if then.is_some() && self.only_passes_fit(number, &missed, then) {
+        // After a violation or at the end of a pizza, an earlier report may be wrong: ask.
+        let certain = self.violation.is_none() && !ends_pizza && then.is_some();
+        if certain && self.only_passes_fit(number, &missed, then) {
             for seat in &missed {
                 self.try_act(number, None, Act::Turn(*seat, Action::Pass))
                     .map_err(|problem| (Some(*seat), (ViolatedRule::Turn, problem)))?;

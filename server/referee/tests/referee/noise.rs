@@ -1,0 +1,285 @@
+//! Whole games, reported correctly or with reports that are missing, doubled or misread.
+
+use chefshat_engine::{Action, Seat};
+use chefshat_referee::{Report, Stage, Verdict};
+use proptest::prelude::*;
+
+use crate::table::{Table, report_of, rules, seen, varied};
+
+/// Plays a game whose reports are all correct.
+fn play_correctly(table: &mut Table, confirm: bool) {
+    let mut steps = 0;
+    while table.referee.stage() != Stage::Over {
+        steps += 1;
+        assert!(
+            steps < 5000,
+            "{:?} {:?}",
+            table.referee.stage(),
+            table.truth.decision()
+        );
+        if !table.prepare() {
+            continue;
+        }
+        let (seat, _, mut report) = table.turn();
+        if table.remote[seat] {
+            if confirm {
+                let (_, verdict) = table.report(&report);
+                assert!(
+                    matches!(verdict, Verdict::Accepted | Verdict::Known),
+                    "{verdict:?}"
+                );
+            }
+            continue;
+        }
+        // A camera often does not see who laid the cards.
+        let opening_is_open = table.referee.stage() == Stage::Opening;
+        if table.rng.random_bool(0.3) && !opening_is_open && table.referee.to_lay().is_empty() {
+            match &mut report {
+                Report::Laid { seat, .. } | Report::Pass { seat } => *seat = None,
+                _ => {}
+            }
+        }
+        let (_, verdict) = table.report(&report);
+        assert_eq!(verdict, Verdict::Accepted, "{report:?}");
+        if table.rng.random_bool(0.2)
+            && table
+                .referee
+                .game()
+                .observe(chefshat_engine::Viewer::Spectator)
+                .board
+                .size
+                == 0
+        {
+            let (_, verdict) = table.report(&Report::Cleared);
+            assert_eq!(verdict, Verdict::Known);
+        }
+    }
+}
+
+/// Brings the referee to the truth, as an attendant does who saw everything.
+fn attend(table: &mut Table) {
+    for _ in 0..200 {
+        if let Some(question) = table.referee.questions().first().cloned() {
+            let counted = table.counted().len();
+            let next: Vec<(Seat, Action)> =
+                table.true_turns()[counted.min(table.true_turns().len())..].to_vec();
+            let option = if question.text.starts_with("Who") {
+                let names = ["Ada", "Bo", "Cy", "Di", "Ed", "Flo"];
+                let opener = table.true_turns()[0].0;
+                question
+                    .options
+                    .iter()
+                    .position(|name| name == names[opener.index()])
+            } else {
+                let asked = question.text.matches(" and ").count()
+                    + question.text.matches(", ").count()
+                    + 1;
+                let passed = next
+                    .iter()
+                    .take(asked)
+                    .filter(|(_, action)| *action == Action::Pass);
+                Some(usize::from(passed.count() != asked))
+            };
+            table.report(&Report::Answer {
+                id: question.id,
+                option,
+            });
+            continue;
+        }
+        let counted = table.counted();
+        let truth = table.true_turns().to_vec();
+        let wrong = counted
+            .iter()
+            .zip(&truth)
+            .position(|((_, seat, action), right)| (*seat, *action) != *right);
+        if let Some(index) = wrong {
+            let (number, seat, _) = counted[index];
+            let (right, action) = truth[index];
+            let inferred = counted.get(index + 1).is_some_and(|next| next.0 == number);
+            let instead = (seat == right && !inferred)
+                .then(|| Box::new(report_of(right, action, index == 0)));
+            let (_, verdict) = table.report(&Report::Correction { number, instead });
+            assert!(
+                matches!(verdict, Verdict::Accepted | Verdict::Held { .. }),
+                "{:?}",
+                table.rulings.last()
+            );
+            continue;
+        }
+        if let Some((number, ..)) = counted.get(truth.len()) {
+            // A pass that was reported twice can be two passes by the rules.
+            let instead = None;
+            let number = *number;
+            let (_, verdict) = table.report(&Report::Correction { number, instead });
+            assert_eq!(
+                verdict,
+                Verdict::Accepted,
+                "{:?}\n{:?}\n{:?}",
+                table.rulings.last(),
+                &counted[counted.len().saturating_sub(8)..],
+                &truth[truth.len().saturating_sub(6)..]
+            );
+            continue;
+        }
+        let Some((seat, action)) = truth.get(counted.len()).copied() else {
+            return;
+        };
+        assert!(
+            !table.remote[seat],
+            "a remote seat's decision counts at once"
+        );
+        let report = report_of(seat, action, counted.is_empty());
+        let (_, verdict) = table.report(&report);
+        assert_eq!(
+            verdict,
+            Verdict::Accepted,
+            "{report:?} {:?}",
+            table.rulings.last()
+        );
+    }
+    panic!("the attendant does not come to an end");
+}
+
+/// Misreads a report of cards: another face, or one card more or fewer.
+fn misread(table: &mut Table, report: &Report) -> Report {
+    let mut wrong = report.clone();
+    if let Report::Laid { cards, .. } = &mut wrong {
+        let faces = usize::from(table.truth.rules().faces());
+        if let Some(kind) = (0..faces).find(|kind| cards.counts[*kind] > 0) {
+            let other = table.rng.random_range(0..faces);
+            let count = cards.counts[kind];
+            cards.counts[kind] = 0;
+            cards.counts[other] = if other == kind { count + 1 } else { count };
+            cards.golden = None;
+        }
+    }
+    wrong
+}
+
+fn play_noisily(table: &mut Table, noise: f64) {
+    while table.referee.stage() != Stage::Over {
+        if table.referee.stage() == Stage::Question {
+            attend(table);
+            continue;
+        }
+        if !table.prepare() {
+            continue;
+        }
+        // Remote seats decide by what the referee counts: bring it to the truth first.
+        let next = table.truth.decision().map(|open| open.seat);
+        let remote_is_next = next.is_some_and(|seat| table.remote[seat]);
+        let last_of_shift = table.counted().len() != table.true_turns().len();
+        if remote_is_next || last_of_shift && table.turns.is_empty() {
+            attend(table);
+            if !matches!(table.referee.stage(), Stage::Opening | Stage::Turn(_)) {
+                continue;
+            }
+        }
+        let pizza_before = table
+            .truth
+            .observe(chefshat_engine::Viewer::Spectator)
+            .pizza;
+        let (seat, _, report) = table.turn();
+        if table.remote[seat] {
+            continue;
+        }
+        if !table.rng.random_bool(noise) {
+            table.report(&report);
+        } else {
+            match table.rng.random_range(0..3) {
+                0 => {}
+                1 => {
+                    table.report(&report);
+                    table.report(&report);
+                }
+                _ => {
+                    let wrong = misread(table, &report);
+                    table.report(&wrong);
+                }
+            }
+        }
+        // A correction is possible within the pizza: the attendant looks before it is cleared.
+        let pizza = table
+            .truth
+            .observe(chefshat_engine::Viewer::Spectator)
+            .pizza;
+        let other_shift =
+            table.referee.game().shift() != table.truth.shift() || table.referee.game().is_over();
+        if pizza != pizza_before
+            || table.turns.is_empty()
+            || other_shift
+            || table.rng.random_bool(0.5)
+        {
+            attend(table);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    /// No legal physical game is called a violation, and its record is the truth.
+    #[test]
+    fn correct_reports_give_the_game_itself(
+        seed in any::<u64>(),
+        remote in 0u8..15,
+        faces in 5u8..=11,
+        variation in 0u8..16,
+        confirm in any::<bool>(),
+    ) {
+        let mut table = Table::new(varied(faces, 3, variation), seed, remote);
+        play_correctly(&mut table, confirm);
+        table.check_end();
+        for ruling in &table.rulings {
+            prop_assert!(ruling.violations.is_empty(), "{ruling:?}");
+            prop_assert!(ruling.corrected.is_none(), "{ruling:?}");
+        }
+    }
+
+    /// Reports that are missing, doubled or misread are noticed or corrected: the game that counts in
+    /// the end is the truth.
+    #[test]
+    fn noisy_reports_give_the_game_after_questions_and_corrections(
+        seed in any::<u64>(),
+        remote in 0u8..15,
+        faces in 5u8..=11,
+        variation in 0u8..16,
+        noise in 0.0..0.5,
+    ) {
+        let mut table = Table::new(varied(faces, 2, variation), seed, remote);
+        play_noisily(&mut table, noise);
+        table.check_end();
+    }
+}
+
+#[test]
+fn other_numbers_of_players() {
+    for players in [2, 3, 5, 6] {
+        for seed in 0..8 {
+            let faces = if players > 4 { 11 } else { 9 };
+            let mut table = Table::new(rules(players, faces, 3), seed, 1);
+            play_correctly(&mut table, true);
+            table.check_end();
+        }
+    }
+}
+
+#[test]
+fn hands_that_all_were_played_are_known_in_the_end() {
+    let mut table = Table::new(rules(4, 11, 1), 5, 0);
+    play_correctly(&mut table, false);
+    let story = table.referee.story();
+    let known: Vec<Seat> = (story[0].hands.iter())
+        .filter(|(_, hand)| hand.is_some())
+        .map(|(seat, _)| seat)
+        .collect();
+    // Three seats played all their cards; the fourth has the rest of the deck.
+    assert_eq!(known.len(), 4);
+    assert_eq!(
+        seen(table.dealt[0][Seat::new(0)], 11)
+            .counts
+            .iter()
+            .sum::<u8>(),
+        17
+    );
+}

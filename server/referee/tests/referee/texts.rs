@@ -1,0 +1,202 @@
+//! What the referee says to the people at the table.
+
+use chefshat_engine::{BySeat, Role, Seat};
+use chefshat_referee::counts::{JOKER, NOTHING};
+use chefshat_referee::{Question, Referee, Report, SeenCards, Stage, Verdict};
+
+use crate::table::rules;
+
+/// A referee of four people at a table, with the number of its last report.
+struct Evening {
+    referee: Referee,
+    number: u64,
+}
+
+fn cards(faces: &[usize], golden: Option<bool>) -> SeenCards {
+    let mut counts = NOTHING;
+    for face in faces {
+        counts[if *face == 12 { JOKER } else { face - 1 }] += 1;
+    }
+    SeenCards { counts, golden }
+}
+
+fn laid(seat: usize, faces: &[usize]) -> Report {
+    Report::Laid {
+        seat: Some(Seat::new(seat)),
+        cards: cards(faces, None),
+    }
+}
+
+fn pass(seat: usize) -> Report {
+    Report::Pass {
+        seat: Some(Seat::new(seat)),
+    }
+}
+
+impl Evening {
+    fn new() -> Self {
+        let names = ["Ada", "Bo", "Cy", "Di"].map(str::to_owned).to_vec();
+        let mut referee = Referee::new(rules(4, 11, 3), BySeat::filled(4, false), names);
+        referee.start();
+        Self { referee, number: 0 }
+    }
+
+    /// What the referee says to a report: "accepted", "known", the violation, or its question.
+    fn say(&mut self, report: &Report) -> String {
+        self.number += 1;
+        match self.referee.report(self.number, report).verdict {
+            Verdict::Accepted => "accepted".into(),
+            Verdict::Known => "known".into(),
+            Verdict::Violation(violation) => violation.text,
+            Verdict::Held { question } => {
+                let questions = self.referee.questions();
+                questions
+                    .iter()
+                    .find(|it| it.id == question)
+                    .unwrap()
+                    .text
+                    .clone()
+            }
+        }
+    }
+
+    fn check(&mut self, table: &[(Report, &str)]) {
+        for (report, expected) in table {
+            assert_eq!(self.say(report), *expected, "{report:?}");
+        }
+    }
+}
+
+#[test]
+fn plays_that_break_a_rule() {
+    let mut evening = Evening::new();
+    assert_eq!(
+        evening.referee.waiting_for(),
+        "The player with the Golden 11 opens the Shift."
+    );
+    evening.check(&[
+        (laid(0, &[9, 9]), "The Shift is opened with 11s, the Golden 11 among them."),
+        (pass(0), "The first turn of a Shift must be a play."),
+        (
+            Report::Laid { seat: Some(Seat::new(0)), cards: cards(&[11, 11], Some(false)) },
+            "The Golden 11 must be among the cards that open the Shift.",
+        ),
+        (laid(0, &[11, 11]), "accepted"),
+        (laid(0, &[11, 11]), "known"),
+        (laid(1, &[7, 9]), "These cards are 7s and 9s: a play has cards of one face, and jokers."),
+        (laid(1, &[]), "No cards were laid."),
+        (laid(1, &[12, 12]), "Jokers alone are no play: lay one alone, or jokers with cards of one face."),
+        (laid(1, &[12]), "A joker alone can only start a pizza."),
+        (laid(1, &[9]), "That pizza has 2 cards: a play needs at least as many, jokers included."),
+        (laid(1, &[3, 3, 3, 3]), "These are 4 3s, but the deck has 3."),
+        (laid(1, &[5, 12]), "accepted"),
+        (laid(2, &[5, 5]), "That pizza already shows 5s: a play must be 4 or lower."),
+        (laid(2, &[2, 12]), "accepted"),
+        (laid(3, &[1, 12]), "Di cannot have a 1 and a joker: too many jokers were dealt to or played by the seats together: 3, but the deck has 2."),
+    ]);
+}
+
+#[test]
+fn a_missed_pass_is_asked_for() {
+    let mut evening = Evening::new();
+    evening.check(&[
+        (laid(0, &[11]), "accepted"),
+        (laid(2, &[9]), "Did Bo pass?"),
+        (laid(3, &[8]), "Did Bo pass?"),
+    ]);
+    assert_eq!(evening.referee.stage(), Stage::Question);
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[
+        (
+            Report::Answer {
+                id: id.clone(),
+                option: Some(7),
+            },
+            "The question has no such answer.",
+        ),
+        (
+            Report::Answer {
+                id: id.clone(),
+                option: Some(0),
+            },
+            "accepted",
+        ),
+        (
+            Report::Answer {
+                id,
+                option: Some(0),
+            },
+            "known",
+        ),
+    ]);
+    assert_eq!(evening.referee.stage(), Stage::Turn(Seat::new(0)));
+    assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
+    // The pizza was cleared, but two passes are missing.
+    evening.check(&[(Report::Cleared, "Did Ada and Cy pass?")]);
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[
+        (
+            Report::Answer {
+                id,
+                option: Some(1),
+            },
+            "accepted",
+        ),
+        (pass(0), "accepted"),
+        (Report::PassWithdrawn { seat: Seat::new(0) }, "accepted"),
+        (Report::PassWithdrawn { seat: Seat::new(0) }, "known"),
+    ]);
+    assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
+}
+
+#[test]
+fn corrections_and_questions() {
+    let mut evening = Evening::new();
+    evening.check(&[
+        (laid(0, &[11, 11]), "accepted"),
+        (laid(1, &[9, 9]), "accepted"),
+        (laid(2, &[7, 7]), "accepted"),
+    ]);
+    let instead = Some(Box::new(laid(1, &[6, 6])));
+    let ruling = evening
+        .referee
+        .report(9, &Report::Correction { number: 2, instead });
+    let corrected = ruling.corrected.unwrap();
+    assert_eq!(
+        corrected.text,
+        "Corrected: Bo laid two 6s. (Before: Bo laid two 9s.)"
+    );
+    // Cy's 7s do not fall below the 6s.
+    assert_eq!(corrected.void_reports, [3]);
+    assert_eq!(corrected.void_events, 2);
+    assert_eq!(evening.referee.waiting_for(), "It is Cy's turn.");
+
+    let question = Question {
+        id: "camera-1".into(),
+        text: "7 or 9 at place 4?".into(),
+        options: vec!["7".into(), "9".into()],
+        seat: Some(Seat::new(2)),
+    };
+    evening.check(&[
+        (Report::Question(question.clone()), "accepted"),
+        (Report::Question(question), "known"),
+        (Report::Answer { id: "camera-1".into(), option: Some(0) }, "accepted"),
+        (Report::Correction { number: 99, instead: None }, "This report cannot be corrected: it is no report of this Shift that counts."),
+        (
+            Report::Correction { number: 2, instead: Some(Box::new(Report::Cleared)) },
+            "A report can be replaced only by one of the same kind.",
+        ),
+        (Report::Role { seat: Seat::new(0), role: Role::Chef }, "The first Shift has no roles."),
+        (Report::Gift { seat: Seat::new(0), cards: None }, "Ada gives no cards in this Shift."),
+        (
+            Report::Special { seat: Some(Seat::new(0)) },
+            "A special action is declared before the exchange, from the second Shift on, by a player with two jokers.",
+        ),
+        (Report::Pause(true), "accepted"),
+        (Report::Pause(true), "known"),
+        (
+            Report::Hand { seat: Seat::new(3), cards: cards(&[1, 2, 3], None) },
+            "Di has 17 cards, but 3 are seen. Show all of them side by side.",
+        ),
+    ]);
+}
