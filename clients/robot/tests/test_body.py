@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import chefshat
 import pytest
 from chefshat import Decision, SeatInfo, pb
@@ -195,6 +197,27 @@ def test_gifts_are_carried_without_saying_what_they_are() -> None:
     run(test())
 
 
+def test_gifts_that_were_decided_are_carried_once_and_wrong_ones_asked_back() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        assert await body.give(12, 3, FAR_S)
+        assert await body.give(2, 3, FAR_S)
+        # The second was too late: the server gave an 11 instead.
+        gift = pb.CardsExchanged(giver=1, receiver=3, count=2, cards=[11, 12])
+        for event in list(numbered({}, {}, {"cards_exchanged": gift}))[2:]:
+            body.on_event(event)
+        await body.idle()
+        assert [move.piece for move in carried(robot)] == ["joker", "2", "11"]
+        assert [notice.text for notice in notices] == [
+            "I was too late, so that does not count. Please put a card back into my stand."
+        ]
+        assert body.state.hand == (0, 2, 0, 0, 1, 0, 1, 0, 3, 3, 4, 1)
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
 def test_winning_and_losing_show() -> None:
     async def ends(order: list[int], winner: int) -> list[Act]:
         robot, notices = ScriptedRobot(), list[Notice]()
@@ -225,7 +248,7 @@ class Takes(chefshat.Agent):
         return self.action
 
 
-def request(legal: list[int], time_left_ms: int = 3_600_000) -> Decision:
+def request(legal: list[int], time_left_ms: int = 3_600_000, seat: SeatInfo | None = None, **seen: Any) -> Decision:
     """A turn of seat 1."""
     mask = bytearray(27)
     for action in legal:
@@ -234,10 +257,10 @@ def request(legal: list[int], time_left_ms: int = 3_600_000) -> Decision:
         decision_id=1,
         kind=pb.DECISION_KIND_TURN,
         action_mask=bytes(mask),
-        observation=pb.Observation(hand=bytes(12)),
+        observation=pb.Observation(**{"shift": 1, "hand": bytes(12), "cards_left": bytes(4), "passed": bytes(4), **seen}),
         time_left_ms=time_left_ms,
     )
-    return Decision(message, SeatInfo("room", "game", 1))
+    return Decision(message, seat or SeatInfo("room", "game", 1))
 
 
 def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_robot_does() -> None:
@@ -249,6 +272,36 @@ def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_r
                 player.on_attached(SeatInfo("room", "game", 1))
                 assert await player.decide(request([0, 199], time_left_ms)) == 199
                 assert said(robot)[:1] == (["I pass."] if time_left_ms else [])
+
+    run(test())
+
+
+def test_at_a_table_with_real_cards_of_others_the_decision_comes_before_the_cards() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(lambda act: None), list[Notice]()
+        seat = SeatInfo("room", "game", 1)
+        started = game_started()["game_started"]
+        assert isinstance(started, pb.GameStarted)
+        started.seats[0].at_table = True
+        seat.game_started = started
+        async with Body(robot, Words("en"), seat=1, notify=notices.append, finish_s=0) as body:
+            player = RobotPlayer(Takes(199), body)
+            assert await player.decide(request([199], seat=seat)) == 199
+
+    run(test())
+
+
+def test_a_decision_says_which_cards_the_robot_has_when_events_did_not() -> None:
+    async def test() -> None:
+        robot = ScriptedRobot()
+        async with Body(robot, Words("en"), seat=1) as body:
+            for event in numbered(game_started(), {"shift_started": pb.ShiftStarted(shift=1)}):
+                body.on_event(event)
+            hand = bytes([0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 1, 1])
+            player = RobotPlayer(Takes(3 * (36 + 1)), body)  # Two 9s.
+            await player.decide(request([3 * (36 + 1)], hand=hand, golden=True, cards_left=bytes([5, 5, 5, 5])))
+            # In the stand lie a 5, two 9s, the Golden card and a joker, in this order.
+            assert [(move.piece, move.start.y if move.start else None) for move in carried(robot)] == [("9", 25.0), ("9", 50.0)]
 
     run(test())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from chefshat import RandomAgent, aio, pb
 
-from chefshat_robot import cli, drivers, speech
+from chefshat_robot import cli, drivers, layout, speech
 from chefshat_robot.body import Notice, Turn
 from chefshat_robot.drivers.driver import Done, Failed, Pick, Say
 from chefshat_robot.robot import play_seat
@@ -70,6 +70,31 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
     asked = [text for line in record if (text := speech.text_of(line.event.expression_shown.expression))]
     assert bool(asked) == jammed
     assert asked == [notice.text for notice in notices][: len(asked)]
+
+
+@pytest.mark.server
+def test_a_robot_gives_just_what_the_exchange_says(server_address: str) -> None:
+    robot = ScriptedRobot()
+
+    async def test() -> tuple[int, list[pb.RecordLine]]:
+        async with aio.Client(server_address) as client:
+            made = await client.create_room("gifts", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=6))
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            result = await play_seat(client, seat.ticket, RandomAgent(5), robot, words=Words("en"))
+            return result.seat, [line async for line in client.record(result.game_id)]
+
+    seat, record = run(test())
+    exchanges = [line.event.cards_exchanged for line in record if line.event.HasField("cards_exchanged")]
+    given = [(exchange.receiver, sorted(exchange.cards)) for exchange in exchanges if exchange.giver == seat]
+    assert given
+    spots = [layout.gift_place(receiver, 4) for receiver in range(4)]
+    moves = [move for act in robot.acts if isinstance(act, Pick) for move in act.moves if move.end in spots]
+    assert all(move.start is not None for move in moves)
+    for receiver, cards in given:
+        carried, moves = moves[: len(cards)], moves[len(cards) :]
+        assert {move.end for move in carried} == {spots[receiver]}
+        assert sorted({"joker": 12, "golden": 11}.get(move.piece) or int(move.piece) for move in carried) == cards
+    assert moves == []
 
 
 @pytest.mark.server

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -33,7 +33,7 @@ from chefshat_robot.drivers.driver import (
     describe,
 )
 from chefshat_robot.layout import Stand
-from chefshat_robot.table import TableState, follow, plays_golden
+from chefshat_robot.table import TableState, follow, observe, plays_golden
 from chefshat_robot.words import Words
 
 LOG = logging.getLogger("chefshat_robot")
@@ -173,6 +173,8 @@ class Body:
         self._pass_is_down = False
         # The own turn that is being performed and that the game has not confirmed yet.
         self._announced: Turn | None = None
+        # Pieces that were given in the exchange, which is not complete yet.
+        self._given: list[str] = []
         self._needed: deque[_Job] = deque()
         self._reactions: deque[_Job] = deque(maxlen=MAX_REACTIONS)
         self._forwards: deque[tuple[pb.GameEvent, TableState]] = deque(maxlen=MAX_FORWARDS)
@@ -207,13 +209,33 @@ class Body:
             self.live_from = live_from
             self.state = replace(self.state, seat=seat)
 
+    def observe(self, seen: pb.Observation) -> None:
+        """Corrects what the robot knows, by the observation of one of its decisions."""
+        self.state = observe(self.state, seen)
+        if self._stand is not None:
+            self._stand.settle(self.state.hand, self.state.golden)
+
     async def take_turn(self, turn: Turn, limit_s: float) -> bool:
         """Performs an own turn. Returns True when its acts have ended, False after `limit_s` seconds; they then continue.
 
         If the limit is not positive, it returns at once.
         """
         self._announced = turn
-        job = self._turn_job(turn, self.state)
+        return await self._performed(self._turn_job(turn, self.state), limit_s)
+
+    async def give(self, face: int, receiver: int, limit_s: float) -> bool:
+        """Gives a card in the exchange; face F+1 is a joker. Returns as `take_turn`. What the card is is not said."""
+        state, stand = self.state, self._stand
+        if stand is None or not self._handles_cards:
+            return True
+        piece = layout.piece_of(face, state.faces)
+        if piece not in stand.slots and face == state.faces:
+            piece = "golden"  # It is given after the others of its face.
+        self._given.append(piece)
+        return await self._performed(self._gift_job([piece], receiver, stand), limit_s)
+
+    async def _performed(self, job: _Job, limit_s: float) -> bool:
+        """Queues a job, and waits for its end as long as allowed."""
         self._need(job)
         if limit_s <= 0:
             return False
@@ -241,7 +263,7 @@ class Body:
         after = self.state = follow(before, event)
         live = event.sequence >= self.live_from
         if self._handles_cards:
-            self._follow_cards(event, before, after, live)
+            self._follow_cards(event, after, live)
         self._forwards.append((event, after))
         self._forward_work.set()
         if not live:
@@ -255,7 +277,7 @@ class Body:
 
     # Cards.
 
-    def _follow_cards(self, event: pb.GameEvent, before: TableState, after: TableState, live: bool) -> None:
+    def _follow_cards(self, event: pb.GameEvent, after: TableState, live: bool) -> None:
         """Keeps the stand as the game has it, and moves the own cards that no decision has moved yet."""
         own = after.seat
         if own is None:
@@ -270,8 +292,9 @@ class Body:
             stand.fill(after.hand, after.golden)
             self._pass_is_down = False
             self._announced = None
+            self._given.clear()
         elif kind == "cards_exchanged" and event.cards_exchanged.giver == own:
-            self._give(event.cards_exchanged, before, after, stand, live)
+            self._exchanged(event.cards_exchanged, after, stand, live)
         elif kind == "cards_exchanged" and event.cards_exchanged.receiver == own and after.hand:
             stand.settle(after.hand, after.golden)
         elif kind == "pizza_done" and self._pass_is_down:
@@ -280,19 +303,33 @@ class Body:
             if live and place is not None:
                 self._need(_Job((Pick((CardMove("pass", place, rest),)),), self.words.say("please_return_pass")))
 
-    def _give(self, given: pb.CardsExchanged, before: TableState, after: TableState, stand: Stand, live: bool) -> None:
-        """Carries the gifts of the exchange to their receiver. What they are is not said."""
-        joker = after.faces + 1
-        pieces = [str(card) if card < joker else "joker" for card in given.cards]
+    def _exchanged(self, given: pb.CardsExchanged, after: TableState, stand: Stand, live: bool) -> None:
+        """Carries the gifts that no decision has carried: those without a choice, and what a default decision gave instead."""
+        pieces = [layout.piece_of(face, after.faces) for face in given.cards]
         if given.golden:
             pieces[pieces.index(str(after.faces))] = "golden"
-        moves = stand.take(pieces, [layout.gift_place(given.receiver, after.players)] * len(pieces))
-        if after.hand:
-            stand.settle(after.hand, after.golden)
-        if live and moves:
-            name, count = after.name(given.receiver), self.words.some_cards(len(moves))
-            told = Say(self.words.say("give", count=count, name=name), self.words.language)
-            self._need(_Job((told, Pick(moves)), self.words.say("please_give", count=count, name=name)))
+        wrong = []
+        for piece in self._given:
+            if piece in pieces:
+                pieces.remove(piece)
+            else:
+                wrong.append(piece)
+        self._given.clear()
+        if live and wrong:
+            text = self.words.say("please_take_back", cards=self.words.some_cards(len(wrong)))
+            self.say(text)
+            self._notify(Notice("help", text, "the decision was too late, and the default decision counted"))
+        if live and pieces:
+            self._need(self._gift_job(pieces, given.receiver, stand))
+        stand.settle(after.hand, after.golden)
+
+    def _gift_job(self, pieces: Sequence[str], receiver: int, stand: Stand) -> _Job:
+        """Returns how gifts are carried to their receiver."""
+        state, words = self.state, self.words
+        moves = stand.take(pieces, [layout.gift_place(receiver, state.players)] * len(pieces))
+        name, count = state.name(receiver), words.some_cards(len(moves))
+        told = Say(words.say("give", count=count, name=name), words.language)
+        return _Job((told, Pick(moves)), words.say("please_give", count=count, name=name))
 
     def _turn_job(self, turn: Turn, state: TableState) -> _Job:
         """Returns what the robot does for a turn in a state, and takes the cards out of its stand."""

@@ -183,6 +183,11 @@ def pieces_of(hand: Sequence[int], golden: bool) -> list[str]:
     return pieces + ["joker"] * hand[top]
 
 
+def piece_of(face: int, faces: int) -> str:
+    """Names a card: 1..F an ingredient, F+1 a joker."""
+    return str(face) if face <= faces else "joker"
+
+
 def pieces_of_play(face: int, quantity: int, jokers: int, golden: bool) -> list[str]:
     """Names the pieces of a play.
 

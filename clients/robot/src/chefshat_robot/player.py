@@ -1,7 +1,8 @@
 """An agent with a body: an agent of `chefshat` decides, and a robot does at the table what it decided.
 
 What the robot does is in `body`. A decision is answered when the robot has finished its turn, or when the time of the decision is
-nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision.
+nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision. At a table where
+others play with real cards it is answered at once, and then laid.
 """
 
 from __future__ import annotations
@@ -51,12 +52,23 @@ class RobotPlayer(chefshat.Agent):
         asked = time.monotonic()
         answer = self._agent.decide(request)
         action = int(await answer if isinstance(answer, Awaitable) else answer)
-        if request.kind == pb.DECISION_KIND_TURN and action in request.legal_actions:
-            limit = limit_s(request.time_left_ms, time.monotonic() - asked)
-            if self._hold_s is not None:
-                limit = min(limit, self._hold_s)
-            await self._body.take_turn(turn_of(action, request.faces), limit)
+        if action in request.legal_actions:
+            self._body.observe(request.request.observation)
+            await self._act(request, action, asked)
         return action
+
+    async def _act(self, request: Decision, action: int, asked: float) -> None:
+        """Lets the robot act, as long as the decision allows."""
+        limit = limit_s(request.time_left_ms, time.monotonic() - asked)
+        if self._hold_s is not None:
+            limit = min(limit, self._hold_s)
+        if decided_before_laid(request.seat_info):
+            limit = 0.0
+        gift = request.gift_requirement
+        if request.kind == pb.DECISION_KIND_TURN:
+            await self._body.take_turn(turn_of(action, request.faces), limit)
+        elif gift is not None:
+            await self._body.give(action - request.turn_actions + 1, gift.receiver, limit)
 
     def on_attached(self, seat: SeatInfo) -> None:
         """Sets the robot's seat."""
@@ -110,6 +122,11 @@ def limit_s(time_left_ms: int, used_s: float) -> float:
     """
     left = time_left_ms / 1000
     return left - used_s - max(left * MARGIN, MIN_MARGIN_S)
+
+
+def decided_before_laid(seat: SeatInfo) -> bool:
+    """Whether others at the table play with real cards: the referee then expects a decision before its cards."""
+    return seat.game_started is not None and any(participant.at_table for participant in seat.game_started.seats)
 
 
 def turn_of(action: int, faces: int) -> Turn:

@@ -1,6 +1,7 @@
 """The state of a game as one seat, or a spectator, sees it, from the game's events alone.
 
-`follow` computes the next state from an event. It contains no rules except who acts next, which the events do not say.
+`follow` computes the next state from an event, `observe` from a decision. There are no rules here except who acts next, which the
+events do not say.
 """
 
 from __future__ import annotations
@@ -105,6 +106,25 @@ def follow(state: TableState, event: pb.GameEvent) -> TableState:
             return replace(state, names=_with(state.names, event.seated.seat, event.seated.name))
         case _:
             return state
+
+
+def observe(state: TableState, seen: pb.Observation) -> TableState:
+    """Returns the state corrected by the observation of a decision. They differ after a correction at a physical table."""
+    return replace(
+        state,
+        shift=seen.shift,
+        pizza=max(seen.pizza, 1),
+        hand=tuple(seen.hand),
+        golden=seen.golden,
+        board_face=seen.board_face,
+        board_size=seen.board_size,
+        board_jokers=seen.board_jokers,
+        cards_left=tuple(seen.cards_left),
+        passed=tuple(map(bool, seen.passed)),
+        places=tuple(seen.places),
+        roles=tuple(seen.roles),
+        points=tuple(seen.points),
+    )
 
 
 def counts_of(cards: Sequence[int], faces: int) -> tuple[int, ...]:
