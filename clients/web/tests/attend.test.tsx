@@ -326,6 +326,14 @@ describe("the reports of the Shift", () => {
     expect(words).toEqual(["1 Dan passed", "1 Bo laid 2 × 9 + joker", "1 The hand of Cleo was seen"]);
   });
 
+  test("are shown eight at a time, or all", async () => {
+    const many = Array.from({ length: 20 }, (_, index) => report(BigInt(index), { case: "pass", value: { seat: 1 } }));
+    await show(stateOf({ reports: many }));
+    expect(root.querySelectorAll('[data-part~="report"]')).toHaveLength(8);
+    await press("Show more");
+    expect(root.querySelectorAll('[data-part~="report"]')).toHaveLength(20);
+  });
+
   test("can be changed into what happened instead", async () => {
     await show(stateOf({ reports }));
     await press("Change: Bo laid 2 × 9 + joker", item(1));

@@ -24,10 +24,14 @@ interface ReportsProps {
   onOutcome: (outcome: Outcome) => void;
 }
 
+/** Reports shown at first: older ones can rarely be corrected. */
+const SHOWN = 8;
+
 /** The list. */
 export function Reports({ state, table, report, onOutcome }: ReportsProps) {
   const words = t().attend.reports;
   const [changing, setChanging] = useState<AcceptedReport | undefined>(undefined);
+  const [all, setAll] = useState(false);
   /** The report whose removal was refused. */
   const [refused, setRefused] = useState<bigint | undefined>(undefined);
   const correct = async (number: bigint, instead: Happening | undefined): Promise<Outcome> => {
@@ -44,17 +48,19 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
     if (kind === "violation") setRefused(number);
     return kind === "accepted" || kind === "void";
   };
+  const reports = state.reports.toReversed();
   return (
     <section class={`${css.part} sheet`} data-part="reports" aria-labelledby="reports-title">
       <h2 id="reports-title" tabIndex={-1}>
         {words.title}
       </h2>
-      {state.reports.length === 0 && <p class="soft">{words.none}</p>}
+      {reports.length === 0 && <p class="soft">{words.none}</p>}
       <ol class={css.list} reversed>
-        {state.reports.toReversed().map((one) => {
+        {reports.slice(0, all ? undefined : SHOWN).map((one, index) => {
           const text = wordsOf(table, one);
+          // Passes that were confirmed with one answer have one number.
           return (
-            <li key={String(one.report)} class={css.report} data-part="report">
+            <li key={`${one.report} ${reports.length - index}`} class={css.report} data-part="report">
               <p>
                 {one.seat !== undefined && <SeatNumber seat={one.seat} />} {text}
               </p>
@@ -73,6 +79,11 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
           );
         })}
       </ol>
+      {!all && reports.length > SHOWN && (
+        <div>
+          <Button onClick={() => setAll(true)}>{t().common.showMore}</Button>
+        </div>
+      )}
       {changing && (
         <Change
           state={state}
