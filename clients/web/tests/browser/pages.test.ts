@@ -8,7 +8,7 @@ import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { byClicks, nextDecision, sitDown } from "./play";
-import { agent, clientsOf, gameOf, newRoom } from "./rooms";
+import { agent, clientsOf, gameOf, newPhysicalRoom, newRoom } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -23,6 +23,8 @@ let tournamentId: string;
 /** A tournament created by the device that has not started. */
 let ownId: string;
 let rooms: { table: string; waiting: string };
+/** A room with real cards, which the device attends to. */
+let physicalId: string;
 /** Join code of a room in which the device has no seat. */
 let code: string;
 
@@ -47,6 +49,10 @@ beforeAll(async () => {
   rooms = { table: table.roomId, waiting: waiting.roomId };
   code = (await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Monday" })).code;
   seated = (await person(browser)).page;
+  const physical = await newPhysicalRoom(server, ["Ada", "Bo", "Cleo"]);
+  physicalId = physical.roomId;
+  await seated.goto(`${server.url}/rooms/${physicalId}/table#ticket=${physical.tableTicket}`);
+  await seated.locator('[data-part~="entry"]').waitFor();
   await sitDown(seated, server, waiting.code, "Rosa");
   await sitDown(seated, server, table.code, "Rosa");
   await seated.goto(`${server.url}/tournaments/new`);
@@ -82,6 +88,12 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
     opened: '[data-part~="tool-lookup"]',
   },
   leaving: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: '[data-part~="tool-leave"]' },
+  "table with real cards": { path: () => `/rooms/${physicalId}/table`, ready: '[data-part~="entry"]' },
+  "entering a play": {
+    path: () => `/rooms/${physicalId}/table`,
+    ready: '[data-part~="entry"]',
+    opened: '[data-part~="choice"] button',
+  },
   watch: { path: () => `/watch/${rooms.table}`, ready: '[data-view="watched"]' },
   replay: {
     path: () => `/replay/${gameId}`,

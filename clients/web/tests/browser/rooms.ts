@@ -55,6 +55,19 @@ export async function newRoom(
   return { roomId: room.roomId, code: joinCode, ownerToken };
 }
 
+/** Creates a room whose cards are real, with people at the table and a built-in agent. */
+export async function newPhysicalRoom(server: Server, names: readonly string[]) {
+  const atTable = names.map((name) => ({ name, filledBy: { case: "atTable" as const, value: ParticipantKind.HUMAN } }));
+  const { room, tableTicket } = await clientsOf(server).rooms.createRoom({
+    name: "Kitchen table",
+    rules: { preset: "paper", players: names.length + 1 },
+    seats: [...atTable, { filledBy: filledBy("greedy") }],
+    physical: true,
+  });
+  if (!room) throw new Error("the server did not say which room it made");
+  return { roomId: room.roomId, tableTicket };
+}
+
 function secondShift(dealt: readonly (readonly number[])[], top: number) {
   const golden = dealt.findLastIndex((cards) => cards.includes(top));
   const hands = dealt.map((cards, seat) => ({ seat, cards: cards.toSorted((a, b) => a - b), golden: seat === golden }));

@@ -1,0 +1,155 @@
+// A table with real cards, against the real server: an attendant enters a short Shift by hand, with
+// a question of the referee, a violation and a correction; a remote player plays in a second
+// browser, and a tablet opens the attendant's link.
+
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { nextDecision, sitDown } from "./play";
+import { gameOf } from "./rooms";
+import { browser, person, server, until, useStage } from "./stage";
+
+useStage();
+
+/*
+ * Four faces and no jokers are ten cards, three for each. Ada has 2 3 4★, Bo has 3 4 4, Cleo, who is
+ * remote, has 1 2 3.
+ */
+const CLEOS_HAND = "1 2 3";
+
+/** Creates the room on the page and returns its id. */
+async function createTable(page: Page): Promise<string> {
+  await page.goto(`${server.url}/new`);
+  await page.getByLabel("Name of the room").fill("Kitchen table");
+  await page.getByLabel("Cards", { exact: true }).selectOption({ label: "Real cards on a table" });
+  await page.getByLabel("Players", { exact: true }).selectOption("3");
+  await page.getByLabel("Seat 1", { exact: true }).selectOption({ label: "A person at the table" });
+  await page.getByLabel("Seat 2", { exact: true }).selectOption({ label: "Remote: free for a person" });
+  await page.getByRole("button", { name: "Create the room" }).click();
+  await page.getByRole("alert").filter({ hasText: "Enter the name" }).first().waitFor();
+  await page.getByLabel("Name, seat 0").fill("Ada");
+  await page.getByLabel("Name, seat 1").fill("Bo");
+  // A refused form is unfolded, so that all its fields are there.
+  await page.getByLabel("The game ends").selectOption({ label: "after a number of Shifts" });
+  await page.getByLabel("Shifts", { exact: true }).fill("1");
+  await page.getByLabel("Faces", { exact: true }).fill("4");
+  await page.getByLabel("Jokers", { exact: true }).fill("0");
+  await page.getByRole("button", { name: "Create the room" }).click();
+  await page.waitForURL(/\/rooms\/\w+\/table$/);
+  return new URL(page.url()).pathname.split("/")[2] ?? "";
+}
+
+/** Waits for what the table waits for. */
+async function awaits(page: Page, words: string): Promise<void> {
+  await page.locator('[data-part~="awaited-heading"]').filter({ hasText: words }).waitFor();
+}
+
+/** Presses a button of the form for entering by hand. */
+async function enter(page: Page, ...names: readonly string[]): Promise<void> {
+  for (const name of names)
+    await page.locator('[data-part~="entry"]').getByRole("button", { name, exact: true }).click();
+}
+
+/** Plays one card of a face from the remote player's page, and lays it at the table. */
+async function playRemotely(cleo: Page, attendant: Page, face: number, before?: string): Promise<string | undefined> {
+  const id = await nextDecision(cleo, before);
+  await cleo.locator(`[data-part~="hand-card"][data-card="${face}"]`).click();
+  await cleo.getByRole("button", { name: `Play 1 × ${face}` }).click();
+  const item = attendant.locator('[data-part~="to-lay-item"]').filter({ hasText: "Lay for Cleo" });
+  await item.getByText(`1 × ${face}`).waitFor({ state: "attached" });
+  await item.getByRole("button").click();
+  await item.waitFor({ state: "detached" });
+  return id;
+}
+
+test("an attendant enters a Shift, with a question, a violation and a correction; Cleo plays remotely", async () => {
+  const { page: attendant, faults } = await person(browser);
+  const { page: cleo, faults: faultsOfCleo } = await person(browser);
+  const { page: tablet, faults: faultsOfTablet } = await person(browser, { viewport: { width: 390, height: 844 } });
+  const board = (words: string) => cleo.locator('[data-part~="board-words"]').filter({ hasText: words }).waitFor();
+
+  const roomId = await createTable(attendant);
+  await awaits(attendant, "Waiting for remote players");
+  const code = (await attendant.locator('[data-part~="invite-code"]').textContent()) ?? "";
+  const link = await attendant.locator('[data-part~="attendant-link"] [data-part~="invite-link"]').textContent();
+
+  // The tablet beside the table has its ticket from the link, and does not show it.
+  await tablet.goto(link ?? "");
+  await awaits(tablet, "Waiting for remote players");
+  expect(new URL(tablet.url()).hash).toBe("");
+
+  await sitDown(cleo, server, code, "Cleo");
+  await awaits(attendant, "Show the hand of Cleo");
+  await cleo.getByRole("heading", { name: "Your cards are on their way" }).waitFor();
+  await attendant.getByLabel("Cards", { exact: true }).fill(CLEOS_HAND);
+  await enter(attendant, "This is the hand of Cleo");
+  await until(async () => (await cleo.locator('[data-part~="hand-card"]').count()) === 3);
+
+  // Nobody said who opens: the referee asks, and the tablet answers.
+  await awaits(attendant, "The player with the Golden 4 opens the Shift");
+  await enter(attendant, "4, artichoke", "Report the play");
+  await awaits(tablet, "A question to you");
+  const question = tablet.locator('[data-part~="question-card"]');
+  await question.getByRole("heading", { name: "Who opened the Shift?" }).waitFor();
+  await question.getByRole("button", { name: "Ada" }).click();
+  await board("1 × 4, Golden · Ada");
+
+  // A violation, which everybody sees and which does not count.
+  await awaits(attendant, "Bo to play");
+  await enter(attendant, "4, artichoke, not allowed now", "Bo lays 1 × 4");
+  const violation = attendant.locator('[data-part~="violation"]');
+  await violation.filter({ hasText: "Bo: That pizza already shows 4s" }).waitFor();
+  await cleo.locator('[data-part~="table-banner"]').filter({ hasText: "That pizza already shows 4s" }).waitFor();
+  await board("1 × 4, Golden · Ada");
+
+  // The second attempt is misread, and corrected while Cleo decides.
+  await violation.getByRole("button", { name: "Enter what really lies there" }).click();
+  await enter(attendant, "2, shrimp", "Bo lays 1 × 2");
+  await violation.waitFor({ state: "detached" });
+  await board("1 × 2 · Bo");
+  const misread = await nextDecision(cleo);
+  expect(await cleo.locator('[data-part~="hand-card"][data-card="2"]').getAttribute("aria-disabled")).toBe("true");
+  await attendant.getByRole("button", { name: "Change: Bo laid 1 × 2" }).click();
+  const change = attendant.locator('[data-part~="change"]');
+  await change.getByRole("button", { name: "3, anchovy" }).click();
+  await change.getByRole("button", { name: "Bo lays 1 × 3" }).click();
+  await change.waitFor({ state: "detached" });
+  await board("1 × 3 · Bo");
+  await cleo.locator('[data-part~="log"]').getByText("Corrected:").waitFor();
+
+  // A pause, seen by the remote player.
+  await attendant.getByRole("button", { name: "Pause" }).click();
+  await cleo.getByText("The game is paused at the table.").waitFor();
+  await attendant.getByRole("button", { name: "Continue" }).click();
+  await cleo.getByText("The game is paused at the table.").waitFor({ state: "detached" });
+
+  let decision = await playRemotely(cleo, attendant, 2, misread);
+  await awaits(attendant, "Ada to play");
+  await enter(attendant, "Ada passes");
+  await awaits(attendant, "Bo to play");
+  await enter(attendant, "Bo passes");
+  await awaits(attendant, "Cleo is deciding");
+  decision = await playRemotely(cleo, attendant, 3, decision);
+  await awaits(attendant, "Ada to play");
+  await enter(attendant, "2, shrimp", "Ada lays 1 × 2");
+  await awaits(attendant, "Bo to play");
+  await enter(attendant, "Bo passes");
+  await playRemotely(cleo, attendant, 1, decision);
+  await awaits(attendant, "Ada to play");
+  await enter(attendant, "Ada passes");
+  await awaits(attendant, "Ada to play");
+  await until(
+    async () => (await attendant.locator('[data-part~="board-words"]').textContent()) === "The board is empty",
+  );
+  await enter(attendant, "3, anchovy", "Ada lays 1 × 3");
+
+  await awaits(attendant, "The game is over");
+  await awaits(tablet, "The game is over");
+  await cleo.getByRole("heading", { name: "You won!" }).waitFor();
+
+  // The record replays with the hands that were never known.
+  await attendant.goto(`${server.url}/replay/${await gameOf(server, roomId)}`);
+  const slider = attendant.locator('[data-part~="replay-slider"] input');
+  await slider.fill((await slider.getAttribute("max")) ?? "");
+  await attendant.getByRole("heading", { name: "Cleo won" }).waitFor();
+  expect([...faults, ...faultsOfCleo, ...faultsOfTablet]).toEqual([]);
+});
