@@ -15,6 +15,8 @@ from chefshat._gen.chefshat.v1.room_service_pb2 import *
 from chefshat._gen.chefshat.v1.rules_pb2 import *
 from chefshat._gen.chefshat.v1.server_service_pb2 import *
 from chefshat._gen.chefshat.v1.spectator_service_pb2 import *
+from chefshat._gen.chefshat.v1.table_pb2 import *
+from chefshat._gen.chefshat.v1.table_service_pb2 import *
 from chefshat._gen.chefshat.v1.tournament_pb2 import *
 from chefshat._gen.chefshat.v1.tournament_service_pb2 import *
 from chefshat._gen.chefshat.v1.vector_service_pb2 import *

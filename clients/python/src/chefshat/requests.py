@@ -96,6 +96,7 @@ def create_room(
     branch: pb.BranchPoint | None,
     hands: pb.ScriptedShift | None,
     durability: pb.Durability.ValueType | None,
+    physical: bool,
 ) -> pb.CreateRoomRequest:
     """Builds the request to create a room."""
     if branch is not None and hands is not None:
@@ -110,7 +111,14 @@ def create_room(
         policy = asked
     configs = [seat_config(seat) for seat in seats]
     return pb.CreateRoomRequest(
-        name=name, rules=rules, seats=configs, policy=policy, game_seed=game_seed, branch=branch, scripted=hands
+        name=name,
+        rules=rules,
+        seats=configs,
+        policy=policy,
+        game_seed=game_seed,
+        branch=branch,
+        scripted=hands,
+        physical=physical,
     )
 
 
@@ -183,6 +191,9 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
 
 def _pauses(request: object) -> Iterator[float]:
     """Returns the pauses in seconds between the attempts of a call, and gives a request that can be repeated its id."""
+    if isinstance(request, pb.ReportRequest):
+        request.report_id = request.report_id or secrets.token_hex(REQUEST_ID_BYTES)
+        return iter(PAUSES_S)
     if not isinstance(request, REPEATABLE):
         return iter(())
     if not request.request_id:

@@ -18,6 +18,7 @@ from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
 from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
+from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
 from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
@@ -52,6 +53,7 @@ class AsyncCalls(ABC):
         self._server = ServerServiceStub(self._channel)
         self._records = RecordServiceStub(self._channel)
         self._spectators = SpectatorServiceStub(self._channel)
+        self._table = TableServiceStub(self._channel)
         self._tournaments = TournamentServiceStub(self._channel)
 
     async def __aenter__(self) -> Self:
@@ -75,6 +77,7 @@ class AsyncCalls(ABC):
         branch: pb.BranchPoint | None = None,
         hands: pb.ScriptedShift | None = None,
         durability: pb.Durability.ValueType | None = None,
+        physical: bool = False,
     ) -> pb.CreateRoomResponse:
         """Creates a room.
 
@@ -87,11 +90,12 @@ class AsyncCalls(ABC):
             branch: the point of a recorded game to continue from, under the rules of that game (leave out `rules`).
             hands: the hands of the first Shift, instead of a deal.
             durability: what the game survives, overriding the policy; default: a restart of the server.
+            physical: the cards are real: nothing is dealt, and what happens at the table is reported (`report`).
 
         Returns:
-            The room, its join code, and the token that closes it.
+            The room, its join code, the token that closes it and, if it is physical, the ticket of its table.
         """
-        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
+        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability, physical)
         return await awaited(self._rooms.CreateRoom, request)
 
     async def join_room(
@@ -172,6 +176,46 @@ class AsyncCalls(ABC):
                 await self._wait(failures, from_rpc_error(error))
             finally:
                 call.cancel()
+
+    async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        """Reports something that happened at a physical table.
+
+        Args:
+            table_ticket: the ticket of the table, from `create_room`.
+            report: what happened.
+            report_id: identifies the report, 1..=64 characters, so that it can be repeated safely; empty: a random one.
+
+        Returns:
+            The verdict of the referee, and the state of the table afterwards. A report that the rules or the cards do not allow is
+            no error: see `verdict` and `detail`.
+        """
+        request = pb.ReportRequest(table_ticket=table_ticket, report_id=report_id, report=report)
+        return await awaited(self._table.Report, request)
+
+    async def watch_table(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
+        """Iterates over the state of a physical table: now, and after every change, until its game is over. Reconnects.
+
+        Args:
+            table_ticket: the ticket of the table, from `create_room`.
+        """
+        failures = 0
+        while True:
+            call = self._table.Watch(pb.TableServiceWatchRequest(table_ticket=table_ticket))
+            error = connection_lost("the server ended the stream before the game was over")
+            try:
+                async for response in call:
+                    failures = 0
+                    if not response.HasField("state"):
+                        continue  # A heartbeat.
+                    yield response.state
+                    if response.state.stage == pb.TABLE_STAGE_OVER:
+                        return
+            except grpc.RpcError as failure:
+                error = from_rpc_error(failure)
+            finally:
+                call.cancel()
+            failures += 1
+            await self._wait(failures, error)
 
     async def create_tournament(self, settings: pb.TournamentSettings) -> pb.CreateTournamentResponse:
         """Creates a tournament.

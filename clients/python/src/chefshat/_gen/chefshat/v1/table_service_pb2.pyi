@@ -507,9 +507,9 @@ Global___RoleTaken: _TypeAlias = RoleTaken  # noqa: Y015
 @_typing.final
 class ReportCorrection(_message.Message):
     """An earlier report was wrong: misread, or something that was not a play. Possible for hands and
-    gifts of the Shift in progress, and for plays and passes of the pizza in progress or of the last
-    one while nobody has acted since. Everything after it is replayed; what then no longer fits is
-    void.
+    gifts of the Shift in progress, and for plays and passes of the pizza in progress and of the one
+    before; after the end of a Shift, until something of the next is reported. Everything after it is
+    judged again; what then no longer fits is void.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
