@@ -9,8 +9,10 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from chefshat import RandomAgent, aio, pb
 
 from chefshat_robot import drivers
+from chefshat_robot.body import Notice
 from chefshat_robot.drivers.driver import (
     Act,
     Affect,
@@ -29,7 +31,9 @@ from chefshat_robot.drivers.driver import (
     attempt,
 )
 from chefshat_robot.drivers.jsonlines import JsonLinesDriver
+from chefshat_robot.robot import play_seat
 from chefshat_robot.table import TableState, follow
+from chefshat_robot.words import Words
 from tests.loop import run, until
 from tests.robots import game_started, numbered, shift_started
 
@@ -204,3 +208,44 @@ def test_events_and_states_of_the_game_are_shown() -> None:
         assert (shown["type"], shown["seat"], shown["hand"][10], shown["golden"]) == ("state", 1, 5, True)
 
     run(test())
+
+
+@pytest.mark.server
+def test_a_game_with_a_robot_that_leaves_in_the_middle_and_comes_back(server_address: str) -> None:
+    notices: list[Notice] = []
+
+    async def serve(peer: Robot, leave_after: int) -> None:
+        """Does every act, but hangs up instead of one of them."""
+        number = 0
+        while True:
+            number += 1
+            identity = await peer.act(number)
+            if number == leave_after:
+                peer.hang_up()
+            else:
+                peer.send(json.dumps({"type": "done", "id": identity}))
+
+    async def test() -> list[dict[str, Any]]:
+        async with robot() as peer, aio.Client(server_address) as client:
+            serving = asyncio.create_task(serve(peer, leave_after=6))
+            made = await client.create_room("lines", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=1))
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            driver = JsonLinesDriver(port=peer.port)
+            result = await play_seat(client, seat.ticket, RandomAgent(7), driver, words=Words("en"), notify=notices.append)
+            assert result.finished
+            assert (result.late, result.invalid) == (0, 0)
+            serving.cancel()
+            assert peer.connections == 2
+            return peer.got
+
+    lines = run(test())
+    acts = [line for line in lines if line["type"] == "act"]
+    lost = acts[5]
+    assert [notice.reason for notice in notices if notice.kind in ("help", "unsaid")] == (
+        ["the robot has closed its socket"] if lost["act"] in ("pick", "say") else []
+    )
+    # It heard of every event until it left, and again from when it was back.
+    sequences = [line["sequence"] for line in lines if line["type"] == "event"]
+    assert sequences == sorted(set(sequences))
+    assert sequences[0] == 1
+    assert [line["kind"] for line in lines if line["type"] == "event"][-1] == "game_ended"

@@ -9,8 +9,9 @@ import pytest
 from chefshat import RandomAgent, aio, pb
 
 from chefshat_robot import cli, drivers, layout, speech
-from chefshat_robot.body import Notice, Turn
+from chefshat_robot.body import Body, Notice, Turn
 from chefshat_robot.drivers.driver import Done, Failed, Pick, Say
+from chefshat_robot.player import RobotPlayer
 from chefshat_robot.robot import play_seat
 from chefshat_robot.words import TEXTS, Words
 from tests.loop import run
@@ -70,6 +71,31 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
     asked = [text for line in record if (text := speech.text_of(line.event.expression_shown.expression))]
     assert bool(asked) == jammed
     assert asked == [notice.text for notice in notices][: len(asked)]
+
+
+@pytest.mark.server
+def test_a_robot_that_never_answers_costs_no_decision(server_address: str) -> None:
+    robot = ScriptedRobot(lambda act: None)
+
+    async def test() -> list[pb.RecordLine]:
+        async with aio.Client(server_address) as client:
+            # The bank is only for a slow machine: the player does not use it.
+            policy = pb.RoomPolicy(decision_time_ms=1200, bank_ms=3_600_000)
+            made = await client.create_room("deaf", seats=[None, "greedy", "greedy", "greedy"], rules=ONE_SHIFT, policy=policy)
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            async with Body(robot, Words("en"), finish_s=0) as body:
+                result = await client.play(RobotPlayer(RandomAgent(7), body), seat.ticket)
+            assert result.finished
+            assert (result.late, result.invalid) == (0, 0)
+            return [line async for line in client.record(result.game_id)]
+
+    record = run(test())
+    turns = [line.event.play for line in record if line.event.HasField("play") and line.event.play.seat == 0]
+    turns += [
+        getattr(line.event, "pass") for line in record if line.event.HasField("pass") and getattr(line.event, "pass").seat == 0
+    ]
+    assert turns
+    assert {turn.source for turn in turns} == {pb.DECISION_SOURCE_AGENT}
 
 
 @pytest.mark.server

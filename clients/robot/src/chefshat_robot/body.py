@@ -184,6 +184,8 @@ class Body:
         self._worker: asyncio.Task[None] | None = None
         self._forwarder: asyncio.Task[None] | None = None
         self._forward_work = asyncio.Event()
+        self._all_forwarded = asyncio.Event()
+        self._all_forwarded.set()
 
     async def __aenter__(self) -> Self:
         await self.driver.__aenter__()
@@ -194,7 +196,9 @@ class Body:
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if error is None:
             try:
-                await asyncio.wait_for(self._idle.wait(), self._finish_s)
+                async with asyncio.timeout(self._finish_s):
+                    await self._idle.wait()
+                    await self._all_forwarded.wait()
             except TimeoutError:
                 LOG.warning("the robot did not finish its last acts within %g s", self._finish_s)
         for task in (self._worker, self._forwarder):
@@ -254,8 +258,9 @@ class Body:
         self._need(_Job((Express(label, valence, arousal),)))
 
     async def idle(self) -> None:
-        """Waits until nothing is left to perform."""
+        """Waits until nothing is left to perform and to show."""
         await self._idle.wait()
+        await self._all_forwarded.wait()
 
     def on_event(self, event: pb.GameEvent) -> None:
         """Follows the game, and queues what the robot does about it. Call it for every event, in order."""
@@ -265,6 +270,7 @@ class Body:
         if self._handles_cards:
             self._follow_cards(event, after, live)
         self._forwards.append((event, after))
+        self._all_forwarded.clear()
         self._forward_work.set()
         if not live:
             return
@@ -490,6 +496,8 @@ class Body:
     async def _forward(self) -> None:
         """Shows events and states to the driver, independently of acts."""
         while True:
+            if not self._forwards:
+                self._all_forwarded.set()
             await self._forward_work.wait()
             self._forward_work.clear()
             while self._forwards:

@@ -198,7 +198,8 @@ def _seats(scene: Scene) -> Iterator[str]:
         role = _role(state, seat)
         label = f"{name[:18]}{points}"
         half = max(len(label) * 6.6 + 18, 46)
-        y = face.y + (80 if seat != state.seat else 84)
+        at_side = abs(face.x - field.WIDTH / 2) > field.WIDTH / 2
+        y = face.y + (112 if at_side and seat == state.seat else 84)
         yield f'<rect x="{face.x - half:g}" y="{y - 20:g}" width="{2 * half:g}" height="32" rx="16" fill="{colour}"/>'
         yield f'<text class="bold pale" x="{face.x:g}" y="{y + 3:g}" font-size="20">{escape(label)}</text>'
         if role:
@@ -305,7 +306,7 @@ def _speech(scene: Scene) -> Iterator[str]:
     width = max(max(map(len, lines)) * 13.2 + 56, 150)
     height = len(lines) * 33 + 34
     left, top, view_width, view_height = VIEW
-    side = -1 if head.x > field.WIDTH / 2 else 1
+    side = -1 if head.y < field.HEIGHT / 2 else 1
     x = min(max(head.x + side * (width / 2 + 110), left + width / 2 + 16), left + view_width - width / 2 - 16)
     y = min(
         max(head.y - 60 if head.y > field.HEIGHT / 2 else head.y + 20, top + height / 2 + 16), top + view_height - height / 2 - 16

@@ -1,0 +1,55 @@
+"""The samples in the README run, and what it names exists."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from chefshat_robot import cli, drivers
+from chefshat_robot.drivers import Done, Express, Failed, Gaze, Say, driver
+from tests.loop import run
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_sample_of_a_driver_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    (sample,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    (tmp_path / "my_module.py").write_text(sample, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "my_module", raising=False)
+
+    async def test() -> None:
+        async with drivers.create("my_module.Lamp:port=9") as lamp:
+            acts = (Say("I pass."), Express("joy"), Gaze(0.0, 0.0))
+            outcomes = [await driver.attempt(lamp, act, 60) for act in acts]
+        assert outcomes == [Done(), Done(), Failed("a lamp has no arms and no eyes")]
+
+    run(test())
+    assert capsys.readouterr().out.splitlines() == [
+        "connected to port 9",
+        "blinks for 'I pass.'",
+        "turns to the colour of joy",
+        "off",
+    ]
+
+
+def test_every_command_and_every_driver_is_described() -> None:
+    for name in cli.COMMANDS:
+        assert f"chefshat-robot {name}" in README
+    for name in drivers.DRIVERS:
+        assert f"| `{name}` |" in README
+
+
+def test_commands_parse() -> None:
+    """Every command in the README has options that exist."""
+    lines = [line.partition(" #")[0].split() for line in README.splitlines() if line.startswith("chefshat-robot ")]
+    assert lines
+    for _, name, *arguments in lines:
+        parser = argparse.ArgumentParser()
+        command = cli._import(cli.COMMANDS[name])
+        command.add_arguments(parser)
+        parser.parse_args(arguments)
