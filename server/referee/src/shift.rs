@@ -307,7 +307,7 @@ pub(crate) fn cards_of(rules: &RuleSet, counts: &[u8; JOKER + 1], golden: bool) 
 }
 
 /// The single gifts of a gift.
-fn gifts_of(cards: Cards, rules: &RuleSet) -> impl Iterator<Item = Action> + use<> {
+pub(crate) fn gifts_of(cards: Cards, rules: &RuleSet) -> impl Iterator<Item = Action> + use<> {
     let counts = counts_of(cards, rules.faces());
     let jokers = usize::from(cards.jokers());
     (1..=rules.faces())

@@ -173,10 +173,12 @@ impl Core {
         let taken = (decided.source, decided.time_us);
         match ruling {
             // What the table reported before and had to wait follows the decision.
-            Some(ruling) => self.fold_ruling(at, ruling, |seat| match seat == decided.seat {
-                true => taken,
-                false => (Source::Table, 0),
-            }),
+            Some(ruling) => {
+                self.fold_ruling(at, number, ruling, |seat| match seat == decided.seat {
+                    true => taken,
+                    false => (Source::Table, 0),
+                })
+            }
             None => self.log_events(at, decided.source, decided.time_us),
         }
         self.decisions += 1;

@@ -57,6 +57,8 @@ pub enum RoomEvent {
 /// A hand that became known.
 #[derive(Debug, Clone)]
 pub struct HandReported {
+    /// Number of the report.
+    pub report: u64,
     /// The seat.
     pub seat: Seat,
     /// Its cards.
@@ -70,6 +72,8 @@ pub struct HandReported {
 pub struct Correction {
     /// Number of the corrected report.
     pub report: u64,
+    /// Numbers of later reports that no longer fit.
+    pub void_reports: Vec<u64>,
     /// Number of the first void event of the game; 0 if there is none.
     pub first_void: u64,
     /// For people.

@@ -274,7 +274,7 @@ impl Core {
         let is_paused = table.referee.paused();
         let time_us = table.made(number).map_or(0, |made| made.time_us);
         let changes_game = ruling.corrected.is_some() || !ruling.events.is_empty();
-        self.fold_ruling(at, ruling, |_| (Source::Table, time_us));
+        self.fold_ruling(at, number, ruling, |_| (Source::Table, time_us));
         if is_paused != was_paused {
             self.fold_pause(at, is_paused);
         }
@@ -289,15 +289,17 @@ impl Core {
         }
     }
 
-    /// Moves what follows from a report or decision to the log. `by`: source and time of a seat's
+    /// Moves what follows from the report or decision `number` to the log. `by`: source and time of a seat's
     /// decision.
     pub(super) fn fold_ruling(
         &mut self,
         at: Duration,
+        number: u64,
         ruling: Ruling,
         by: impl Fn(Seat) -> (Source, u64),
     ) {
         let mut void = Vec::new();
+        let report = (ruling.corrected.as_ref()).map_or(number, |corrected| corrected.number);
         if let (Some(corrected), Some(RoomGame::Physical(table))) =
             (ruling.corrected, &mut self.game)
         {
@@ -305,7 +307,8 @@ impl Core {
             (first, void) = table.void(&corrected);
             let first = first.and_then(|position| u64::try_from(position + 1).ok());
             let correction = Correction {
-                report: corrected.number,
+                report,
+                void_reports: corrected.void_reports,
                 first_void: first.unwrap_or(0),
                 text: corrected.text,
             };
@@ -313,7 +316,12 @@ impl Core {
                 .push(at, RoomEvent::Correction(Box::new(correction)));
         }
         if let Some((seat, cards, dealt)) = ruling.hand {
-            let hand = HandReported { seat, cards, dealt };
+            let hand = HandReported {
+                report,
+                seat,
+                cards,
+                dealt,
+            };
             self.log.push(at, RoomEvent::HandReported(Box::new(hand)));
         }
         self.log_physical(at, ruling.events, void, by);

@@ -5,6 +5,7 @@ mod decision;
 mod event;
 mod kind;
 mod name;
+mod physical_record;
 mod players;
 mod policy;
 mod ratings;

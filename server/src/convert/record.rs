@@ -11,6 +11,7 @@ use prost::Message as _;
 
 use super::decision::{mask_bytes, source_to_proto};
 use super::event::{event_to_proto, standings};
+use super::physical_record::{decisions_at_table, physical_record_lines};
 use super::policy::policy_of;
 use super::room::{
     aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
@@ -23,6 +24,9 @@ use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
 
 /// All lines of the record of a game, from its header and its journal.
 pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {
+    if header.is_physical() {
+        return physical_record_lines(header, journal);
+    }
     let mut core = Core::new(Arc::clone(header));
     let mut body = Vec::with_capacity(journal.len() * 2);
     let mut attempts: Vec<u32> = Vec::new();
@@ -66,7 +70,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         .collect()
 }
 
-fn record_header(core: &Core) -> v1::RecordHeader {
+pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
     let header = core.header();
     v1::RecordHeader {
         format_version: FORMAT_VERSION,
@@ -106,7 +110,10 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         seats: participants(core),
         standings: standings(core),
         shifts: core.game().map_or(0, |game| game.shift()),
-        decisions: core.decisions(),
+        decisions: match core.table() {
+            Some(table) => decisions_at_table(table),
+            None => core.decisions(),
+        },
         added: false,
         abort_reason: aborted_because(core.state()).into(),
         tournament_id: tournament_id(header),
@@ -152,6 +159,6 @@ fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> 
     }
 }
 
-fn elapsed_ms(entry: &Entry) -> u64 {
+pub(super) fn elapsed_ms(entry: &Entry) -> u64 {
     u64::try_from(entry.at.as_millis()).unwrap_or(u64::MAX)
 }

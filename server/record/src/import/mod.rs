@@ -1,20 +1,23 @@
-//! Import of games played with real cards: a transcript becomes a record.
+//! Records of games played with real cards, from a transcript ([`import`]) or from a physical room
+//! ([`PhysicalRoom`]).
 //!
-//! A transcript ([`transcript`]) states part of a game. The cards it does not state are completed
+//! A transcript ([`transcript`]) or a room states part of a game. The cards it does not state are completed
 //! ([`PhysicalGame`]) so that the rule engine can play each Shift; the first row that no game can
 //! contain is reported. The record contains only what was stated or follows from it.
 
 mod facts;
 mod notation;
 mod notes;
+mod room;
 mod start;
 mod transcript;
 
 use chefshat_engine::{
-    Action, ActionSpace, BySeat, DecisionKind, Event, Game, RULES_VERSION, Role, Seat,
+    Action, ActionSpace, BySeat, DecisionKind, Event, Game, RULES_VERSION, RewardScheme, Role,
+    RuleSet, Seat,
 };
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_referee::{PhysicalGame, StartState};
+use chefshat_referee::{PhysicalGame, ShiftFacts, StartState};
 use sha2::{Digest as _, Sha256};
 
 use crate::convert::{
@@ -26,6 +29,7 @@ use crate::replay::{game_started, replay};
 pub(crate) use facts::facts_of_record;
 use facts::facts_of_transcript;
 use notes::RuledShifts;
+pub use room::{PhysicalRoom, RoomEntry};
 pub(crate) use start::start_of_header;
 use start::start_of_transcript;
 use transcript::{Entry, Row, Transcript, read, wrong};
@@ -46,7 +50,8 @@ pub fn import(bytes: &[u8]) -> Result<Vec<v1::RecordLine>, TranscriptError> {
         .finalize()
         .into();
     let last_line = transcript.last_line;
-    let lines = Importer::new(transcript, &hex::encode(&hash[..16]))?.run()?;
+    let lines =
+        Importer::of_transcript(&transcript, &hex::encode(&hash[..16]))?.run(&transcript)?;
     // Readers of the record see its lines alone.
     match replay(&lines) {
         Ok(_) => Ok(lines),
@@ -58,31 +63,69 @@ pub fn import(bytes: &[u8]) -> Result<Vec<v1::RecordLine>, TranscriptError> {
 }
 
 struct Importer {
-    transcript: Transcript,
+    rules: RuleSet,
+    scheme: Option<RewardScheme>,
     header: v1::RecordHeader,
     start: StartState,
-    imported: PhysicalGame,
+    physical: PhysicalGame,
     game: Option<Game>,
     lines: Vec<v1::RecordLine>,
     events: u64,
     decisions: BySeat<u64>,
     elapsed_ms: u64,
-    /// Chosen gifts the engine has not asked for yet, each with its decision time.
-    gifts: Vec<(Seat, Action, u64)>,
+    /// Chosen gifts the engine has not asked for yet.
+    gifts: Vec<Stated>,
     attempts: Vec<(Seat, u32)>,
     ruled: RuledShifts,
 }
 
+/// A stated decision.
+#[derive(Debug)]
+struct Stated {
+    seat: Seat,
+    action: Action,
+    /// Its line of the record, without what follows from the game.
+    record: v1::DecisionRecord,
+}
+
+impl Stated {
+    /// A decision of a transcript.
+    fn of_row(row: &Row, action: Action) -> Self {
+        Self {
+            seat: row.seat,
+            action,
+            record: v1::DecisionRecord {
+                source: v1::DecisionSource::Agent.into(),
+                decision_time_us: row.took_us,
+                ..v1::DecisionRecord::default()
+            },
+        }
+    }
+}
+
 impl Importer {
-    fn new(transcript: Transcript, game_id: &str) -> Result<Self, TranscriptError> {
-        let rules = transcript.rules;
-        let shifts = facts_of_transcript(&transcript)?;
-        let start = start_of_transcript(&transcript)?;
-        let header = header(&transcript, &start, game_id);
-        Ok(Self {
-            imported: PhysicalGame::new(rules, shifts),
+    fn of_transcript(transcript: &Transcript, game_id: &str) -> Result<Self, TranscriptError> {
+        let start = start_of_transcript(transcript)?;
+        let header = header(transcript, &start, game_id);
+        let shifts = facts_of_transcript(transcript)?;
+        Ok(Self::new(transcript.rules, header, start, shifts))
+    }
+
+    fn new(
+        rules: RuleSet,
+        header: v1::RecordHeader,
+        start: StartState,
+        shifts: Vec<ShiftFacts>,
+    ) -> Self {
+        let policy = header.policy.as_ref();
+        let scheme = policy.map_or(v1::RewardScheme::Unspecified, |policy| {
+            policy.reward_scheme()
+        });
+        Self {
+            rules,
+            scheme: reward_scheme_from_proto(scheme),
+            physical: PhysicalGame::new(rules, shifts),
             decisions: BySeat::filled(rules.players(), 0),
-            transcript,
             header,
             start,
             game: None,
@@ -92,10 +135,10 @@ impl Importer {
             gifts: Vec::new(),
             attempts: Vec::new(),
             ruled: RuledShifts::default(),
-        })
+        }
     }
 
-    fn run(mut self) -> Result<Vec<v1::RecordLine>, TranscriptError> {
+    fn run(mut self, transcript: &Transcript) -> Result<Vec<v1::RecordLine>, TranscriptError> {
         self.push(Line::Header(self.header.clone()));
         for seat in self.header.seats.clone() {
             self.room_event(Kind::Seated(Box::new(v1::Seated {
@@ -104,36 +147,43 @@ impl Importer {
                 kind: seat.kind,
             })));
         }
-        self.room_event(Kind::GameStarted(Box::new(game_started(
-            &self.header,
-            &self.transcript.rules,
-        ))));
-        let rows = std::mem::take(&mut self.transcript.rows);
-        let first_line = rows
-            .first()
-            .map_or(self.transcript.last_line, |row| row.line);
-        let mut events = Vec::new();
-        self.game = self
-            .imported
-            .start(&self.start, &mut events)
-            .map_err(|error| wrong(first_line, error.to_string()))?;
-        self.push_events(&events, 0);
-        for row in &rows {
+        let rows = &transcript.rows;
+        let first_line = rows.first().map_or(transcript.last_line, |row| row.line);
+        self.begin().map_err(|problem| wrong(first_line, problem))?;
+        for row in rows {
             self.row(row)?;
         }
         if let Some((seat, _)) = self.attempts.first() {
             return Err(wrong(
-                self.transcript.last_line,
+                transcript.last_line,
                 format!("seat {seat} tried a play, but its turn is missing"),
             ));
         }
-        self.end();
+        // A transcript that breaks off has no result.
+        self.end(v1::AbortReason::Closed);
         Ok(self.lines)
+    }
+
+    /// Starts the game.
+    fn begin(&mut self) -> Result<(), String> {
+        let started = game_started(&self.header, &self.rules);
+        self.room_event(Kind::GameStarted(Box::new(started)));
+        let mut events = Vec::new();
+        self.game = self
+            .physical
+            .start(&self.start, &mut events)
+            .map_err(|error| error.to_string())?;
+        let by = By {
+            source: v1::DecisionSource::Agent,
+            decision_time_us: 0,
+        };
+        self.push_events(&events, by);
+        Ok(())
     }
 
     fn row(&mut self, row: &Row) -> Result<(), TranscriptError> {
         let at = |problem: String| wrong(row.line, problem);
-        if let Some(problem) = self.imported.contradiction(row.line) {
+        if let Some(problem) = self.physical.contradiction(row.line) {
             return Err(at(problem.to_owned()));
         }
         if let Some(ms) = row.at_ms {
@@ -152,10 +202,10 @@ impl Importer {
                 self.check_shift(row)?;
                 // Forced gifts are not decisions.
                 if self.is_chooser(row.seat) {
-                    let moves = moves.iter().map(|gift| (row.seat, *gift, row.took_us));
+                    let moves = moves.iter().map(|gift| Stated::of_row(row, *gift));
                     self.gifts.extend(moves);
                 }
-                self.apply_gifts(row.line)
+                self.apply_gifts().map_err(at)
             }
             Entry::Special(declared) => {
                 self.check_shift(row)?;
@@ -164,8 +214,9 @@ impl Importer {
                 } else {
                     Action::Decline
                 };
-                self.apply_decision(row.line, row.seat, decision, row.took_us)?;
-                self.apply_gifts(row.line)
+                self.apply_decision(Stated::of_row(row, decision))
+                    .map_err(at)?;
+                self.apply_gifts().map_err(at)
             }
             Entry::Tries(attempt) => {
                 let action = self.space().encode(*attempt);
@@ -176,7 +227,7 @@ impl Importer {
             }
             Entry::Turn(turn) => {
                 self.check_shift(row)?;
-                self.apply_decision(row.line, row.seat, *turn, row.took_us)
+                self.apply_decision(Stated::of_row(row, *turn)).map_err(at)
             }
             Entry::Role(_) | Entry::Points(_) | Entry::Finishes(_) => {
                 self.ruled.check(row, game).map_err(at)
@@ -193,47 +244,41 @@ impl Importer {
     }
 
     /// Applies the stated gifts the engine asks for now.
-    fn apply_gifts(&mut self, line: usize) -> Result<(), TranscriptError> {
+    fn apply_gifts(&mut self) -> Result<(), String> {
         loop {
             let open = self.game.as_ref().and_then(Game::decision);
-            let next = self.gifts.iter().position(|(seat, ..)| {
-                open.is_some_and(|open| open.kind == DecisionKind::Exchange && open.seat == *seat)
+            let next = self.gifts.iter().position(|gift| {
+                open.is_some_and(|open| {
+                    open.kind == DecisionKind::Exchange && open.seat == gift.seat
+                })
             });
             let Some(next) = next else { return Ok(()) };
-            let (seat, gift, took_us) = self.gifts.remove(next);
-            self.apply_decision(line, seat, gift, took_us)?;
+            let gift = self.gifts.remove(next);
+            self.apply_decision(gift)?;
         }
     }
 
     /// Applies a stated decision and pushes its lines.
-    fn apply_decision(
-        &mut self,
-        line: usize,
-        seat: Seat,
-        decision: Action,
-        took_us: u64,
-    ) -> Result<(), TranscriptError> {
-        let at = |problem: String| wrong(line, problem);
+    fn apply_decision(&mut self, stated: Stated) -> Result<(), String> {
+        let seat = stated.seat;
         let Some(game) = self.game.as_mut() else {
-            return Err(at("the game has not started".into()));
+            return Err("the game has not started".into());
         };
-        let known = self.imported.hands_known(game);
+        let known = self.physical.hands_known(game);
         let open = game
             .decision()
-            .filter(|_| self.imported.is_open())
-            .ok_or_else(|| {
-                at("by the rules, the Shift or the game ended before this line".into())
-            })?;
+            .filter(|_| self.physical.is_open())
+            .ok_or("by the rules, the Shift or the game ended before this line")?;
         if open.seat != seat {
-            return Err(at(format!(
+            return Err(format!(
                 "it is seat {}'s decision, not seat {seat}'s",
                 open.seat
-            )));
+            ));
         }
-        let space = self.transcript.rules.actions();
+        let space = self.rules.actions();
         let action = space
-            .encode(decision)
-            .ok_or_else(|| at("no deck has that many cards of one face".into()))?;
+            .encode(stated.action)
+            .ok_or("no deck has that many cards of one face")?;
         let legal = game.legal_actions();
         let (attempts, others) = self.attempts.iter().partition(|(tried, _)| *tried == seat);
         let attempts: Vec<(Seat, u32)> = attempts;
@@ -243,53 +288,52 @@ impl Importer {
             .find(|(_, tried)| known[seat] && legal.contains(action_id(*tried)))
         {
             let text = space.text(action_id(*tried)).unwrap_or_default();
-            return Err(at(format!(
+            return Err(format!(
                 "seat {seat} tried {text} before, but that was legal"
-            )));
+            ));
         }
         let mut events = Vec::new();
         game.apply(action, |event| events.push(event))
-            .map_err(|error| at(error.to_string()))?;
+            .map_err(|error| error.to_string())?;
         self.decisions[seat] += 1;
-        let scheme = reward_scheme_from_proto(self.transcript.scheme);
+        let mut record = stated.record;
+        let attempts = attempts.into_iter().map(|(_, tried)| tried);
+        record.invalid_attempts.extend(attempts);
+        let attempts = record.invalid_attempts.len();
         let record = v1::DecisionRecord {
             seat: seat_number(seat),
             decision_id: self.decisions[seat],
             kind: decision_kind(open.kind).into(),
             action: action.index().into(),
             text: space.text(action).unwrap_or_default(),
-            source: v1::DecisionSource::Agent.into(),
-            decision_time_us: took_us,
-            invalid_reward: invalid_reward(scheme, open.kind, attempts.len()),
-            invalid_attempts: attempts.into_iter().map(|(_, tried)| tried).collect(),
+            invalid_reward: invalid_reward(self.scheme, open.kind, attempts),
             action_mask: if known[seat] {
                 legal.to_bytes(space.size())
             } else {
                 Vec::new()
             },
             elapsed_ms: self.elapsed_ms,
-            ..v1::DecisionRecord::default()
+            ..record
         };
-        self.imported.count_decision(seat, open.kind);
-        self.imported
+        self.physical.count_decision(seat, open.kind);
+        self.physical
             .advance(game, &mut events)
-            .map_err(|error| at(error.to_string()))?;
+            .map_err(|error| error.to_string())?;
+        let by = By {
+            source: record.source(),
+            decision_time_us: record.decision_time_us,
+        };
         self.push(Line::Decision(record));
-        self.push_events(&events, took_us);
+        self.push_events(&events, by);
         Ok(())
     }
 
     /// Pushes the events of a decision with their rewards.
-    fn push_events(&mut self, events: &[Event], took_us: u64) {
-        let (rules, space) = (self.transcript.rules, self.space());
-        let by = By {
-            source: v1::DecisionSource::Agent,
-            decision_time_us: took_us,
-        };
-        let scheme = reward_scheme_from_proto(self.transcript.scheme);
-        for (event, rewards) in with_rewards(events, &rules, scheme) {
+    fn push_events(&mut self, events: &[Event], by: By) {
+        let (rules, space) = (self.rules, self.space());
+        for (event, rewards) in with_rewards(events, &rules, self.scheme) {
             self.ruled.note(event);
-            if let Some(kind) = event_kind(&self.imported.redact(event.clone()), space, by) {
+            if let Some(kind) = event_kind(&self.physical.redact(event.clone()), space, by) {
                 self.event(kind, rewards);
             }
         }
@@ -298,7 +342,7 @@ impl Importer {
     /// Checks that a row belongs to the Shift in progress.
     fn check_shift(&self, row: &Row) -> Result<(), TranscriptError> {
         let game = self.game.as_ref();
-        match game.filter(|game| !game.is_over() && self.imported.is_open()) {
+        match game.filter(|game| !game.is_over() && self.physical.is_open()) {
             Some(game) if game.shift() != row.shift => Err(wrong(
                 row.line,
                 format!(
@@ -317,7 +361,8 @@ impl Importer {
         matches!(role, Some(Role::Chef | Role::SousChef))
     }
 
-    fn end(&mut self) {
+    /// Ends the record. `aborted`: why the game has no result, if by the rules it is not over.
+    fn end(&mut self, aborted: v1::AbortReason) {
         let standings = self.game.as_ref().and_then(Game::standings);
         let state = match standings {
             Some(standings) => {
@@ -327,10 +372,9 @@ impl Importer {
                 })));
                 v1::RoomState::Finished
             }
-            // The transcript breaks off.
             None => {
                 self.room_event(Kind::GameAborted(Box::new(v1::GameAborted {
-                    reason: v1::AbortReason::Closed.into(),
+                    reason: aborted.into(),
                     reveal: None,
                 })));
                 v1::RoomState::Aborted
@@ -344,7 +388,7 @@ impl Importer {
     }
 
     fn space(&self) -> ActionSpace {
-        self.transcript.rules.actions()
+        self.rules.actions()
     }
 
     fn room_event(&mut self, kind: Kind) {

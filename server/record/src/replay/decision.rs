@@ -99,8 +99,10 @@ impl OpenDecision<'_> {
 
     fn check_attempts(&self, record: &v1::DecisionRecord) -> Result<(), String> {
         let legal = self.game.legal_actions();
+        // A correction may have changed the game before a decision of a physical room.
+        let unchanged = self.setup.origin != v1::GameOrigin::Physical;
         for (index, attempt) in record.invalid_attempts.iter().enumerate() {
-            if self.hand_known && legal.contains(action_id(*attempt)) {
+            if unchanged && self.hand_known && legal.contains(action_id(*attempt)) {
                 return Err(format!(
                     "invalidAttempts[{index}] is {attempt}, which was legal"
                 ));
@@ -171,12 +173,14 @@ impl OpenDecision<'_> {
                 record.invalid_attempts.len()
             ));
         }
+        // As for the attempts.
+        let unchanged = self.setup.origin != v1::GameOrigin::Physical;
         let by_default = matches!(
             source,
             Source::Timeout | Source::Disconnected | Source::Invalid
         );
         match self.game.default_action() {
-            Some(default) if by_default && default != action => Err(format!(
+            Some(default) if by_default && unchanged && default != action => Err(format!(
                 "action is {} and must be {default}, the default decision, because source is {name}",
                 record.action
             )),

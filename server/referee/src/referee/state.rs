@@ -6,7 +6,7 @@ use chefshat_engine::{
 
 use super::Referee;
 use crate::counts::{NOTHING, add_action};
-use crate::shift::{Act, cards_of};
+use crate::shift::{Act, Played, Shift, cards_of, gifts_of};
 use crate::words::{cards_text, counts_text};
 use crate::{Report, Stage, ToLay};
 
@@ -16,8 +16,10 @@ pub struct ShiftStory {
     /// The hands as dealt, as far as they are known.
     pub hands: BySeat<Option<Cards>>,
     /// The gifts that are stated, in the order of the seats: the giver and, if known, the cards.
+    /// Empty until the exchange is over.
     pub gifts: Vec<(Seat, Option<Cards>)>,
-    /// Decisions in order, with the number of the report or decision.
+    /// Decisions in order, with the number of the report or decision. Gifts that were chosen are
+    /// one decision for each card.
     pub decisions: Vec<(u64, Seat, Action)>,
 }
 
@@ -178,25 +180,44 @@ impl Referee {
 
     /// Every Shift as it counts, for the record.
     pub fn story(&self) -> Vec<ShiftStory> {
-        let story = |(shift, played): (&crate::shift::Shift, &crate::shift::Played)| ShiftStory {
+        let shifts = self.shifts.iter().zip(&self.played);
+        shifts
+            .map(|(shift, played)| self.story_of(shift, played))
+            .collect()
+    }
+
+    fn story_of(&self, shift: &Shift, played: &Played) -> ShiftStory {
+        let over = shift.exchange_is_over(&self.rules, &self.remote);
+        let choosers: Vec<Seat> = (shift.pairs(&self.rules).iter())
+            .map(|pair| pair.chooser)
+            .collect();
+        let mut decisions = Vec::new();
+        for entry in &shift.entries {
+            let mut add = |seat, action| decisions.push((entry.number, seat, action));
+            match entry.act {
+                Act::Turn(seat, action) | Act::Give(seat, action) => add(seat, action),
+                Act::Special(seat, true) => add(seat, Action::Declare),
+                Act::Special(seat, false) => add(seat, Action::Decline),
+                Act::Gift(seat, Some(cards))
+                    if over && !self.remote[seat] && choosers.contains(&seat) =>
+                {
+                    gifts_of(cards, &self.rules).for_each(|gift| add(seat, gift));
+                }
+                Act::Dealt(..)
+                | Act::Held(..)
+                | Act::NoSpecial
+                | Act::Gift(..)
+                | Act::ExchangeOver => {}
+            }
+        }
+        ShiftStory {
             hands: played.dealt,
-            gifts: shift.stated_gifts(&self.rules, &self.remote),
-            decisions: (shift.entries.iter())
-                .filter_map(|entry| match entry.act {
-                    Act::Turn(seat, action) | Act::Give(seat, action) => {
-                        Some((entry.number, seat, action))
-                    }
-                    Act::Special(seat, true) => Some((entry.number, seat, Action::Declare)),
-                    Act::Special(seat, false) => Some((entry.number, seat, Action::Decline)),
-                    Act::Dealt(..)
-                    | Act::Held(..)
-                    | Act::NoSpecial
-                    | Act::Gift(..)
-                    | Act::ExchangeOver => None,
-                })
-                .collect(),
-        };
-        self.shifts.iter().zip(&self.played).map(story).collect()
+            gifts: match over {
+                true => shift.stated_gifts(&self.rules, &self.remote),
+                false => Vec::new(),
+            },
+            decisions,
+        }
     }
 
     /// Lists the decisions of remote seats that nobody has carried out.

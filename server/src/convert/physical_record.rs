@@ -1,0 +1,278 @@
+//! The record of a physical room: the game as it counts at its end, after all corrections, with
+//! everything that is known by then.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_engine::{Action, Event, Seat, Viewer};
+use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_record::convert::seat_number;
+use chefshat_record::import::{PhysicalRoom, RoomEntry};
+use chefshat_referee::{Fact, ShiftFacts, ShiftStory};
+use prost::Message as _;
+use tracing::error;
+
+use super::decision::source_to_proto;
+use super::event::event_to_proto;
+use super::policy::millis;
+use super::record::{elapsed_ms, record_header};
+use chefshat_room::journal::{Change, Decided, Entry, Fill, GameHeader};
+use chefshat_room::log::RoomEvent;
+use chefshat_room::{Core, PhysicalTable};
+
+/// Where an entry of the record stands: after the changes before, and among what follows from the
+/// same change.
+type Place = (u64, Phase);
+
+/// The order of what follows from one change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Phase {
+    /// What became known, or was wrong.
+    Known,
+    /// Decisions.
+    Decided,
+    /// Other events.
+    After,
+}
+
+/// Number of decisions of a game, as its record has them.
+pub(super) fn decisions_at_table(table: &PhysicalTable) -> u64 {
+    let shifts = table.referee().story();
+    let decisions: usize = shifts.iter().map(|shift| shift.decisions.len()).sum();
+    u64::try_from(decisions).unwrap_or(u64::MAX)
+}
+
+/// All lines of the record of a physical room.
+pub(super) fn physical_record_lines(
+    header: &Arc<GameHeader>,
+    journal: &[Entry],
+) -> Vec<v1::RecordLine> {
+    let room = Room::of(header, journal);
+    let shifts = room.story();
+    room.record(&shifts).unwrap_or_else(|problem| {
+        // The decisions alone are a game in any case.
+        error!(game = %header.game_id, problem, "a record lacks the hands and gifts");
+        let turns = shifts.into_iter().map(without_cards).collect::<Vec<_>>();
+        (room.record(&turns)).expect("the decisions that a referee accepted are a game")
+    })
+}
+
+/// A room at the end of its game.
+struct Room {
+    core: Core,
+    /// Everything but decisions.
+    entries: Vec<Placed>,
+    /// Decisions of participants and built-in agents, by the number of their change.
+    decided: BTreeMap<u64, v1::DecisionRecord>,
+}
+
+/// An entry of a room and its place in the record.
+struct Placed {
+    place: Place,
+    /// The report that made a hand known.
+    hand: Option<u64>,
+    entry: RoomEntryOf,
+}
+
+/// An entry of a room, before its record is made.
+#[derive(Clone)]
+enum RoomEntryOf {
+    Event(u64, Kind),
+    Private(v1::PrivateExpression),
+}
+
+impl Room {
+    /// Folds a journal.
+    fn of(header: &Arc<GameHeader>, journal: &[Entry]) -> Self {
+        let mut room = Self {
+            core: Core::new(Arc::clone(header)),
+            entries: Vec::new(),
+            decided: BTreeMap::new(),
+        };
+        // Invalid attempts at the open decision, which a correction may close.
+        let mut attempts: (Option<(Seat, u64)>, Vec<u32>) = (None, Vec::new());
+        for (number, entry) in (1..).zip(journal) {
+            let open = room.core.open().map(|open| (open.decision.seat, open.id));
+            if attempts.0 != open {
+                attempts = (open, Vec::new());
+            }
+            match &entry.change {
+                Change::Attempted { action, .. } => attempts.1.push(*action),
+                Change::Decided(decided) => {
+                    let record = decision(entry, decided, std::mem::take(&mut attempts.1));
+                    room.decided.insert(number, record);
+                }
+                Change::Expressed {
+                    seat,
+                    record_only: true,
+                    expression,
+                } => {
+                    let private = v1::PrivateExpression {
+                        seat: seat_number(*seat),
+                        elapsed_ms: elapsed_ms(entry),
+                        expression: v1::Expression::decode(expression.as_ref()).ok(),
+                    };
+                    room.entries.push(Placed {
+                        place: (number, Phase::After),
+                        hand: None,
+                        entry: RoomEntryOf::Private(private),
+                    });
+                }
+                _ => {}
+            }
+            room.fold(number, entry);
+        }
+        room
+    }
+
+    fn fold(&mut self, number: u64, entry: &Entry) {
+        let before = self.core.log().len();
+        self.core.refold(entry);
+        for position in before..self.core.log().len() {
+            let (phase, hand) = match self.core.log().get(position).map(|it| &it.event) {
+                Some(RoomEvent::Game(game)) => match game.event {
+                    Event::GameEnded { .. } => (Phase::After, None),
+                    // Follows from the decisions.
+                    _ => continue,
+                },
+                Some(RoomEvent::HandReported(hand)) => (Phase::Known, Some(hand.report)),
+                Some(RoomEvent::Correction(correction)) => {
+                    let void = |report| {
+                        report == correction.report || correction.void_reports.contains(&report)
+                    };
+                    (self.entries).retain(|entry| !entry.hand.is_some_and(void));
+                    (Phase::Known, None)
+                }
+                _ => (Phase::After, None),
+            };
+            let event = event_to_proto(&self.core, position, Viewer::Everything);
+            let Some((elapsed_ms, Some(mut kind))) = event.map(|it| (it.elapsed_ms, it.kind))
+            else {
+                continue;
+            };
+            if let Kind::Correction(correction) = &mut kind {
+                correction.first_void = 0;
+            }
+            self.entries.push(Placed {
+                place: (number, phase),
+                hand,
+                entry: RoomEntryOf::Event(elapsed_ms, kind),
+            });
+        }
+    }
+
+    /// The Shifts as they count.
+    fn story(&self) -> Vec<ShiftStory> {
+        (self.core.table()).map_or_else(Vec::new, |table| table.referee().story())
+    }
+
+    /// The lines of the record.
+    fn record(&self, shifts: &[ShiftStory]) -> Result<Vec<v1::RecordLine>, String> {
+        let entries = self.entries.iter();
+        let mut entries: Vec<(Place, RoomEntry)> = entries
+            .map(|it| {
+                let entry = match it.entry.clone() {
+                    RoomEntryOf::Event(elapsed_ms, kind) => RoomEntry::Event { elapsed_ms, kind },
+                    RoomEntryOf::Private(private) => RoomEntry::Private(private),
+                };
+                (it.place, entry)
+            })
+            .collect();
+        let mut latest = 0;
+        for (number, seat, action) in shifts.iter().flat_map(|shift| &shift.decisions) {
+            // A report that had to wait counts when the one before it does.
+            latest = latest.max(*number);
+            let record = Box::new(self.decision(*number, *seat));
+            let entry = RoomEntry::Decision {
+                seat: *seat,
+                action: *action,
+                record,
+            };
+            entries.push(((latest, Phase::Decided), entry));
+        }
+        entries.sort_by_key(|(place, _)| *place);
+        PhysicalRoom {
+            header: record_header(&self.core),
+            rules: self.core.header().rules,
+            shifts: shifts.iter().map(facts).collect(),
+            entries: entries.into_iter().map(|(_, entry)| entry).collect(),
+        }
+        .record()
+    }
+
+    /// What is recorded of a decision besides the game.
+    fn decision(&self, number: u64, seat: Seat) -> v1::DecisionRecord {
+        let own = self.decided.get(&number);
+        if let Some(own) = own.filter(|own| own.seat == seat_number(seat)) {
+            return own.clone();
+        }
+        let made = self.core.table().and_then(|table| table.made(number));
+        let kind = match self.core.standing(seat).fill {
+            Fill::AtTable(kind) => Some(kind),
+            _ => None,
+        };
+        v1::DecisionRecord {
+            source: v1::DecisionSource::Table.into(),
+            decision_time_us: made.map_or(0, |made| made.time_us),
+            bank_left_ms: millis(self.core.header().policy.bank_of(kind)),
+            elapsed_ms: made.map_or(0, |made| {
+                u64::try_from(made.at.as_millis()).unwrap_or(u64::MAX)
+            }),
+            ..v1::DecisionRecord::default()
+        }
+    }
+}
+
+/// The decision of a participant or built-in agent.
+fn decision(entry: &Entry, decided: &Decided, attempts: Vec<u32>) -> v1::DecisionRecord {
+    let annotations = decided.annotations.as_ref();
+    v1::DecisionRecord {
+        seat: seat_number(decided.seat),
+        source: source_to_proto(decided.source).into(),
+        decision_time_us: decided.time_us,
+        bank_left_ms: decided.bank_left_ms,
+        invalid_attempts: attempts,
+        annotations: annotations.and_then(|bytes| v1::Annotations::decode(bytes.as_ref()).ok()),
+        elapsed_ms: elapsed_ms(entry),
+        ..v1::DecisionRecord::default()
+    }
+}
+
+/// The facts of a Shift.
+fn facts(shift: &ShiftStory) -> ShiftFacts {
+    let hands = shift.hands.iter();
+    let hands = hands.filter_map(|(seat, hand)| Some(Fact::Hand(seat, (*hand)?)));
+    let gifts = (shift.gifts.iter()).map(|(seat, cards)| Fact::Given(*seat, *cards));
+    let decisions = shift
+        .decisions
+        .iter()
+        .map(|(_, seat, action)| match action {
+            Action::Declare | Action::Decline => Fact::Special {
+                seat: *seat,
+                declared: *action == Action::Declare,
+            },
+            Action::Give(_) | Action::GiveJoker => Fact::Gives(*seat, *action),
+            turn => Fact::Turn(*seat, *turn),
+        });
+    ShiftFacts {
+        facts: hands
+            .chain(gifts)
+            .chain(decisions)
+            .map(|fact| (0, fact))
+            .collect(),
+        choosing: None,
+    }
+}
+
+/// A Shift of which only special actions that were declared and turns are known.
+fn without_cards(mut shift: ShiftStory) -> ShiftStory {
+    shift.hands = shift.hands.map(|_| None);
+    shift.gifts.clear();
+    shift.decisions.retain(|(_, _, action)| {
+        !matches!(
+            action,
+            Action::Give(_) | Action::GiveJoker | Action::Decline
+        )
+    });
+    shift
+}
