@@ -260,7 +260,7 @@ fn facts(shift: &ShiftStory) -> ShiftFacts {
             .chain(decisions)
             .map(|fact| (0, fact))
             .collect(),
-        choosing: None,
+        ..ShiftFacts::default()
     }
 }
 
@@ -275,4 +275,139 @@ fn without_cards(mut shift: ShiftStory) -> ShiftStory {
         )
     });
     shift
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_engine::{ActionId, Cards, Seat};
+    use chefshat_proto::v1::record_line::Line;
+    use chefshat_record::replay::replay;
+    use chefshat_room::journal::{AbortReason, Report};
+    use chefshat_room::testing::OPEN;
+    use chefshat_room::testing::real_table::{MIXED, Mixed, PERSON};
+
+    use super::*;
+
+    fn record_of(mixed: &Mixed) -> Vec<v1::RecordLine> {
+        physical_record_lines(mixed.table.core.header(), &mixed.table.journal)
+    }
+
+    /// The decisions of a record.
+    fn decisions(lines: &[v1::RecordLine]) -> Vec<&v1::DecisionRecord> {
+        let lines = lines.iter();
+        lines
+            .filter_map(|line| match &line.line {
+                Some(Line::Decision(decision)) => Some(decision),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// Sorts the cards of each gift: at a table they have no order.
+    fn sort_gifts(decisions: &mut [(u32, u32)], mixed: &Mixed) {
+        let actions = mixed.table.core.header().rules.actions();
+        let is_gift = |action: u32| {
+            let action = ActionId::new(u16::try_from(action).expect("an action"));
+            let action = actions.decode(action);
+            matches!(action, Some(Action::Give(_) | Action::GiveJoker))
+        };
+        let gift = |a: &(u32, u32), b: &(u32, u32)| a.0 == b.0 && is_gift(a.1) && is_gift(b.1);
+        (decisions.chunk_by_mut(gift)).for_each(<[(u32, u32)]>::sort_unstable);
+    }
+
+    fn check(mixed: &Mixed) {
+        let lines = record_of(mixed);
+        let replayed = replay(&lines).expect("the record verifies");
+        let mut recorded: Vec<(u32, u32)> = (decisions(&lines).iter())
+            .map(|decision| (decision.seat, decision.action))
+            .collect();
+        // A decline at the table is seen by nobody.
+        let decline = |action| {
+            let actions = mixed.table.core.header().rules.actions();
+            actions.decode(action) == Some(Action::Decline)
+        };
+        let mut truth: Vec<(u32, u32)> = (mixed.real.decisions.iter())
+            .filter(|(seat, action)| {
+                let fill = mixed.table.core.standing(*seat).fill;
+                !(decline(*action) && matches!(fill, Fill::AtTable(_)))
+            })
+            .map(|(seat, action)| (seat_number(*seat), action.index().into()))
+            .collect();
+        sort_gifts(&mut recorded, mixed);
+        sort_gifts(&mut truth, mixed);
+        assert_eq!(recorded, truth);
+        let summary = crate::convert::summary(&mixed.table.core);
+        assert_eq!(summary.decisions, replayed.decisions);
+        assert_eq!(summary.standings, replayed.standings);
+        assert_eq!(summary.origin(), v1::GameOrigin::Physical);
+        // Hands that are known are right.
+        let mut shift = 0;
+        for line in &lines {
+            let Some(Line::Event(event)) = &line.line else {
+                continue;
+            };
+            if let Some(Kind::ShiftStarted(started)) = &event.kind {
+                assert!(!started.hands.is_empty(), "hands of remote seats are known");
+                for hand in &started.hands {
+                    let seat = Seat::new(usize::try_from(hand.seat).expect("small"));
+                    assert_eq!(
+                        Some(mixed.real.dealt[shift][seat]),
+                        cards(hand),
+                        "Shift {shift}"
+                    );
+                }
+                shift += 1;
+            }
+        }
+        assert!(shift > 0);
+    }
+
+    fn cards(hand: &v1::SeatCards) -> Option<Cards> {
+        chefshat_record::convert::cards_from_numbers(&hand.cards, hand.golden, 11)
+    }
+
+    #[test]
+    fn records_are_the_games_at_the_table() {
+        for seed in 0..6 {
+            let mut mixed = Mixed::new(MIXED, 2, seed);
+            mixed.until(|it| it.table.core.state().is_over());
+            check(&mixed);
+            let lines = record_of(&mixed);
+            let sources: Vec<v1::DecisionSource> =
+                decisions(&lines).iter().map(|it| it.source()).collect();
+            assert!(sources.contains(&v1::DecisionSource::Table));
+            assert!(sources.contains(&v1::DecisionSource::Agent));
+        }
+    }
+
+    #[test]
+    fn a_record_has_the_game_as_corrected() {
+        for seed in 0..6 {
+            let mut mixed = Mixed::new([PERSON, PERSON, OPEN, PERSON], 2, seed);
+            let (number, right) = mixed.misread();
+            mixed.table.report(Report::Correction {
+                number,
+                instead: Some(Box::new(right)),
+            });
+            mixed.until(|it| it.table.core.state().is_over());
+            check(&mixed);
+            let corrections = record_of(&mixed).into_iter().filter(|line| {
+                matches!(&line.line, Some(Line::Event(event))
+                    if matches!(&event.kind, Some(Kind::Correction(it)) if it.first_void == 0))
+            });
+            assert_eq!(corrections.count(), 1);
+        }
+    }
+
+    #[test]
+    fn a_game_that_is_closed_has_a_record_at_any_moment() {
+        for steps in 0..60 {
+            let mut mixed = Mixed::new(MIXED, 2, 1);
+            (0..steps).for_each(|_| mixed.step());
+            mixed.table.core.abort(mixed.table.now, AbortReason::Closed);
+            mixed.table.commit();
+            let replayed = replay(&record_of(&mixed)).expect("the record verifies");
+            assert_eq!(replayed.state, v1::RoomState::Aborted);
+        }
+    }
 }

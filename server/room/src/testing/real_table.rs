@@ -1,11 +1,19 @@
 //! A real table under test: a dealt game is the truth, of which the reports that a room needs are
 //! made.
 
+use chefshat_agents::AgentKind;
 use chefshat_engine::{
-    Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, RuleSet, Seat, Seed,
+    Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, RuleSet, RuleSetSpec, Seat, Seed,
+    Stop,
 };
 use chefshat_referee::counts::{Counts, JOKER, index};
 use chefshat_referee::{Report, SeenCards, Stage};
+
+use super::{OPEN, Table, ms};
+use crate::ReportVerdict;
+use crate::journal::{Change, Fill, ParticipantKind, Source};
+use crate::log::RoomEvent;
+use crate::policy::Policy;
 
 pub struct RealTable {
     pub truth: Game,
@@ -136,5 +144,165 @@ impl RealTable {
         let action = legal.nth(self.chosen % legal.len()).expect("one is legal");
         self.decide(action);
         action
+    }
+}
+
+pub const PERSON: Fill = Fill::AtTable(ParticipantKind::Human);
+/// Two players at the table, a remote agent and a built-in agent.
+pub const MIXED: [Fill; 4] = [PERSON, OPEN, Fill::BuiltIn(AgentKind::Greedy), PERSON];
+
+/// A policy with short times.
+pub fn policy() -> Policy {
+    Policy {
+        decision_time: ms(1_000),
+        bank: ms(500),
+        pace: Some(ms(0)),
+        ..Policy::default()
+    }
+}
+
+/// Rules for games of a number of Shifts.
+pub fn shifts(count: u32) -> RuleSetSpec {
+    RuleSetSpec {
+        stop: Stop::Shifts(count),
+        ..RuleSetSpec::default()
+    }
+}
+
+/// A room with players at the table, a remote agent and a built-in agent, beside the truth.
+pub struct Mixed {
+    pub table: Table,
+    pub real: RealTable,
+}
+
+impl Mixed {
+    pub fn new(fills: [Fill; 4], count: u32, seed: u8) -> Self {
+        let at_table = BySeat::from_fn(4, |seat: Seat| {
+            matches!(fills[seat.index()], Fill::AtTable(_))
+        });
+        let mut table = Table::physical(policy(), fills.to_vec(), shifts(count));
+        for seat in table.core.all_seats() {
+            if matches!(fills[seat.index()], Fill::Open { .. }) {
+                table.join(ParticipantKind::Agent).expect("a free seat");
+                table.attach(seat);
+            }
+        }
+        let real = RealTable::new(table.core.header().rules, Seed([seed; 32]), at_table);
+        Self { table, real }
+    }
+
+    pub fn stage(&self) -> Stage {
+        self.table
+            .core
+            .table()
+            .expect("a physical room")
+            .referee()
+            .stage()
+    }
+
+    /// Lets the next thing happen: a report, or the answer of the remote agent.
+    pub fn step(&mut self) {
+        self.follow();
+        self.table.now += ms(10);
+        if let Some(open) = self.table.core.awaited() {
+            let (seat, id) = (open.decision.seat, open.id);
+            let action = self.table.legal(id as usize);
+            self.table.answer(seat, id, action);
+        } else {
+            let stage = self.stage();
+            let report = self.real.next_report(stage);
+            let report = report.unwrap_or_else(|| panic!("nobody acts, but {stage:?}"));
+            let outcome = self.table.report(report.clone());
+            assert_eq!(outcome.verdict, ReportVerdict::Accepted, "{report:?}");
+        }
+        self.follow();
+    }
+
+    /// Applies the decisions of remote seats to the truth.
+    pub fn follow(&mut self) {
+        self.table.pass_time(ms(0));
+        let decided: Vec<ActionId> = (self.table.journal.iter())
+            .filter_map(|entry| match &entry.change {
+                Change::Decided(decided) => Some(decided.action),
+                _ => None,
+            })
+            .collect();
+        let at_table = |seat: Seat| matches!(self.table.core.standing(seat).fill, Fill::AtTable(_));
+        let known = (self.real.decisions.iter()).filter(|(seat, _)| !at_table(*seat));
+        for action in decided.into_iter().skip(known.count()) {
+            self.real.decide(action);
+        }
+    }
+
+    pub fn until(&mut self, done: impl Fn(&Self) -> bool) {
+        for _ in 0..5_000 {
+            if done(self) {
+                return;
+            }
+            self.step();
+        }
+        panic!("it never came: {:?}", self.stage());
+    }
+
+    /// The standing events of the game.
+    pub fn events(&self) -> Vec<Event> {
+        let mut events: Vec<Option<Event>> = Vec::new();
+        for entry in self.table.core.log().since(0) {
+            if let RoomEvent::Correction(correction) = &entry.event
+                && let Some(from) = correction.first_void.checked_sub(1)
+            {
+                events[usize::try_from(from).expect("small")..].fill(None);
+            }
+            events.push(match &entry.event {
+                RoomEvent::Game(game) => Some(game.event.clone()),
+                _ => None,
+            });
+        }
+        events.into_iter().flatten().collect()
+    }
+
+    pub fn sources(&self) -> Vec<(Source, u64)> {
+        let turns = self.table.core.log().since(0);
+        turns
+            .filter_map(|entry| match &entry.event {
+                RoomEvent::Game(game)
+                    if matches!(game.event, Event::Played { .. } | Event::Passed { .. }) =>
+                {
+                    Some((game.source, game.time_us))
+                }
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// A play that was misread as one with other cards, and the report that states it.
+    pub fn misread(&mut self) -> (u64, Report) {
+        for _ in 0..200 {
+            let stage = self.stage();
+            let at_table = matches!(stage, Stage::Turn(seat) if matches!(self.table.core.standing(seat).fill, Fill::AtTable(_)));
+            if at_table && self.table.core.open().is_none() && self.sources().len() > 1 {
+                self.table.now += ms(10);
+                let right = self.real.next_report(stage).expect("a turn");
+                if let Report::Laid { seat, cards } = &right
+                    && let Some(face) = (3..11).find(|face| cards.counts[*face] == 1)
+                {
+                    let mut wrong = *cards;
+                    wrong.counts[face] = 0;
+                    wrong.counts[face - 1] = 1;
+                    let outcome = self.table.report(Report::Laid {
+                        seat: *seat,
+                        cards: wrong,
+                    });
+                    if outcome.verdict == ReportVerdict::Accepted {
+                        return (outcome.number, right);
+                    }
+                }
+                self.table.report(right);
+                self.follow();
+                continue;
+            }
+            self.step();
+        }
+        panic!("nothing to misread");
     }
 }

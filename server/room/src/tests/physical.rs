@@ -3,143 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, RuleSetSpec, Seat, Seed, Stop};
+use chefshat_engine::{DecisionKind, Event, Seat};
 use chefshat_referee::{MAX_QUESTIONS, Question, Stage, ViolatedRule};
 
 use super::{Core, OPEN, ParticipantKind, Source, State, Table, ms};
-use crate::journal::{Fill, Report, ReportSource, Reported};
+use crate::journal::{Report, ReportSource, Reported};
 use crate::log::RoomEvent;
-use crate::policy::Policy;
-use crate::testing::real_table::RealTable;
+use crate::testing::real_table::{MIXED, Mixed, PERSON, policy, shifts};
 use crate::{ReportError, ReportVerdict};
-
-const PERSON: Fill = Fill::AtTable(ParticipantKind::Human);
-
-fn policy() -> Policy {
-    Policy {
-        decision_time: ms(1_000),
-        bank: ms(500),
-        pace: Some(ms(0)),
-        ..Policy::default()
-    }
-}
-
-fn shifts(count: u32) -> RuleSetSpec {
-    RuleSetSpec {
-        stop: Stop::Shifts(count),
-        ..RuleSetSpec::default()
-    }
-}
-
-/// A room with players at the table, a remote agent and a built-in agent, beside the truth.
-struct Mixed {
-    table: Table,
-    real: RealTable,
-}
-
-impl Mixed {
-    fn new(fills: [Fill; 4], count: u32, seed: u8) -> Self {
-        let at_table = BySeat::from_fn(4, |seat: Seat| {
-            matches!(fills[seat.index()], Fill::AtTable(_))
-        });
-        let mut table = Table::physical(policy(), fills.to_vec(), shifts(count));
-        for seat in table.core.all_seats() {
-            if matches!(fills[seat.index()], Fill::Open { .. }) {
-                table.join(ParticipantKind::Agent).expect("a free seat");
-                table.attach(seat);
-            }
-        }
-        let real = RealTable::new(table.core.header().rules, Seed([seed; 32]), at_table);
-        Self { table, real }
-    }
-
-    fn stage(&self) -> Stage {
-        self.table
-            .core
-            .table()
-            .expect("a physical room")
-            .referee()
-            .stage()
-    }
-
-    /// Lets the next thing happen: a report, or the answer of the remote agent.
-    fn step(&mut self) {
-        self.follow();
-        self.table.now += ms(10);
-        if let Some(open) = self.table.core.awaited() {
-            let (seat, id) = (open.decision.seat, open.id);
-            let action = self.table.legal(id as usize);
-            self.table.answer(seat, id, action);
-        } else {
-            let stage = self.stage();
-            let report = self.real.next_report(stage);
-            let report = report.unwrap_or_else(|| panic!("nobody acts, but {stage:?}"));
-            let outcome = self.table.report(report.clone());
-            assert_eq!(outcome.verdict, ReportVerdict::Accepted, "{report:?}");
-        }
-        self.follow();
-    }
-
-    /// Applies the decisions of remote seats to the truth.
-    fn follow(&mut self) {
-        self.table.pass_time(ms(0));
-        let decided: Vec<ActionId> = (self.table.journal.iter())
-            .filter_map(|entry| match &entry.change {
-                crate::journal::Change::Decided(decided) => Some(decided.action),
-                _ => None,
-            })
-            .collect();
-        let at_table = |seat: Seat| matches!(self.table.core.standing(seat).fill, Fill::AtTable(_));
-        let known = (self.real.decisions.iter()).filter(|(seat, _)| !at_table(*seat));
-        for action in decided.into_iter().skip(known.count()) {
-            self.real.decide(action);
-        }
-    }
-
-    fn until(&mut self, done: impl Fn(&Self) -> bool) {
-        for _ in 0..5_000 {
-            if done(self) {
-                return;
-            }
-            self.step();
-        }
-        panic!("it never came: {:?}", self.stage());
-    }
-
-    /// The standing events of the game.
-    fn events(&self) -> Vec<Event> {
-        let mut events: Vec<Option<Event>> = Vec::new();
-        for entry in self.table.core.log().since(0) {
-            if let RoomEvent::Correction(correction) = &entry.event
-                && let Some(from) = correction.first_void.checked_sub(1)
-            {
-                events[usize::try_from(from).expect("small")..].fill(None);
-            }
-            events.push(match &entry.event {
-                RoomEvent::Game(game) => Some(game.event.clone()),
-                _ => None,
-            });
-        }
-        events.into_iter().flatten().collect()
-    }
-
-    fn sources(&self) -> Vec<(Source, u64)> {
-        let turns = self.table.core.log().since(0);
-        turns
-            .filter_map(|entry| match &entry.event {
-                RoomEvent::Game(game)
-                    if matches!(game.event, Event::Played { .. } | Event::Passed { .. }) =>
-                {
-                    Some((game.source, game.time_us))
-                }
-                _ => None,
-            })
-            .collect()
-    }
-}
-
-const MIXED: [Fill; 4] = [PERSON, OPEN, Fill::BuiltIn(AgentKind::Greedy), PERSON];
 
 #[test]
 fn a_mixed_game_is_the_one_at_the_table() {
@@ -324,43 +195,12 @@ fn a_violation_is_an_event_and_the_game_stands() {
     assert_eq!(violations, 1);
 }
 
-/// A play that was misread as one with other cards, and the report that states it.
-fn misread(mixed: &mut Mixed) -> (u64, Report) {
-    for _ in 0..200 {
-        let stage = mixed.stage();
-        let at_table = matches!(stage, Stage::Turn(seat) if matches!(mixed.table.core.standing(seat).fill, Fill::AtTable(_)));
-        if at_table && mixed.table.core.open().is_none() && mixed.sources().len() > 1 {
-            mixed.table.now += ms(10);
-            let right = mixed.real.next_report(stage).expect("a turn");
-            if let Report::Laid { seat, cards } = &right
-                && let Some(face) = (3..11).find(|face| cards.counts[*face] == 1)
-            {
-                let mut wrong = *cards;
-                wrong.counts[face] = 0;
-                wrong.counts[face - 1] = 1;
-                let outcome = mixed.table.report(Report::Laid {
-                    seat: *seat,
-                    cards: wrong,
-                });
-                if outcome.verdict == ReportVerdict::Accepted {
-                    return (outcome.number, right);
-                }
-            }
-            mixed.table.report(right);
-            mixed.follow();
-            continue;
-        }
-        mixed.step();
-    }
-    panic!("nothing to misread");
-}
-
 #[test]
 fn a_correction_voids_what_followed_and_reopens_the_decision() {
     let mut reopened = 0;
     for seed in 0..12 {
         let mut mixed = Mixed::new([PERSON, PERSON, OPEN, PERSON], 1, seed);
-        let (number, right) = misread(&mut mixed);
+        let (number, right) = mixed.misread();
         let before = mixed
             .table
             .core
