@@ -9,7 +9,7 @@ import pytest
 from chefshat import Decision, SeatInfo, pb
 
 from chefshat_robot.body import PASS, Body, Notice, Times, Turn
-from chefshat_robot.drivers.driver import Act, CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Pose, RobotError, Say
+from chefshat_robot.drivers.driver import Act, CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Point, Pose, RobotError, Say
 from chefshat_robot.player import RobotPlayer, limit_s, turn_of
 from chefshat_robot.words import Words
 from tests.loop import run
@@ -84,6 +84,7 @@ def test_a_failed_pick_is_asked_of_the_people_aloud_and_reported() -> None:
         body = await table(robot, notices)
         await body.take_turn(Turn(9, 2, 0), FAR_S)
         assert said(robot) == ["I play two 9s.", "Please lay my two 9s for me."]
+        assert robot.acts[-1] == Point(97.5, 151.0)
         (notice,) = notices
         assert (notice.kind, notice.text, notice.reason) == ("help", "Please lay my two 9s for me.", "the gripper is jammed")
         assert [move.piece for move in notice.cards] == ["9", "9"]
@@ -99,7 +100,7 @@ def test_a_failed_pick_is_asked_of_the_people_aloud_and_reported() -> None:
 def test_a_robot_that_is_gone_or_hangs_is_reported_and_stopped(failure: Exception | None, reason: str) -> None:
     async def test() -> None:
         robot, notices = ScriptedRobot(lambda act: failure), list[Notice]()
-        body = await table(robot, notices, Times(say=0.01, pick=0.005, gaze=0.01, express=0.01))
+        body = await table(robot, notices, Times(say=0.01, pick=0.005, point=0.01, gaze=0.01, express=0.01))
         assert await body.take_turn(Turn(9, 2, 0), FAR_S)
         assert [(notice.kind, notice.text) for notice in notices] == [
             ("unsaid", "I play two 9s."),
@@ -332,6 +333,13 @@ def test_actions_are_turns() -> None:
                for face in range(1, 12) for quantity in range(1, face + 1) for jokers in range(3)]  # fmt: skip
     turns = [Turn(face, quantity, jokers) for face in range(1, 12) for quantity in range(1, face + 1) for jokers in range(3)]
     assert [turn_of(index, 11) for index in indices] == turns
+
+
+def test_limits_of_acts_are_by_their_kind_and_can_be_multiplied() -> None:
+    move = CardMove("9", None, Pose(0.0, 0.0))
+    times = Times(say=1, pick=2, point=3, gaze=4, express=5).times(2)
+    acts: list[Act] = [Say(""), Pick((move, move, move)), Point(0.0, 0.0), Gaze(0.0, 0.0), Express("joy")]
+    assert [times.of(act) for act in acts] == [2, 12, 6, 8, 10]
 
 
 def test_a_turn_is_not_delayed_by_reactions_that_wait() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import pytest
 from chefshat import RandomAgent, aio, pb
 
 from chefshat_robot import cli, drivers, layout, speech
+from chefshat_robot.affect import Forwarder
 from chefshat_robot.body import Body, Notice, Turn
-from chefshat_robot.drivers.driver import Done, Failed, Pick, Say
+from chefshat_robot.drivers.driver import Affect, Done, Express, Failed, Pick, Say
 from chefshat_robot.player import RobotPlayer
 from chefshat_robot.robot import play_seat
 from chefshat_robot.words import TEXTS, Words
@@ -68,9 +70,39 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
     said = [text for line in record if (text := speech.text_of(line.private_expression.expression))]
     assert said
     assert said == [act.text for act in robot.acts if isinstance(act, Say)][: len(said)]
-    asked = [text for line in record if (text := speech.text_of(line.event.expression_shown.expression))]
+    shown = [line.event.expression_shown.expression for line in record if line.event.HasField("expression_shown")]
+    asked = [text for expression in shown if (text := speech.text_of(expression))]
     assert bool(asked) == jammed
     assert asked == [notice.text for notice in notices][: len(asked)]
+    # Its feelings are, too; those after the end of the game no longer.
+    felt = [Express(act.label, act.valence, act.arousal) for act in shown if act.label != speech.HELP]
+    expressed = [act for act in robot.acts if isinstance(act, Express)]
+    assert [act.label for act in felt] == [act.label for act in expressed][: len(felt)]
+
+
+@pytest.mark.server
+def test_what_a_robot_reads_in_faces_becomes_expressions_of_their_seats(server_address: str) -> None:
+    async def test() -> list[pb.Expression]:
+        async with aio.Client(server_address) as client:
+            made = await client.create_room(
+                "faces", seats=[None, None, "random", "greedy"], rules=ONE_SHIFT, policy=pb.RoomPolicy(pace_ms=0)
+            )
+            person = await client.join_room(made.join_code, "Ada", kind=pb.PARTICIPANT_KIND_HUMAN)
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            robot = ScriptedRobot()
+            for affect in (Affect("joy", 0.5, seat=0, source="face"), Affect("sadness", seat=3)):
+                robot.report(affect)
+            people = Forwarder(client, {0: person.ticket})
+            playing = asyncio.create_task(client.play(RandomAgent(1), person.ticket))
+            result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), people=people)
+            await playing
+            lines = [line async for line in client.record(result.game_id)]
+            return [line.event.expression_shown.expression for line in lines if line.event.expression_shown.seat == person.seat]
+
+    shown = [expression for expression in run(test()) if expression.label]
+    assert [(expression.label, expression.valence, expression.source) for expression in shown] == [
+        ("joy", 0.5, pb.EXPRESSION_SOURCE_FACE)
+    ]
 
 
 @pytest.mark.server
@@ -173,6 +205,19 @@ def test_wrong_drivers_are_explained(spec: str, message: str) -> None:
     with pytest.raises(drivers.RobotError) as error:
         drivers.create(spec)
     assert message in str(error.value)
+
+
+@pytest.mark.server
+def test_a_robot_that_is_not_there_at_the_start_is_an_error(server_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    async def code() -> str:
+        async with aio.Client(server_address) as client:
+            return await room(client)
+
+    arguments = ["--address", server_address, "--room", run(code()), "--driver", "jsonlines:port=1"]
+    assert cli.main(["robot", *arguments]) == 1
+    err = capsys.readouterr().err
+    assert "no robot listens at 127.0.0.1:1" in err
+    assert "--ticket" not in err  # It has not taken the seat.
 
 
 def test_drivers_are_listed_with_their_options(capsys: pytest.CaptureFixture[str]) -> None:

@@ -224,7 +224,7 @@ def test_the_command_sends_markers_until_the_game_is_over(server_address: str) -
     [
         ([], "give the ticket of at least one seat"),
         (["--ticket", "0=T"], "give --listen HOST:PORT, --lsl KEY=VALUE, or both"),
-        (["--ticket", "Ada=T", "--listen", "127.0.0.1:0"], "the seat must be a number"),
+        (["--ticket", "Ada=T", "--listen", "127.0.0.1:0"], "the seat of a ticket must be a number"),
         (["--ticket", "0=T", "--listen", "7701"], "--listen 7701: give HOST:PORT"),
         (["--ticket", "0=T", "--lsl", "Faces"], "--lsl Faces: give name=..., type=... or source_id=..."),
     ],

@@ -9,7 +9,7 @@ import argparse
 import asyncio
 import json
 import time
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
 from chefshat import ChefsHatError, aio, pb
@@ -205,13 +205,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs the subcommand until it is interrupted."""
-    tickets = _tickets(arguments.ticket)
+    given = tickets(arguments.ticket)
     if not arguments.listen and not arguments.lsl:
         raise CommandError("give --listen HOST:PORT, --lsl KEY=VALUE, or both")
 
     async def forward() -> int:
         async with aio.Client(arguments.address) as client:
-            forwarder = Forwarder(client, tickets, record_only=arguments.record_only, interval_s=arguments.interval)
+            forwarder = Forwarder(client, given, record_only=arguments.record_only, interval_s=arguments.interval)
             async with asyncio.TaskGroup() as tasks:
                 if arguments.listen:
                     host, _, port = arguments.listen.rpartition(":")
@@ -234,13 +234,18 @@ def _listening(port: int) -> None:
     LOG.info("listening on port %d", port)
 
 
-def _tickets(given: list[str]) -> dict[int | None, str]:
+def tickets(given: Sequence[str]) -> dict[int | None, str]:
+    """Parses SEAT=TICKET, or TICKET alone for readings that name no seat.
+
+    Raises:
+        CommandError: there is none, or a seat is not a number.
+    """
     if not given:
         raise CommandError("give the ticket of at least one seat: --ticket SEAT=TICKET")
-    tickets: dict[int | None, str] = {}
+    parsed: dict[int | None, str] = {}
     for text in given:
         seat, separator, ticket = text.partition("=")
         if separator and not seat.isdigit():
-            raise CommandError(f"--ticket {seat}=...: the seat must be a number, from 0")
-        tickets[int(seat) if separator else None] = ticket if separator else text
-    return tickets
+            raise CommandError(f"{seat}=...: the seat of a ticket must be a number, from 0")
+        parsed[int(seat) if separator else None] = ticket if separator else text
+    return parsed

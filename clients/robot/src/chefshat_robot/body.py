@@ -8,6 +8,7 @@ is elsewhere: an agent in `player`, a person on the page in `wizard`.
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -62,6 +63,10 @@ class Times:
     point: float = 8.0
     gaze: float = 4.0
     express: float = 8.0
+
+    def times(self, factor: float) -> Times:
+        """Returns these limits multiplied."""
+        return Times(*(limit * factor for limit in dataclasses.astuple(self)))
 
     def of(self, act: Act) -> float:
         """Returns the limit for an act."""
@@ -483,7 +488,10 @@ class Body:
         return outcome
 
     async def _failed(self, act: Act, reason: str, plea: str) -> None:
-        """Reports a failed act to the attendant; for cards, also asks the table for help. Other failures are only logged."""
+        """Reports a failed act to the attendant; for cards, also asks the people at the table, and points at the place.
+
+        Other failures are only logged.
+        """
         LOG.info("%s failed: %s", type(act).__name__, reason)
         if isinstance(act, Say):
             self._notify(Notice("unsaid", act.text, reason))
@@ -492,6 +500,8 @@ class Body:
             outcome = await self._attempt(Say(plea, self.words.language))
             if isinstance(outcome, Failed):
                 self._notify(Notice("unsaid", plea, outcome.reason))
+            end = act.moves[0].end
+            await self._attempt(Point(end.x, end.y))
 
     async def _forward(self) -> None:
         """Shows events and states to the driver, independently of acts."""

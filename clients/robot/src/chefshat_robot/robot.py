@@ -6,21 +6,23 @@ Acts are in `body`, decisions in `player`, robots in `drivers`.
 from __future__ import annotations
 
 import argparse
+import asyncio
 import json
 import os
 import sys
 from collections.abc import Callable
 
-from chefshat import Agent, PlayOptions, SeatResult, aio, pb
+from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
 from chefshat.agent import make_agent
 from chefshat.join_options import TICKET
 from chefshat.outcome import Played
 from chefshat.outcome import report as report_result
 
 from chefshat_robot import drivers, speech, wire
-from chefshat_robot.body import Body, Notice
+from chefshat_robot.affect import Forwarder, tickets
+from chefshat_robot.body import Body, Notice, Times
 from chefshat_robot.cli import CommandError
-from chefshat_robot.drivers.driver import LOG, Act, Done, Driver, Outcome, RobotEvent, Say
+from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Express, Outcome, RobotEvent, Say
 from chefshat_robot.player import RobotPlayer
 from chefshat_robot.running import run_command
 from chefshat_robot.words import LANGUAGES, Words
@@ -54,6 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, help="seed of the agent")
     parser.add_argument(
+        "--people",
+        action="append",
+        metavar="SEAT=TICKET",
+        help="send what the robot reads in the face of a seat's player as that seat's expression; repeat it for several seats",
+    )
+    parser.add_argument(
         "--hold", type=float, metavar="SECONDS", help="answer at the latest after so many seconds, while the robot is still moving"
     )
 
@@ -65,6 +73,9 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list-drivers", action="store_true", help="list the drivers and their options, and exit")
     parser.add_argument("--language", choices=LANGUAGES, default="en", help="what the robot speaks (default: %(default)s)")
     parser.add_argument("--no-cards", action="store_true", help="there are no real cards: the robot only speaks, looks and shows")
+    parser.add_argument(
+        "--patience", type=float, default=1.0, metavar="FACTOR", help="multiply the time limits of the robot's acts (default: 1)"
+    )
     parser.add_argument("--json", action="store_true", help="print requests for help and the result as lines of JSON")
     parser.add_argument("--quiet", action="store_true", help="do not print what the robot says and does")
 
@@ -79,16 +90,21 @@ def run(arguments: argparse.Namespace) -> int:
         if bool(ticket) == bool(arguments.room):
             raise CommandError("give the room's join code (--room), or the ticket of a seat to resume (--ticket)")
         agent = _agent(arguments.agent, arguments.seed)
+        driver = drivers.create(arguments.driver)
+        async with driver:
+            pass  # The robot is there: only then a seat is taken.
         async with aio.Client(arguments.address) as client:
             taken = ticket or await _join(client, arguments)
             result = await play_seat(
                 client,
                 taken,
                 agent,
-                drivers.create(arguments.driver),
+                driver,
                 words=Words(arguments.language),
                 handles_cards=not arguments.no_cards,
                 hold_s=arguments.hold,
+                times=Times().times(arguments.patience),
+                people=Forwarder(client, tickets(arguments.people)) if arguments.people else None,
                 notify=attendant(arguments.json),
             )
             return report_result(Played([result]), as_json=arguments.json)
@@ -105,11 +121,13 @@ async def play_seat(
     words: Words,
     handles_cards: bool = True,
     hold_s: float | None = None,
+    times: Times | None = None,
+    people: Forwarder | None = None,
     notify: Callable[[Notice], None] = lambda notice: None,
 ) -> SeatResult:
     """Plays one seat with a robot until its game is over.
 
-    What the robot says is recorded with the game, and its requests for help are shown in the room (`speech`).
+    What the robot says is recorded with the game (`speech`); what it shows, and its requests for help, appear in the room.
 
     Args:
         client: the connection to the server.
@@ -119,6 +137,8 @@ async def play_seat(
         words: what it says.
         handles_cards: whether there are real cards.
         hold_s: most seconds by which the robot's acts may delay an answer.
+        times: limits of its acts.
+        people: where to send the expressions that the robot reads in people's faces and voices; None: nowhere.
         notify: called with messages to the attendant, in addition.
 
     Raises:
@@ -126,6 +146,7 @@ async def play_seat(
         ChefsHatError: the seat was refused or lost.
     """
     outbox = speech.Outbox(client, ticket)
+    readings: set[asyncio.Task[None]] = set()
 
     def noticed(notice: Notice) -> None:
         notify(notice)
@@ -135,16 +156,33 @@ async def play_seat(
     def acted(act: Act, outcome: Outcome) -> None:
         if isinstance(act, Say) and isinstance(outcome, Done):
             outbox.send(speech.line(act.text, record_only=True))
+        elif isinstance(act, Express) and isinstance(outcome, Done):
+            outbox.send(pb.Expression(label=act.label, valence=act.valence, arousal=act.arousal, source=pb.EXPRESSION_SOURCE_MODEL))
 
     def perceived(event: RobotEvent) -> None:
         LOG.info("the robot perceived %s", event)
         hook = getattr(agent, "on_robot_event", None)
         if hook is not None:
             hook(event)
+        if isinstance(event, Affect) and people is not None:
+            reading = asyncio.create_task(_forward(people, event))
+            readings.add(reading)
+            reading.add_done_callback(readings.discard)
 
-    async with outbox, Body(driver, words, notify=noticed, on_act=acted, handles_cards=handles_cards) as body:
+    body = Body(driver, words, notify=noticed, on_act=acted, times=times, handles_cards=handles_cards)
+    async with outbox, body:
         player = RobotPlayer(agent, body, hold_s=hold_s, on_robot_event=perceived)
-        return await client.play(player, ticket, options=PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
+        result = await client.play(player, ticket, options=PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
+    await asyncio.gather(*readings)
+    return result
+
+
+async def _forward(people: Forwarder, affect: Affect) -> None:
+    """Sends what the robot read in a person's face. A failure is logged: the game is more important."""
+    try:
+        await people.forward(affect)
+    except (ValueError, ChefsHatError) as error:
+        LOG.warning("a reading was not sent: %s", error)
 
 
 def attendant(as_json: bool) -> Callable[[Notice], None]:

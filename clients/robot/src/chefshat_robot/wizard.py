@@ -14,7 +14,7 @@ from collections.abc import Callable
 from chefshat import aio, pb
 
 from chefshat_robot import drivers, speech
-from chefshat_robot.body import Body, Notice
+from chefshat_robot.body import Body, Notice, Times
 from chefshat_robot.cli import CommandError
 from chefshat_robot.drivers.driver import Driver
 from chefshat_robot.robot import add_robot_arguments, attendant, print_drivers
@@ -42,6 +42,7 @@ async def follow_seat(
     handles_cards: bool = True,
     small_talk: bool = False,
     announces: bool = True,
+    times: Times | None = None,
     notify: Callable[[Notice], None] = lambda notice: None,
 ) -> None:
     """Performs the events of a seat, from now on until the game is over.
@@ -55,6 +56,7 @@ async def follow_seat(
         handles_cards: whether there are real cards.
         small_talk: whether it comments on the game by itself.
         announces: whether it says what it plays.
+        times: limits of the robot's acts.
         notify: called with messages to the attendant.
 
     Raises:
@@ -62,7 +64,7 @@ async def follow_seat(
         ChefsHatError: the room cannot be watched.
     """
     live = await live_from(client, room_id)
-    body = Body(driver, words, notify=notify, handles_cards=handles_cards, small_talk=small_talk, announces=announces)
+    body = Body(driver, words, notify=notify, times=times, handles_cards=handles_cards, small_talk=small_talk, announces=announces)
     async with body:
         body.seat_at(seat, live)
         async for event in client.watch(room_id):
@@ -109,6 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
                 handles_cards=not arguments.no_cards,
                 small_talk=arguments.small_talk,
                 announces=not arguments.silent_plays,
+                times=Times().times(arguments.patience),
                 notify=attendant(arguments.json),
             )
         return 0
