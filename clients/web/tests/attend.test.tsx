@@ -154,6 +154,18 @@ describe("entering by hand", () => {
     ]);
   });
 
+  test("is for players at the table: what a remote one decides is laid for it", async () => {
+    await show(stateOf({ seat: 2 }));
+    const who = [...root.querySelectorAll('[data-part~="entry"] [aria-pressed]')].map(nameOf);
+    expect(who).not.toContain("2 Cleo");
+    await press("5, chilli");
+    await press("Report the play");
+    expect(sent).toEqual([]);
+    await press("1 Bo");
+    await press("Bo lays 3 × 5");
+    expect(sent).toHaveLength(1);
+  });
+
   test("a pass, a pass taken back, a cleared board", async () => {
     await show(stateOf());
     await press("Ada passes");
@@ -310,7 +322,7 @@ describe("a violation", () => {
 describe("the reports of the Shift", () => {
   const report = (number: bigint, kind: Happening) => ({ report: number, seat: 1, text: "…", content: { kind } });
   const reports = [
-    report(1n, { case: "hand", value: { seat: 2 } }),
+    { ...report(1n, { case: "hand", value: { seat: 2 } }), seat: 2 },
     report(2n, { case: "laid", value: { seat: 1, cards: { cards: [9, 9, 12], golden: false } } }),
     report(3n, { case: "pass", value: { seat: 3 } }),
   ];
@@ -323,7 +335,7 @@ describe("the reports of the Shift", () => {
   test("are listed, the newest first", async () => {
     await show(stateOf({ reports }));
     const words = [...root.querySelectorAll('[data-part~="report"] p')].map(({ textContent }) => textContent);
-    expect(words).toEqual(["1 Dan passed", "1 Bo laid 2 × 9 + joker", "1 The hand of Cleo was seen"]);
+    expect(words).toEqual(["1 Dan passed", "1 Bo laid 2 × 9 + joker", "2 The hand of Cleo was seen"]);
   });
 
   test("are shown eight at a time, or all", async () => {
@@ -358,6 +370,18 @@ describe("the reports of the Shift", () => {
       },
       { case: "correction", value: { report: 2n, instead: { kind: { case: "pass", value: { seat: 1 } } } } },
     ]);
+  });
+
+  test("a corrected hand is as it was then", async () => {
+    await show(stateOf({ reports }));
+    await press("Change: The hand of Cleo was seen", item(2));
+    await type("Cards", "1 11");
+    const dialog = part("change");
+    if (!dialog) throw new Error("no dialog");
+    await act(() => dialog.querySelector<HTMLInputElement>("[type=checkbox]")?.click());
+    await press("This is the hand of Cleo", dialog);
+    const instead = { kind: { case: "hand", value: { seat: 2, cards: { cards: [1, 11], golden: true } } } };
+    expect(sent).toEqual([{ case: "correction", value: { report: 1n, instead } }]);
   });
 
   test("can be removed, after a confirmation", async () => {

@@ -6,7 +6,7 @@ import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { TableStage } from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
-import { CopyLine, HostInvite, QrCode } from "../lobby/Invite";
+import { CopyLine, HostInvite, QrCode, ThisMachine } from "../lobby/Invite";
 import { isForAgents, isOpen } from "../lobby/rooms";
 import { ErrorPage } from "../parts/ErrorPage";
 import css from "./Attend.module.css";
@@ -84,6 +84,7 @@ function AttendantLink({ address }: { address: string }) {
         <CopyLine label={words.address} text={address} />
       </div>
       <QrCode text={address} label={words.qr} />
+      <ThisMachine />
     </div>
   );
 }

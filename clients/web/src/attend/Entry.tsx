@@ -14,6 +14,7 @@ import type { Happening, Outcome } from "./attending";
 import {
   awaitedEntry,
   cardsOfDraft,
+  type Deck,
   deckOf,
   type EntryKind,
   entriesAt,
@@ -139,17 +140,31 @@ function holders(table: Table): number[] {
   return table.seats.filter(({ cardsLeft }) => cardsLeft > 0).map(({ seat }) => seat);
 }
 
+/**
+ * Seats at the table that still hold cards. What remote seats decide is laid for them, and reported
+ * as done.
+ */
+function players(table: Table): number[] {
+  return holders(table).filter((seat) => table.seats[seat]?.atTable);
+}
+
+/** The seat, if its player sits at the table. */
+function playerOf(table: Table, seat: number | undefined): number | undefined {
+  return seat !== undefined && table.seats[seat]?.atTable ? seat : undefined;
+}
+
 /** A play or a pass. `fixed`: of this seat, in place of an earlier report. */
 export function TurnFields({
   state,
   table,
   draft,
-  seat,
+  seat: named,
   change,
   send,
   fixed = false,
 }: FieldsProps & { fixed?: boolean }) {
   const words = t().attend.enter;
+  const seat = fixed ? named : playerOf(table, named);
   const deck = deckOf(table.rules);
   const cards = cardsOfDraft(draft.play, deck);
   const name = seat === undefined ? undefined : distinctName(table, seat);
@@ -161,7 +176,7 @@ export function TurnFields({
   return (
     <>
       {!fixed && (
-        <SeatPick table={table} seats={holders(table)} value={seat} onPick={(picked) => change({ seat: picked })} />
+        <SeatPick table={table} seats={players(table)} value={seat} onPick={(picked) => change({ seat: picked })} />
       )}
       <PlayPick
         deck={deck}
@@ -191,96 +206,107 @@ export function TurnFields({
   );
 }
 
-/** A hand that became known. */
-export function HandFields({
-  state,
-  table,
-  draft,
-  seat,
-  change,
-  send,
-  fixed = false,
-}: FieldsProps & { fixed?: boolean }) {
+/** A hand that became known. `fixed`: of this seat, in place of an earlier report. */
+export function HandFields(props: FieldsProps & { fixed?: boolean }) {
+  const { state, table, draft, seat, send, fixed = false } = props;
   const words = t().attend.enter;
   const deck = deckOf(table.rules);
   const { cards, problem } = parseHand(draft.hand, deck);
-  const expected = seat === undefined ? undefined : table.seats[seat]?.cardsLeft;
+  // A corrected hand is as it was then.
+  const expected = seat === undefined || fixed ? undefined : table.seats[seat]?.cardsLeft;
   const complete = expected === undefined || cards.length === expected;
   const ready = seat !== undefined && cards.length > 0 && problem === undefined && complete;
-  const asksGolden = mayBeGolden(state);
-  const value = { cards: { cards, golden: asksGolden && draft.golden && cards.includes(deck.faces) } };
   return (
-    <>
-      {!fixed && (
-        <SeatPick table={table} seats={holders(table)} value={seat} onPick={(picked) => change({ seat: picked })} />
-      )}
-      <HandPick
-        deck={deck}
-        text={draft.hand}
-        golden={draft.golden}
-        asksGolden={asksGolden}
-        expected={expected}
-        fault={expected !== undefined && cards.length > expected ? words.hand.mustBe(expected) : undefined}
-        onChange={({ text, golden }) =>
-          change({ ...(text === undefined ? {} : { hand: text }), ...(golden === undefined ? {} : { golden }) })
-        }
-      />
-      <Actions>
-        <Button
-          look="main"
-          aria-disabled={!ready}
-          onClick={() => ready && send({ case: "hand", value: { ...value, seat } })}
-        >
-          {seat === undefined ? words.whoFirst : words.handSeen(distinctName(table, seat))}
-        </Button>
-      </Actions>
-    </>
+    <TypedForm
+      {...props}
+      seats={fixed ? [] : holders(table)}
+      seat={seat}
+      expected={expected}
+      fault={expected !== undefined && cards.length > expected ? words.hand.mustBe(expected) : undefined}
+      label={seat === undefined ? words.whoFirst : words.handSeen(distinctName(table, seat))}
+      ready={ready}
+      onSubmit={() =>
+        ready && send({ case: "hand", value: { seat, cards: typedCards(draft, deck, asksGolden(state, fixed)) } })
+      }
+    />
   );
 }
 
-/** A gift of the exchange, whose cards may be unknown. */
-export function GiftFields({
-  state,
-  table,
-  draft,
-  seat,
-  change,
-  send,
-  fixed = false,
-}: FieldsProps & { fixed?: boolean }) {
+/** A gift of the exchange, whose cards may be unknown. `fixed`: as for a hand. */
+export function GiftFields(props: FieldsProps & { fixed?: boolean }) {
+  const { state, table, draft, send, fixed = false } = props;
   const words = t().attend.enter;
+  const seat = fixed ? props.seat : playerOf(table, props.seat);
   const deck = deckOf(table.rules);
   const { cards, problem } = parseHand(draft.hand, deck);
   const name = seat === undefined ? undefined : distinctName(table, seat);
-  const asksGolden = mayBeGolden(state);
-  const seen = { cards, golden: asksGolden && draft.golden && cards.includes(deck.faces) };
+  const seen = cards.length === 0 ? {} : { cards: typedCards(draft, deck, asksGolden(state, fixed)) };
   const ready = seat !== undefined && problem === undefined;
   return (
-    <>
-      {!fixed && (
-        <SeatPick table={table} seats={holders(table)} value={seat} onPick={(picked) => change({ seat: picked })} />
+    <TypedForm
+      {...props}
+      seats={fixed ? [] : players(table)}
+      seat={seat}
+      label={name === undefined ? words.whoFirst : cards.length === 0 ? words.giftUnseen(name) : words.giftSeen(name)}
+      ready={ready}
+      onSubmit={() => ready && send({ case: "gift", value: { seat, ...seen } })}
+    />
+  );
+}
+
+/** Whether to ask for the Golden card: an earlier report may be from before it was played. */
+function asksGolden(state: TableState, fixed: boolean): boolean {
+  return fixed || mayBeGolden(state);
+}
+
+/** The typed cards as they are reported. */
+function typedCards({ hand, golden }: Draft, deck: Deck, asked: boolean) {
+  const { cards } = parseHand(hand, deck);
+  return { cards, golden: asked && golden && cards.includes(deck.faces) };
+}
+
+interface TypedFormProps extends FieldsProps {
+  /** Seats to choose from; none if the seat is given. */
+  seats: readonly number[];
+  fixed?: boolean;
+  expected?: number | undefined;
+  fault?: string | undefined;
+  /** The button. */
+  label: string;
+  ready: boolean;
+  onSubmit: () => void;
+}
+
+/** A form with typed cards: Enter sends it. */
+function TypedForm(props: TypedFormProps) {
+  const { state, table, draft, seats, seat, change, fixed = false, expected, fault, label, ready, onSubmit } = props;
+  return (
+    <form
+      class={css.part}
+      noValidate
+      onSubmit={(event) => {
+        event.preventDefault();
+        onSubmit();
+      }}
+    >
+      {seats.length > 0 && (
+        <SeatPick table={table} seats={seats} value={seat} onPick={(picked) => change({ seat: picked })} />
       )}
       <HandPick
-        deck={deck}
+        deck={deckOf(table.rules)}
         text={draft.hand}
         golden={draft.golden}
-        asksGolden={asksGolden}
-        onChange={({ text, golden }) =>
-          change({ ...(text === undefined ? {} : { hand: text }), ...(golden === undefined ? {} : { golden }) })
-        }
+        asksGolden={asksGolden(state, fixed)}
+        expected={expected}
+        fault={fault}
+        onChange={({ text = draft.hand, golden = draft.golden }) => change({ hand: text, golden })}
       />
       <Actions>
-        <Button
-          look="main"
-          aria-disabled={!ready}
-          onClick={() =>
-            ready && send({ case: "gift", value: { seat, ...(cards.length === 0 ? {} : { cards: seen }) } })
-          }
-        >
-          {name === undefined ? words.whoFirst : cards.length === 0 ? words.giftUnseen(name) : words.giftSeen(name)}
+        <Button look="main" type="submit" aria-disabled={!ready}>
+          {label}
         </Button>
       </Actions>
-    </>
+    </form>
   );
 }
 

@@ -13,21 +13,30 @@ import { cardWord, distinctName, playWords } from "../table/words";
 import { type Deck, type HandProblem, handText, type PlayDraft, parseHand } from "./entries";
 import css from "./Picks.module.css";
 
+/** Most cards in one row. */
+const ONE_ROW = 8;
+
 interface ChoiceProps {
   label: string;
   /** Hides the label for readers who see the buttons. */
   quiet?: boolean;
-  /** The options are cards. */
-  cards?: boolean;
+  /** Number of options that are cards; undefined if they are not. */
+  cards?: number;
   children: ComponentChildren;
 }
 
 /** A group of buttons of which one is chosen. */
-export function Choice({ label, quiet = false, cards = false, children }: ChoiceProps) {
+export function Choice({ label, quiet = false, cards, children }: ChoiceProps) {
   return (
     <fieldset class={css.choice} data-part="choice">
       <legend class={quiet ? "visually-hidden" : ""}>{label}</legend>
-      <div class={cards ? css.faces : css.options}>{children}</div>
+      {cards === undefined ? (
+        <div class={css.options}>{children}</div>
+      ) : (
+        <div class={css.faces} style={{ "--columns": cards > ONE_ROW ? Math.ceil(cards / 2) : cards }}>
+          {children}
+        </div>
+      )}
     </fieldset>
   );
 }
@@ -99,7 +108,7 @@ export function PlayPick({ deck, draft, requirement, golden, onChange }: PlayPic
   };
   return (
     <div class={css.play}>
-      <Choice label={words.face} cards>
+      <Choice label={words.face} cards={numbers.length}>
         {numbers.map((face) => {
           const card: CardValue = face > faces ? { kind: "joker" } : { kind: "face", face };
           return (
@@ -236,7 +245,7 @@ export function HandPick({ deck, text, golden, asksGolden, expected, fault, onCh
         autoComplete="off"
         autoCapitalize="characters"
       />
-      <Choice label={words.tap} cards>
+      <Choice label={words.tap} cards={all.length}>
         {all.map((card) => {
           const count = cards.filter((other) => other === card).length;
           const full = count >= (card > faces ? jokers : card);

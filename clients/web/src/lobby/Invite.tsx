@@ -35,17 +35,24 @@ export function Invite({ title, code, address, agent }: InviteProps) {
         {agent && <CopyLine label={agent.label} text={agent.command} mono />}
       </div>
       <QrCode text={address} label={words.qr} />
-      {isThisMachine(location.hostname) && (
-        <div class={css.here}>
-          <Notice kind="hint">
-            <span>
-              {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"}</code>
-              {words.thenOpen}
-            </span>
-          </Notice>
-        </div>
-      )}
+      <ThisMachine />
     </section>
+  );
+}
+
+/** Says that the addresses of this page lead nowhere on other devices; nothing if they do. */
+export function ThisMachine() {
+  const words = t().lobby.invite;
+  if (!isThisMachine(location.hostname)) return null;
+  return (
+    <div class={css.here}>
+      <Notice kind="hint">
+        <span>
+          {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"}</code>
+          {words.thenOpen}
+        </span>
+      </Notice>
+    </div>
   );
 }
 

@@ -91,7 +91,9 @@ export function rulesInShort(room: Room): string {
       (kind || reservedFor) !== ParticipantKind.ROBOT
     );
   });
-  if (room.policy) {
+  // At a table with real cards only remote participants have a clock.
+  const timed = room.seats.some(({ atTable, builtInAgent }) => !atTable && builtInAgent === "");
+  if (room.policy && (timed || room.origin !== GameOrigin.PHYSICAL)) {
     const clock = withPeople ? clockOfPeople(room.policy).decisionTimeMs : room.policy.decisionTimeMs;
     parts.push(words.decisionTime(clock ?? 0));
   }

@@ -106,7 +106,7 @@ export function happeningWords(table: TableState, entry: LogEntry): SaidLine {
     case "substituted":
       return { seat: entry.seat, text: words.substituted(entry.agent) };
     case "handReported":
-      return { seat: entry.seat, text: words.handReported };
+      return { seat: undefined, text: words.handReported(distinctName(table, entry.seat)) };
     case "violated": {
       const text = violationWords(table, entry.breach, entry.demand);
       return { seat: entry.breach.seat, text: entry.breach.seat === undefined ? text : words.violated(text) };

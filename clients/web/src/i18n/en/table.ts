@@ -90,7 +90,7 @@ export const table = {
       recorded: "as recorded",
       table: "",
     },
-    handReported: "shows all cards to the referee",
+    handReported: (name: string) => `The referee has seen the hand of ${name}`,
     violated: (text: string) => `is stopped by the referee: ${text}`,
     corrected: (text: string) => `Corrected: ${text}`,
     paused: "The game is paused",

@@ -71,7 +71,7 @@ export const table: Texts["table"] = {
       recorded: "come registrato",
       table: "",
     },
-    handReported: "mostra tutte le carte all’arbitro",
+    handReported: (name) => `L’arbitro ha visto la mano di ${name}`,
     violated: (text) => `riceve un richiamo dall’arbitro: ${text}`,
     corrected: () => "Un errore di lettura è stato corretto",
     paused: "La partita è in pausa",
