@@ -162,6 +162,8 @@ def test_readings_are_complete_expressions() -> None:
 @pytest.mark.server
 def test_every_event_of_a_game_is_a_marker(server_address: str) -> None:
     markers: list[tuple[dict[str, Any], float]] = []
+    # An outlet that is gone delivers nothing more: this one stays until everything is recorded.
+    outlets: list[Any] = []
 
     async def record(room_id: str) -> None:
         """What a recorder does: finds the stream and fetches its samples until the game's end."""
@@ -179,6 +181,7 @@ def test_every_event_of_a_game_is_a_marker(server_address: str) -> None:
                 recording = asyncio.create_task(record(game.room_id))
 
                 async def recorded(outlet: Any) -> None:
+                    outlets.append(outlet)
                     assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
 
                 sending = asyncio.create_task(send_markers(client, game.room_id, linger_s=0, ready=recorded))
