@@ -6,7 +6,9 @@ what moves is painted over it, so that a frame costs a few milliseconds.
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import insort
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -194,8 +196,12 @@ class SyntheticTable:
         self._gestures: list[_Gesture] = []
         self._changes: list[tuple[float, bool, Lying]] = []
         """Time, whether the piece is laid (else taken), and the piece."""
-        self._plan(acts, np.random.default_rng((seed, 1)))
-        self.duration = max((gesture.keys[-1][0] for gesture in self._gestures), default=0.0) + tail
+        self._lying: list[Lying] = []
+        """What lies on the table when all acts are done."""
+        self._rng = np.random.default_rng((seed, 1))
+        for act in sorted(acts, key=lambda act: act.start):
+            self.perform(act)
+        self.duration = self.busy_until + tail
         rng = np.random.default_rng((seed, 2))
         width, height = size
         focal = width * rng.uniform(0.88, 1.0)
@@ -216,43 +222,48 @@ class SyntheticTable:
 
     # The plan: acts become ways of hands and changes of what lies there.
 
-    def _plan(self, acts: Sequence[Act], rng: np.random.Generator) -> None:
-        lying: list[Lying] = []
+    @property
+    def busy_until(self) -> float:
+        """When the last hand has left the table, in s."""
+        return max((gesture.keys[-1][0] for gesture in self._gestures), default=0.0)
+
+    def perform(self, act: Act) -> None:
+        """Adds an act, which must not start before those added so far. While frames are taken, it starts after the last frame."""
+        rng, lying = self._rng, self._lying
         places, pass_places = field.places(), field.pass_places()
-        for act in sorted(acts, key=lambda act: act.start):
-            if isinstance(act, LayCards):
-                pieces = [
-                    (Piece(PieceKind.CARD, card.deck, card.index), place) for card, place in zip(act.cards, act.places, strict=True)
-                ]
-                laid = self._lay(
-                    act.start, act.seat, [(piece, place, places[place - 1]) for piece, place in pieces], act.face_down, rng
-                )
-                lying += laid
-                self._happened("laid", laid[-1].since, act.seat, act.cards, act.places)
-            elif isinstance(act, ShowPass):
-                pass_card = Piece(PieceKind.PASS, self._deck, act.seat)
-                laid = self._lay(act.start, act.seat, [(pass_card, act.seat, pass_places[act.seat])], False, rng)
-                lying += laid
-                self._happened("pass_shown", laid[-1].since, act.seat)
-            elif isinstance(act, Hover):
-                place = places[act.place - 1]
-                start, held = _outside(act.seat, place.x, place.y), _grip(act.seat, place.x, place.y)
-                arrived = act.start + REACH_TIME
-                keys = [
-                    (act.start, *start, _CARRY_HEIGHT),
-                    (arrived, *held, _CARRY_HEIGHT / 2),
-                    (arrived + act.duration, *held, _CARRY_HEIGHT / 2),
-                    (arrived + act.duration + REACH_TIME, *start, _CARRY_HEIGHT),
-                ]
-                gesture = _Gesture(act.seat, keys)
-                if act.card is not None:
-                    piece = Piece(PieceKind.CARD, act.card.deck, act.card.index)
-                    gesture.carried.append((Lying(piece, act.place, place.x, place.y, 0.0, 0.0), act.start, keys[-1][0], None))
-                self._gestures.append(gesture)
-            else:
-                taken = self._taken(act, lying)
-                lying = [piece for piece in lying if piece not in taken]
-                self._take(act, taken)
+        if isinstance(act, LayCards):
+            pieces = [
+                (Piece(PieceKind.CARD, card.deck, card.index), place) for card, place in zip(act.cards, act.places, strict=True)
+            ]
+            laid = self._lay(
+                act.start, act.seat, [(piece, place, places[place - 1]) for piece, place in pieces], act.face_down, rng
+            )
+            lying += laid
+            self._happened("laid", laid[-1].since, act.seat, act.cards, act.places)
+        elif isinstance(act, ShowPass):
+            pass_card = Piece(PieceKind.PASS, self._deck, act.seat)
+            laid = self._lay(act.start, act.seat, [(pass_card, act.seat, pass_places[act.seat])], False, rng)
+            lying += laid
+            self._happened("pass_shown", laid[-1].since, act.seat)
+        elif isinstance(act, Hover):
+            place = places[act.place - 1]
+            start, held = _outside(act.seat, place.x, place.y), _grip(act.seat, place.x, place.y)
+            arrived = act.start + REACH_TIME
+            keys = [
+                (act.start, *start, _CARRY_HEIGHT),
+                (arrived, *held, _CARRY_HEIGHT / 2),
+                (arrived + act.duration, *held, _CARRY_HEIGHT / 2),
+                (arrived + act.duration + REACH_TIME, *start, _CARRY_HEIGHT),
+            ]
+            gesture = _Gesture(act.seat, keys)
+            if act.card is not None:
+                piece = Piece(PieceKind.CARD, act.card.deck, act.card.index)
+                gesture.carried.append((Lying(piece, act.place, place.x, place.y, 0.0, 0.0), act.start, keys[-1][0], None))
+            self._gestures.append(gesture)
+        else:
+            taken = self._taken(act, lying)
+            lying[:] = [piece for piece in lying if piece not in taken]
+            self._take(act, taken)
 
     def _happened(self, kind: str, time: float, seat: int, cards: tuple[Card, ...] = (), places: tuple[int, ...] = ()) -> None:
         self.happenings.append(Happening(kind, time, seat, cards, places))
@@ -277,7 +288,7 @@ class SyntheticTable:
             laid.append(lies)
             keys.append((time, *_grip(seat, lies.x, lies.y), 2.0))
             gesture.carried.append((lies, start, time, None))
-            self._changes.append((time, True, lies))
+            insort(self._changes, (time, True, lies), key=lambda change: change[0])
         end = keys[-1][0] + REACH_TIME
         last = pieces[-1][2]
         keys.append((end, *_outside(seat, last.x, last.y), _CARRY_HEIGHT))
@@ -317,7 +328,7 @@ class SyntheticTable:
             time = times[piece.place]
             x, y, _ = gesture.at(time)
             gesture.carried.append((piece, time, end, (piece.x - x, piece.y - y)))
-            self._changes.append((time, False, piece))
+            insort(self._changes, (time, False, piece), key=lambda change: change[0])
         self._gestures.append(gesture)
         cards = tuple(card for piece in taken if (card := piece.piece.card) is not None)
         places = tuple(piece.place for piece in taken)
@@ -416,11 +427,13 @@ class SyntheticTable:
         _width, height = self.size
         blur = self.difficulty.blur * height / 720
         maps = self._table_maps()
-        changes = sorted(self._changes, key=lambda change: change[0])
+        done = 0
         bumps = list(self._bumps)
         lying: list[Lying] = []
         still, sharp = self._still(maps, lying, blur)
-        for index in range(int(self.duration * self.fps)):
+        for index in itertools.count():
+            if index >= int(self.duration * self.fps):
+                return
             time = index / self.fps
             changed = False
             while bumps and bumps[0].time <= time:
@@ -428,8 +441,9 @@ class SyntheticTable:
                 maps = self._table_maps()
                 changed = True
             laid: list[Lying] = []
-            while changes and changes[0][0] <= time:
-                _, is_laid, piece = changes.pop(0)
+            while done < len(self._changes) and self._changes[done][0] <= time:
+                _, is_laid, piece = self._changes[done]
+                done += 1
                 if is_laid:
                     lying.append(piece)
                     laid.append(piece)
