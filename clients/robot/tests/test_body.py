@@ -12,10 +12,8 @@ from chefshat_robot.body import PASS, Body, Notice, Times, Turn
 from chefshat_robot.drivers.driver import Act, CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Point, Pose, RobotError, Say
 from chefshat_robot.player import RobotPlayer, limit_s, turn_of
 from chefshat_robot.words import Words
-from tests.loop import run
+from tests.loop import run, until
 from tests.robots import HAND, ScriptedRobot, game_started, numbered, passed, pizza_done, play, shift_started
-
-FAR_S = 3600.0
 
 
 def said(robot: ScriptedRobot) -> list[str]:
@@ -42,7 +40,7 @@ def test_a_turn_is_said_looked_at_and_laid_from_the_stand_to_the_field() -> None
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
-        assert await body.take_turn(Turn(11, 2, 1), FAR_S)
+        assert await body.take_turn(Turn(11, 2, 1)).wait()
         assert [type(act) for act in robot.acts] == [Say, Gaze, Pick]
         assert said(robot) == ["I play two 11s and a joker."]
         moves = carried(robot)
@@ -63,7 +61,7 @@ def test_a_pass_puts_the_pass_card_down_and_takes_it_back_when_the_pizza_is_done
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
-        await body.take_turn(PASS, FAR_S)
+        await body.take_turn(PASS).wait()
         for event in list(numbered({}, {}, passed(1), pizza_done(0, 0)))[2:]:
             body.on_event(event)
         await body.idle()
@@ -82,7 +80,7 @@ def test_a_failed_pick_is_asked_of_the_people_aloud_and_reported() -> None:
     async def test() -> None:
         robot, notices = ScriptedRobot(drops), list[Notice]()
         body = await table(robot, notices)
-        await body.take_turn(Turn(9, 2, 0), FAR_S)
+        await body.take_turn(Turn(9, 2, 0)).wait()
         assert said(robot) == ["I play two 9s.", "Please lay my two 9s for me."]
         assert robot.acts[-1] == Point(97.5, 151.0)
         (notice,) = notices
@@ -101,7 +99,7 @@ def test_a_robot_that_is_gone_or_hangs_is_reported_and_stopped(failure: Exceptio
     async def test() -> None:
         robot, notices = ScriptedRobot(lambda act: failure), list[Notice]()
         body = await table(robot, notices, Times(say=0.01, pick=0.005, point=0.01, gaze=0.01, express=0.01))
-        assert await body.take_turn(Turn(9, 2, 0), FAR_S)
+        assert await body.take_turn(Turn(9, 2, 0)).wait()
         assert [(notice.kind, notice.text) for notice in notices] == [
             ("unsaid", "I play two 9s."),
             ("help", "Please lay my two 9s for me."),
@@ -118,7 +116,7 @@ def test_a_default_decision_is_performed_and_the_cards_laid_too_late_are_asked_b
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
-        await body.take_turn(Turn(9, 2, 0), FAR_S)
+        await body.take_turn(Turn(9, 2, 0)).wait()
         for event in list(numbered({}, {}, passed(1)))[2:]:
             body.on_event(event)
         await body.idle()
@@ -135,7 +133,7 @@ def test_own_turns_that_nobody_announced_are_performed_once_and_announced_ones_n
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
-        await body.take_turn(Turn(9, 1, 0), FAR_S)
+        await body.take_turn(Turn(9, 1, 0)).wait()
         for event in list(numbered({}, {}, play(1, 9, 1, cards_left=16), play(1, 7, 1, cards_left=15)))[2:]:
             body.on_event(event)
         await body.idle()
@@ -156,7 +154,7 @@ def test_events_of_the_past_are_followed_without_acts() -> None:
             assert [type(act) for act in robot.acts] == [Gaze]
             assert body.state.hand[10] == 4
             assert not body.state.golden
-            await body.take_turn(Turn(11, 1, 0), FAR_S)
+            await body.take_turn(Turn(11, 1, 0)).wait()
             assert [move.piece for move in carried(robot)] == ["11"]
 
     run(test())
@@ -189,7 +187,7 @@ def test_gifts_are_carried_without_saying_what_they_are() -> None:
         assert [move.piece for move in carried(robot)] == ["10", "golden"]
         assert {(move.end.x, move.end.y) for move in carried(robot)} == {(630.0, 200.0)}
         # What it received lies in the slots that became free, and is found there.
-        await body.take_turn(Turn(1, 1, 0), FAR_S)
+        await body.take_turn(Turn(1, 1, 0)).wait()
         start = carried(robot)[-1].start
         assert start is not None
         assert start.y == 25 * HAND.index(10)
@@ -202,8 +200,8 @@ def test_gifts_that_were_decided_are_carried_once_and_wrong_ones_asked_back() ->
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
-        assert await body.give(12, 3, FAR_S)
-        assert await body.give(2, 3, FAR_S)
+        assert await body.give(12, 3).wait()
+        assert await body.give(2, 3).wait()
         # The second was too late: the server gave an 11 instead.
         gift = pb.CardsExchanged(giver=1, receiver=3, count=2, cards=[11, 12])
         for event in list(numbered({}, {}, {"cards_exchanged": gift}))[2:]:
@@ -277,17 +275,48 @@ def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_r
     run(test())
 
 
-def test_at_a_table_with_real_cards_of_others_the_decision_comes_before_the_cards() -> None:
+def test_at_a_physical_table_the_decision_comes_before_the_cards() -> None:
     async def test() -> None:
-        robot, notices = ScriptedRobot(lambda act: None), list[Notice]()
-        seat = SeatInfo("room", "game", 1)
-        started = game_started()["game_started"]
-        assert isinstance(started, pb.GameStarted)
-        started.seats[0].at_table = True
-        seat.game_started = started
-        async with Body(robot, Words("en"), seat=1, notify=notices.append, finish_s=0) as body:
+        robot = ScriptedRobot(lambda act: None)
+        async with Body(robot, Words("en"), seat=1, finish_s=0) as body:
+            hand = pb.SeatCards(seat=1, cards=[9, 9, 11, 12], golden=True)
+            dealt: dict[str, object] = {"shift_started": pb.ShiftStarted(shift=1)}
+            for event in numbered(game_started(), dealt, {"hand_reported": pb.HandReported(hand=hand)}):
+                body.on_event(event)
+            assert body.state.real_cards
+            assert (body.state.hand[8], body.state.golden) == (2, True)
+            robot.acts.clear()
             player = RobotPlayer(Takes(199), body)
-            assert await player.decide(request([199], seat=seat)) == 199
+            assert await player.decide(request([199])) == 199
+            assert said(robot) == []
+            for event in list(numbered({}, {}, {}, passed(1)))[3:]:
+                player.on_event(event)
+            await until(lambda: said(robot) == ["I pass."])
+
+    run(test())
+
+
+def test_at_a_physical_table_a_gift_is_carried_when_its_decision_counts() -> None:
+    async def test() -> None:
+        robot = ScriptedRobot()
+        async with Body(robot, Words("en"), seat=1) as body:
+            dealt: dict[str, object] = {"shift_started": pb.ShiftStarted(shift=2)}
+            hand = pb.SeatCards(seat=1, cards=[9, 9, 11, 12])
+            for event in numbered(game_started(), dealt, {"hand_reported": pb.HandReported(hand=hand)}):
+                body.on_event(event)
+            player = RobotPlayer(Takes(200 + 8), body)
+            gift = pb.GiftRequirement(number=1, total=1, receiver=2)
+            seen = bytes([0] * 8 + [2, 0, 1, 1])
+            decision = request([208], hand=seen, cards_left=bytes([4] * 4))
+            decision.request.kind = pb.DECISION_KIND_EXCHANGE
+            decision.request.gift_requirement.CopyFrom(gift)
+            assert await player.decide(decision) == 208
+            await body.idle()
+            assert carried(robot) == []
+            player.on_result(pb.AnswerResult(decision_id=1, status=pb.ANSWER_STATUS_ACCEPTED))
+            await body.idle()
+            (move,) = carried(robot)
+            assert (move.piece, move.end.y) == ("9", -70.0)
 
     run(test())
 
@@ -348,7 +377,7 @@ def test_a_turn_is_not_delayed_by_reactions_that_wait() -> None:
         body = await table(robot, notices)
         for event in list(numbered({}, {}, play(2, 11, 1), passed(3), play(0, 10, 1)))[2:]:
             body.on_event(event)
-        await body.take_turn(PASS, FAR_S)
+        await body.take_turn(PASS).wait()
         assert [type(act) for act in robot.acts] == [Say, Gaze, Pick]
         await body.__aexit__(None, None, None)
 

@@ -224,35 +224,21 @@ class Body:
         if self._stand is not None:
             self._stand.settle(self.state.hand, self.state.golden)
 
-    async def take_turn(self, turn: Turn, limit_s: float) -> bool:
-        """Performs an own turn. Returns True when its acts have ended, False after `limit_s` seconds; they then continue.
-
-        If the limit is not positive, it returns at once.
-        """
+    def take_turn(self, turn: Turn) -> asyncio.Event:
+        """Starts to perform an own turn. Returns an event that is set when its acts have ended."""
         self._announced = turn
-        return await self._performed(self._turn_job(turn, self.state), limit_s)
+        return self._need(self._turn_job(turn, self.state))
 
-    async def give(self, face: int, receiver: int, limit_s: float) -> bool:
-        """Gives a card in the exchange; face F+1 is a joker. Returns as `take_turn`. What the card is is not said."""
+    def give(self, face: int, receiver: int) -> asyncio.Event:
+        """Starts to give a card in the exchange; face F+1 is a joker. Returns as `take_turn`. What the card is is not said."""
         state, stand = self.state, self._stand
         if stand is None or not self._handles_cards:
-            return True
+            return self._need(_Job(()))
         piece = layout.piece_of(face, state.faces)
         if piece not in stand.slots and face == state.faces:
             piece = "golden"  # It is given after the others of its face.
         self._given.append(piece)
-        return await self._performed(self._gift_job([piece], receiver, stand), limit_s)
-
-    async def _performed(self, job: _Job, limit_s: float) -> bool:
-        """Queues a job, and waits for its end as long as allowed."""
-        self._need(job)
-        if limit_s <= 0:
-            return False
-        try:
-            await asyncio.wait_for(job.done.wait(), limit_s)
-        except TimeoutError:
-            return False
-        return True
+        return self._need(self._gift_job([piece], receiver, stand))
 
     def say(self, text: str) -> None:
         """Says a line, before anything less urgent."""
@@ -304,6 +290,8 @@ class Body:
             self._pass_is_down = False
             self._announced = None
             self._given.clear()
+        elif kind == "hand_reported":
+            stand.settle(after.hand, after.golden)
         elif kind == "cards_exchanged" and event.cards_exchanged.giver == own:
             self._exchanged(event.cards_exchanged, after, stand, live)
         elif kind == "cards_exchanged" and event.cards_exchanged.receiver == own and after.hand:
@@ -444,10 +432,11 @@ class Body:
 
     # The queues.
 
-    def _need(self, job: _Job) -> None:
+    def _need(self, job: _Job) -> asyncio.Event:
         self._needed.append(job)
         self._reactions.clear()
         self._wake()
+        return job.done
 
     def _reaction(self, *acts: Act) -> None:
         self._reactions.append(_Job(acts))

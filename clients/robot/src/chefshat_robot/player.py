@@ -1,13 +1,14 @@
 """An agent with a body: an agent of `chefshat` decides, and a robot does at the table what it decided.
 
 What the robot does is in `body`. A decision is answered when the robot has finished its turn, or when the time of the decision is
-nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision. At a table where
-others play with real cards it is answered at once, and then laid.
+nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision. At a physical table
+it is answered at once, and then laid.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Awaitable, Callable
 
@@ -46,6 +47,8 @@ class RobotPlayer(chefshat.Agent):
         self._hold_s = hold_s
         self._on_robot_event = on_robot_event
         self._listener: asyncio.Task[None] | None = None
+        # The gift decided last at a physical table: number of the decision, face and receiver.
+        self._gift: tuple[int, int, int] | None = None
 
     async def decide(self, request: Decision) -> int:
         """Lets the agent decide, and the robot act. Illegal actions of the agent are answered at once, without an act."""
@@ -59,16 +62,24 @@ class RobotPlayer(chefshat.Agent):
 
     async def _act(self, request: Decision, action: int, asked: float) -> None:
         """Lets the robot act, as long as the decision allows."""
-        limit = limit_s(request.time_left_ms, time.monotonic() - asked)
-        if self._hold_s is not None:
-            limit = min(limit, self._hold_s)
-        if decided_before_laid(request.seat_info):
-            limit = 0.0
         gift = request.gift_requirement
+        face = action - request.turn_actions + 1
+        if self._body.state.real_cards:
+            # The referee expects a decision before its cards. A turn's event lets the body act, but the event of a gift comes only
+            # when the exchange is complete.
+            self._gift = (request.decision_id, face, gift.receiver) if gift is not None else None
+            return
         if request.kind == pb.DECISION_KIND_TURN:
-            await self._body.take_turn(turn_of(action, request.faces), limit)
+            done = self._body.take_turn(turn_of(action, request.faces))
         elif gift is not None:
-            await self._body.give(action - request.turn_actions + 1, gift.receiver, limit)
+            done = self._body.give(face, gift.receiver)
+        else:
+            return
+        limit = limit_s(request.time_left_ms, time.monotonic() - asked)
+        limit = limit if self._hold_s is None else min(limit, self._hold_s)
+        if limit > 0:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(done.wait(), limit)
 
     def on_attached(self, seat: SeatInfo) -> None:
         """Sets the robot's seat."""
@@ -87,7 +98,10 @@ class RobotPlayer(chefshat.Agent):
         self._agent.on_snapshot(snapshot)
 
     def on_result(self, result: pb.AnswerResult) -> None:
-        """Passes it to the agent."""
+        """Passes it to the agent. Lets the robot carry a gift at a physical table."""
+        if self._gift is not None and self._gift[0] == result.decision_id and result.status == pb.ANSWER_STATUS_ACCEPTED:
+            _, face, receiver = self._gift
+            self._body.give(face, receiver)
         self._agent.on_result(result)
 
     def on_refused(self, refused: pb.Refused) -> None:
@@ -122,11 +136,6 @@ def limit_s(time_left_ms: int, used_s: float) -> float:
     """
     left = time_left_ms / 1000
     return left - used_s - max(left * MARGIN, MIN_MARGIN_S)
-
-
-def decided_before_laid(seat: SeatInfo) -> bool:
-    """Whether others at the table play with real cards: the referee then expects a decision before its cards."""
-    return seat.game_started is not None and any(participant.at_table for participant in seat.game_started.seats)
 
 
 def turn_of(action: int, faces: int) -> Turn:

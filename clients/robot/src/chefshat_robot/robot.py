@@ -11,6 +11,7 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 
 from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
 from chefshat.agent import make_agent
@@ -22,8 +23,9 @@ from chefshat_robot import drivers, speech, wire
 from chefshat_robot.affect import Forwarder, tickets
 from chefshat_robot.body import Body, Notice, Times
 from chefshat_robot.cli import CommandError
-from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Express, Outcome, RobotEvent, Say
+from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Express, Outcome, Pick, RobotEvent, Say
 from chefshat_robot.player import RobotPlayer
+from chefshat_robot.reporting import Reporter
 from chefshat_robot.running import run_command
 from chefshat_robot.words import LANGUAGES, Words
 
@@ -55,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who decides: 'random', module:Class of a chefshat.Agent, or a trained network, FILE.safetensors (default: random)",
     )
     parser.add_argument("--seed", type=int, help="seed of the agent")
+    parser.add_argument(
+        "--table-ticket",
+        default="",
+        metavar="TICKET",
+        help="of a physical room: report what the robot has laid, passed and given, so that no camera or attendant has to",
+    )
     parser.add_argument(
         "--people",
         action="append",
@@ -104,6 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
                 handles_cards=not arguments.no_cards,
                 hold_s=arguments.hold,
                 times=Times().times(arguments.patience),
+                table_ticket=arguments.table_ticket,
                 people=Forwarder(client, tickets(arguments.people)) if arguments.people else None,
                 notify=attendant(arguments.json),
             )
@@ -123,6 +132,7 @@ async def play_seat(
     hold_s: float | None = None,
     times: Times | None = None,
     people: Forwarder | None = None,
+    table_ticket: str = "",
     notify: Callable[[Notice], None] = lambda notice: None,
 ) -> SeatResult:
     """Plays one seat with a robot until its game is over.
@@ -139,6 +149,7 @@ async def play_seat(
         hold_s: most seconds by which the robot's acts may delay an answer.
         times: limits of its acts.
         people: where to send the expressions that the robot reads in people's faces and voices; None: nowhere.
+        table_ticket: of a physical table, to which the robot reports what it has laid, passed and given; empty: it does not report.
         notify: called with messages to the attendant, in addition.
 
     Raises:
@@ -147,6 +158,7 @@ async def play_seat(
     """
     outbox = speech.Outbox(client, ticket)
     readings: set[asyncio.Task[None]] = set()
+    reporter = Reporter(client, table_ticket) if table_ticket else None
 
     def noticed(notice: Notice) -> None:
         notify(notice)
@@ -156,6 +168,8 @@ async def play_seat(
     def acted(act: Act, outcome: Outcome) -> None:
         if isinstance(act, Say) and isinstance(outcome, Done):
             outbox.send(speech.line(act.text, record_only=True))
+        elif isinstance(act, Pick) and isinstance(outcome, Done) and reporter is not None:
+            reporter.carried(act, body.state)
         elif isinstance(act, Express) and isinstance(outcome, Done):
             outbox.send(pb.Expression(label=act.label, valence=act.valence, arousal=act.arousal, source=pb.EXPRESSION_SOURCE_MODEL))
 
@@ -170,7 +184,7 @@ async def play_seat(
             reading.add_done_callback(readings.discard)
 
     body = Body(driver, words, notify=noticed, on_act=acted, times=times, handles_cards=handles_cards)
-    async with outbox, body:
+    async with outbox, reporter or nullcontext(), body:
         player = RobotPlayer(agent, body, hold_s=hold_s, on_robot_event=perceived)
         result = await client.play(player, ticket, options=PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
     await asyncio.gather(*readings)

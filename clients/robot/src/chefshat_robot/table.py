@@ -41,6 +41,7 @@ class TableState:
         pass_scope_turn: a pass counts for one turn only.
         over: the game has ended.
         hand_size: cards dealt to each seat.
+        real_cards: the game is played with real cards at a physical table.
     """
 
     seat: int | None = None
@@ -64,6 +65,7 @@ class TableState:
     pass_scope_turn: bool = False
     over: bool = False
     hand_size: int = 0
+    real_cards: bool = False
 
     @property
     def players(self) -> int:
@@ -82,6 +84,8 @@ def follow(state: TableState, event: pb.GameEvent) -> TableState:
             return _started(state, event.game_started)
         case "shift_started":
             return _dealt(state, event.shift_started)
+        case "hand_reported":
+            return _hand_reported(state, event.hand_reported)
         case "roles_assigned":
             return replace(state, roles=tuple(event.roles_assigned.roles))
         case "cards_exchanged":
@@ -166,6 +170,13 @@ def _dealt(state: TableState, dealt: pb.ShiftStarted) -> TableState:
         to_act=None,
         opening=True,
     )
+
+
+def _hand_reported(state: TableState, reported: pb.HandReported) -> TableState:
+    hand = reported.hand
+    if hand.seat != state.seat or not hand.cards:
+        return replace(state, real_cards=True)
+    return replace(state, real_cards=True, hand=counts_of(list(hand.cards), state.faces), golden=hand.golden)
 
 
 def _exchanged(state: TableState, exchanged: pb.CardsExchanged) -> TableState:

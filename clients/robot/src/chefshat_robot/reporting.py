@@ -1,0 +1,85 @@
+"""A robot's own reports to a physical table: what it has carried, it has laid, passed or given.
+
+With them a table needs no camera for the robot's seat; with a camera they do no harm: the referee recognises repeated reports.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import Self
+
+from chefshat import ChefsHatError, aio, pb
+
+from chefshat_robot import layout
+from chefshat_robot.drivers.driver import Pick
+from chefshat_robot.table import TableState
+
+LOG = logging.getLogger("chefshat_robot")
+
+
+class Reporter:
+    """Reports what a robot has carried, in order, in the background. An asynchronous context manager: leaving sends what waits."""
+
+    def __init__(self, client: aio.Client, table_ticket: str) -> None:
+        """Sets the table.
+
+        Args:
+            client: the connection to the server.
+            table_ticket: of the table, from creating the room.
+        """
+        self._client = client
+        self._ticket = table_ticket
+        # The last entry is None.
+        self._waiting: asyncio.Queue[pb.TableReport | None] = asyncio.Queue()
+        self._sender: asyncio.Task[None] | None = None
+
+    def carried(self, pick: Pick, state: TableState) -> None:
+        """Queues the report for pieces that were carried, if they mean something in the game."""
+        report = report_of(pick, state)
+        if report is not None:
+            self._waiting.put_nowait(report)
+
+    async def __aenter__(self) -> Self:
+        self._sender = asyncio.create_task(self._run(), name="robot reports")
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._waiting.put_nowait(None)
+        if self._sender is not None:
+            await self._sender
+
+    async def _run(self) -> None:
+        while (report := await self._waiting.get()) is not None:
+            try:
+                response = await self._client.report(self._ticket, report)
+                if response.verdict not in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN):
+                    LOG.warning("the referee did not accept what the robot did: %s", response.detail)
+            except ChefsHatError as error:
+                LOG.warning("what the robot did was not reported: %s", error)
+
+
+def report_of(pick: Pick, state: TableState) -> pb.TableReport | None:
+    """Returns the report for pieces that a robot has carried; None if they mean nothing, as a pass card taken back."""
+    seat = state.seat
+    if seat is None:
+        return None
+    report = pb.TableReport(source=pb.REPORT_SOURCE_ROBOT)
+    pieces = [move.piece for move in pick.moves]
+    ends = [move.end for move in pick.moves]
+    if pieces == ["pass"]:
+        if ends[0] != layout.pass_place(seat):
+            return None
+        getattr(report, "pass").CopyFrom(pb.PassShown(seat=seat))
+        return report
+    cards = pb.SeenCards(cards=[card_of(piece, state.faces) for piece in pieces], golden="golden" in pieces)
+    if ends[0] == layout.play_places(1)[0]:
+        report.laid.CopyFrom(pb.CardsLaid(seat=seat, cards=cards))
+    else:
+        report.gift.CopyFrom(pb.GiftSeen(seat=seat, cards=cards))
+    return report
+
+
+def card_of(piece: str, faces: int) -> int:
+    """Returns the number of a card: its face, or F+1 for a joker."""
+    return {"golden": faces, "joker": faces + 1}.get(piece) or int(piece)
