@@ -70,7 +70,7 @@ class Happening:
 
     Attributes:
         kind: `laid`, `taken_back`, `cleared`, `pass_shown` or `pass_withdrawn`, as events are named.
-        time: When it was complete, in s: the last card at rest, or the last card off the field.
+        time: When it was complete, in s: the last card at rest, or the last card taken from its place.
         cards: The cards laid or taken back.
         places: The place of each card, 1..11.
         seat: Whose hand did it.
@@ -337,7 +337,7 @@ class SyntheticTable:
         elif isinstance(act, TakeBack):
             self._happened("taken_back", max(times.values()), act.seat, cards, places)
         else:
-            self._happened("cleared", end, act.seat)
+            self._happened("cleared", max(times.values()), act.seat)
 
     # The camera.
 

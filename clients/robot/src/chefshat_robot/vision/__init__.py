@@ -21,6 +21,7 @@ from .events import (
     to_json,
 )
 from .frames import Frame, SourceError, open_source
+from .perception import Perception
 
 __all__ = [
     "Camera",
@@ -34,6 +35,7 @@ __all__ = [
     "Observed",
     "PassShown",
     "PassWithdrawn",
+    "Perception",
     "Picture",
     "SourceError",
     "TakenBack",

@@ -53,6 +53,23 @@ class Camera:
         found, _ = cv2.projectPoints(np.ascontiguousarray(rays), zero, zero, self.matrix, self.distortion)
         return np.asarray(found, dtype=np.float64).reshape(-1, 2)
 
+    def scaled(self, width: int, height: int) -> Camera:
+        """The same camera with pictures of another size.
+
+        Raises:
+            ValueError: The size has other proportions: such a picture is cut, and how is not known.
+        """
+        factor = width / self.width
+        if (width, height) == (self.width, self.height):
+            return self
+        if abs(height - self.height * factor) > 1.0:
+            raise ValueError(
+                f"the camera was calibrated with pictures of {self.width}x{self.height}, these are {width}x{height}; calibrate again"
+            )
+        matrix = self.matrix * factor
+        matrix[2, 2] = 1.0
+        return Camera(width, height, matrix, self.distortion, self.error * factor)
+
     def save(self, path: Path) -> None:
         """Writes the camera to a JSON file."""
         values = {

@@ -1,0 +1,517 @@
+"""Decides over several frames what happened at the table: sightings in, events out.
+
+The decider sees no pictures, so that a recording of sightings gives the same events as the camera did. Its rule:
+
+- A card **settles** when its tag was read `SETTLE_READS` times within `STILL_MM` while nothing moved around its place.
+- Cards that settled are reported together as soon as nothing moves at any place for cards (`QUIET_FRAMES`) and every place is
+  **explained**: its look is the one it had before, it is empty, or the card on top of it was read since the look changed.
+- A place that stays unexplained for `DOUBT_SECONDS` while no arm reaches over the edge of the field becomes a doubt, and so does one
+  that is covered again before it could be read.
+  Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
+- A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone;
+  if others stay for `TAKEN_SECONDS`, the cards were taken back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field as dataclass_field
+
+from chefshat_robot import field
+from chefshat_robot.deck import Card, Piece, PieceKind, deck, piece_of_tag
+
+from .events import Cleared, Doubt, DoubtResolved, FieldChanged, Laid, Observed, PassShown, PassWithdrawn, TakenBack
+from .reader import SPOTS, STILL_FRAMES, SeenPlace, SeenTag, Sighting
+
+SETTLE_READS = 3
+"""A card is believed after so many readings at one position."""
+STILL_MM = 1.5
+"""Readings within this distance are of one position, in mm. The hand that still holds a card moves it further."""
+QUIET_FRAMES = 3
+"""Cards are reported when nothing has moved at any place for so many frames."""
+GONE_FRAMES = 3
+"""A place is empty when it has looked empty for so many frames."""
+DOUBT_SECONDS = 1.2
+"""A place that cannot be explained for this long becomes a doubt, in s."""
+TAKEN_SECONDS = 1.2
+"""Cards that are gone for this long while others stay were taken back, in s."""
+REACH = 45.0
+"""A card belongs to the nearest place, if its centre is no further from it than this, in mm."""
+TRUSTED_HAMMING = 1
+"""Tags with more corrected bits are only options of a doubt."""
+SAME_CARD_MM = 12.0
+"""The two tags of a card give its centre within this distance; else there are two cards with one code, in mm."""
+
+CARD_SPOTS = range(len(field.places()))
+"""The places for cards among all places."""
+_FIRST_PASS = len(CARD_SPOTS)
+_TAG_TO_CENTRE = (field.CARD_WIDTH / 2 - field.CARD_TAG_CENTRE[0], field.CARD_HEIGHT / 2 - field.CARD_TAG_CENTRE[1])
+
+
+@dataclass
+class _Track:
+    """A piece while its place is still."""
+
+    piece: Piece
+    spot: int
+    x: float
+    y: float
+    angle: float
+    trusted: int = 0
+    """Readings that are trusted."""
+    ends: set[bool] = dataclass_field(default_factory=set)
+    """Which of its two tags were read."""
+
+
+@dataclass
+class _Known:
+    """A piece that lies on the field, as far as is known."""
+
+    spot: int
+    told: bool = False
+    """Whether it is the answer to a doubt, and was never read."""
+
+
+@dataclass
+class _Spot:
+    """What is known of a place."""
+
+    explained: int = 0
+    """The last look that was explained."""
+    since: float | None = None
+    """Since when it is still and unexplained, in s."""
+    frames: int = 0
+    """For how many frames it is still and unexplained."""
+    suspect: bool = False
+    """Whether it was covered before an unexplained look was explained."""
+    doubt: int | None = None
+    """The open doubt about its present look."""
+    gone_since: float | None = None
+    """Since when the card on top of it is not there, in s."""
+
+
+@dataclass
+class _Play:
+    """Cards that were laid together."""
+
+    cards: dict[Card, int] = dataclass_field(default_factory=dict)
+    """The cards and their spots."""
+    doubts: set[int] = dataclass_field(default_factory=set)
+    """Its open doubts."""
+    closed: bool = False
+    """Whether no further card can belong to it."""
+
+
+@dataclass
+class _Gone:
+    """Cards were taken away: some (`TakenBack`), or all (`Cleared`)."""
+
+    cards: dict[Card, int] | None = None
+
+
+@dataclass
+class _PassMoved:
+    """The pass card of a seat was shown or withdrawn."""
+
+    seat: int
+    shown: bool
+
+
+@dataclass
+class _OpenDoubt:
+    """A doubt that waits for an answer."""
+
+    spot: int
+    look: int
+    play: _Play
+    """Where the card belongs. For a pass card: a play without cards that keeps the order."""
+    options: tuple[Card, ...]
+
+
+class Decider:
+    """Turns sightings into events.
+
+    Args:
+        deck: The deck that is played with, 0..6; cards of other decks are ignored. None: any deck.
+    """
+
+    def __init__(self, deck: int | None = None) -> None:
+        self._deck = deck
+        self._known: dict[Piece, _Known] = {}
+        self._tracks: dict[Piece, _Track] = {}
+        self._spots = [_Spot() for _ in SPOTS]
+        self._queue: list[_Play | _Gone | _PassMoved] = []
+        self._doubts: dict[int, _OpenDoubt] = {}
+        self._next_doubt = 1
+        self._frame = 0
+        self._time = 0.0
+        self._reaching = False
+        self._places: tuple[SeenPlace, ...] = ()
+
+    # What a bridge and a reader may ask.
+
+    @property
+    def unexplained(self) -> set[int]:
+        """The places that should be read again: something new lies there. Indices of `SPOTS`."""
+        return {number for number, spot in enumerate(self._spots) if spot.since is not None}
+
+    @property
+    def on_table(self) -> dict[Card, int]:
+        """The cards that lie on the field and the place of each, 1..11; the lowest first."""
+        return {card: known.spot + 1 for piece, known in self._known.items() if (card := piece.card) is not None}
+
+    def card_of_face(self, face: int) -> Card:
+        """A card of a face that does not lie on the field: for a person who answers a doubt and knows only the face.
+
+        Args:
+            face: 1..11, or 12 for a joker.
+
+        Raises:
+            ValueError: All cards of the face lie on the field, or there is no such face.
+        """
+        number = self._deck if self._deck is not None else next((card.deck for card in self.on_table), 0)
+        for card in deck(number):
+            if card.face == face and card not in self.on_table:
+                return card
+        raise ValueError(f"no card of face {face} is left: faces are 1..12, and those on the field cannot be laid again")
+
+    # Sightings.
+
+    def see(self, sighting: Sighting) -> list[Observed]:
+        """Takes in the next frame and returns what is now certain."""
+        self._frame, self._time = sighting.frame, sighting.time
+        events: list[Observed] = []
+        if sighting.field is not None:
+            events.append(FieldChanged(self._frame, self._time, sighting.field))
+            self._tracks.clear()
+        self._places = sighting.places
+        self._reaching = sighting.reaching
+        if sighting.places:
+            self._forget_moved()
+            self._follow_tags(sighting.tags)
+            self._settle(events)
+            self._explain()
+            self._notice_gone(events)
+            self._raise_doubts(events)
+        self._flush(events)
+        return events
+
+    def answer(self, number: int, reading: Card | bool) -> list[Observed]:
+        """Answers a doubt and returns the events that were waiting for it.
+
+        Args:
+            number: The number of the doubt.
+            reading: The card that lies there. At a pass place: whether the pass card lies there. False at a place for cards: nothing
+                new lies there.
+
+        Raises:
+            ValueError: There is no such open doubt, or the answer does not fit its place.
+        """
+        if number not in self._doubts:
+            raise ValueError(f"doubt {number} is not open: it was answered or resolved before")
+        doubt = self._doubts[number]
+        is_pass = doubt.spot >= _FIRST_PASS
+        if isinstance(reading, bool) != (is_pass or reading is False):
+            raise ValueError("answer with True or False at a pass place, and with a card or False at a place for cards")
+        events: list[Observed] = []
+        if isinstance(reading, Card):
+            self._add_told(doubt, reading)
+        elif is_pass:
+            self._tell_pass(doubt, reading)
+        self._close_doubt(number, events)
+        self._flush(events)
+        return events
+
+    def _add_told(self, doubt: _OpenDoubt, card: Card) -> None:
+        """Adds the card that answers a doubt to its play, unless it was read there in the meantime."""
+        for play in self._queue:
+            if isinstance(play, _Play) and play is not doubt.play:
+                for read, spot in list(play.cards.items()):
+                    if spot == doubt.spot and (
+                        read == card or (read.face == card.face and self._known[_piece(read)].told is False)
+                    ):
+                        del play.cards[read]
+                        doubt.play.cards[read] = spot
+                        if not play.cards and not play.doubts:
+                            self._queue.remove(play)
+                        return
+        doubt.play.cards[card] = doubt.spot
+        self._known[_piece(card)] = _Known(doubt.spot, told=True)
+
+    def _tell_pass(self, doubt: _OpenDoubt, shown: bool) -> None:
+        """Puts the answer to a doubt about a pass card in its place in the queue."""
+        seat = doubt.spot - _FIRST_PASS
+        piece = next((piece for piece, known in self._known.items() if known.spot == doubt.spot), None)
+        if shown == (piece is not None):
+            return
+        self._queue.insert(self._queue.index(doubt.play), _PassMoved(seat, shown))
+        if piece is not None:
+            del self._known[piece]
+        else:
+            self._known[Piece(PieceKind.PASS, self._deck or 0, seat)] = _Known(doubt.spot, told=True)
+
+    def _close_doubt(self, number: int, events: list[Observed]) -> None:
+        doubt = self._doubts.pop(number)
+        doubt.play.doubts.discard(number)
+        spot = self._spots[doubt.spot]
+        if spot.doubt == number:
+            spot.doubt = None
+            spot.explained = doubt.look
+            spot.since = None
+        events.append(DoubtResolved(self._frame, self._time, number))
+
+    # Following tags.
+
+    def _forget_moved(self) -> None:
+        """Forgets the readings at places where something moves."""
+        self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
+        for spot, seen in zip(self._spots, self._places, strict=True):
+            if seen.still == 0:
+                spot.suspect = spot.suspect or spot.frames >= SETTLE_READS
+                spot.since, spot.frames, spot.gone_since = None, 0, None
+
+    def _follow_tags(self, tags: Iterable[SeenTag]) -> None:
+        """Counts the readings of each piece."""
+        by_piece: dict[Piece, list[SeenTag]] = {}
+        for tag in tags:
+            piece = piece_of_tag(tag.number)
+            if piece is not None and self._deck in (None, piece.deck) and piece.kind is not PieceKind.ROLE:
+                by_piece.setdefault(piece, []).append(tag)
+        for piece, readings in by_piece.items():
+            centres = [_centre(tag) for tag in readings]
+            if any(math.dist(centres[0], centre) > SAME_CARD_MM for centre in centres[1:]):
+                continue
+            spot = _spot_of(piece, *centres[0])
+            if spot is None or self._places[spot].still == 0:
+                continue
+            for tag, (x, y) in zip(readings, centres, strict=True):
+                track = self._tracks.get(piece)
+                flipped = track is not None and abs((tag.angle - track.angle + 180) % 360 - 180) > 90
+                if track is None or (not flipped and math.hypot(track.x - tag.x, track.y - tag.y) > STILL_MM):
+                    track = self._tracks[piece] = _Track(piece, spot, tag.x, tag.y, tag.angle)
+                if flipped and math.dist((x, y), _centre_of(track.x, track.y, track.angle)) > SAME_CARD_MM:
+                    continue
+                track.ends.add(flipped)
+            track = self._tracks.get(piece)
+            if track is not None and min(tag.hamming for tag in readings) <= TRUSTED_HAMMING:
+                track.trusted += 1
+
+    def _settle(self, events: list[Observed]) -> None:
+        """Takes note of the pieces that settled."""
+        for track in self._tracks.values():
+            if track.trusted < SETTLE_READS:
+                continue
+            known = self._known.get(track.piece)
+            if known is not None:
+                known.spot, known.told = track.spot, False
+                top = self._top(track.spot)
+                if top == track.piece and len(track.ends) == 2:
+                    self._explained(track.spot, events)
+            elif track.piece.card is None:
+                self._known[track.piece] = _Known(track.spot)
+                self._queue.append(_PassMoved(track.piece.number, True))
+                self._explained(track.spot, events)
+            else:
+                self._settle_card(track, track.piece.card, events)
+
+    def _settle_card(self, track: _Track, card: Card, events: list[Observed]) -> None:
+        """Takes note of a card that was not on the field before."""
+        spot = self._spots[track.spot]
+        top = self._top(track.spot)
+        if top is not None and self._known[top].told and top.card is not None and top.card.face == card.face:
+            # The person who answered a doubt knew the face; this is the card.
+            told = top.card
+            del self._known[top]
+            self._known[track.piece] = _Known(track.spot)
+            for entry in self._queue:
+                if isinstance(entry, _Play) and told in entry.cards:
+                    entry.cards[card] = entry.cards.pop(told)
+            self._explained(track.spot, events)
+            return
+        self._known[track.piece] = _Known(track.spot)
+        if spot.doubt is not None and self._doubts[spot.doubt].look == self._places[track.spot].look:
+            self._doubts[spot.doubt].play.cards[card] = track.spot
+            self._explained(track.spot, events)
+            return
+        if spot.suspect:
+            self._raise_doubt(track.spot, self._places[track.spot].look - 1, events)
+        play = self._open_play()
+        if play is None or track.spot in play.cards.values():
+            if play is not None:
+                play.closed = True
+            play = _Play()
+            self._queue.append(play)
+        play.cards[card] = track.spot
+        self._explained(track.spot, events)
+
+    def _open_play(self) -> _Play | None:
+        """The play that further cards may belong to."""
+        last = next((entry for entry in reversed(self._queue) if not isinstance(entry, _PassMoved)), None)
+        return last if isinstance(last, _Play) and not last.closed else None
+
+    def _top(self, spot: int) -> Piece | None:
+        """The piece on top of a place."""
+        return next((piece for piece in reversed(self._known) if self._known[piece].spot == spot), None)
+
+    # Explaining looks.
+
+    def _explained(self, number: int, events: list[Observed]) -> None:
+        """A place's present look is explained, and with it a doubt about this look."""
+        spot = self._spots[number]
+        spot.explained = self._places[number].look
+        spot.since, spot.frames, spot.suspect = None, 0, False
+        if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
+            self._close_doubt(spot.doubt, events)
+
+    def _explain(self) -> None:
+        """Finds the places that are still and not explained."""
+        for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
+            if seen.still < STILL_FRAMES:
+                continue
+            occupied = self._top(number) is not None
+            if seen.look == spot.explained or (not occupied and seen.empty is not False and not spot.suspect):
+                spot.since, spot.frames = None, 0
+                if not occupied:
+                    spot.explained = seen.look
+            elif seen.empty or self._reaching:
+                spot.since, spot.frames = None, 0
+            else:
+                spot.since = self._time if spot.since is None else spot.since
+                spot.frames += 1
+
+    def _raise_doubts(self, events: list[Observed]) -> None:
+        """Asks about places that stay unexplained."""
+        for number, spot in enumerate(self._spots):
+            seen = self._places[number]
+            if spot.doubt is None and spot.since is not None and self._time - spot.since >= DOUBT_SECONDS:
+                self._raise_doubt(number, seen.look, events)
+
+    def _raise_doubt(self, number: int, look: int, events: list[Observed]) -> None:
+        """Asks about a place."""
+        spot = self._spots[number]
+        spot.suspect = False
+        if spot.doubt is not None:
+            return
+        play = self._open_play() if number < _FIRST_PASS else None
+        if play is None or number in play.cards.values():
+            play = _Play()
+            self._queue.append(play)
+        candidates = sorted((track for track in self._tracks.values() if track.spot == number), key=lambda track: -track.trusted)
+        options = tuple(card for track in candidates if track.piece not in self._known and (card := track.piece.card) is not None)
+        play.doubts.add(self._next_doubt)
+        play.closed = True
+        spot.doubt = self._next_doubt
+        self._doubts[self._next_doubt] = _OpenDoubt(number, look, play, options)
+        events.append(Doubt(self._frame, self._time, self._next_doubt, SPOTS[number].name, options))
+        self._next_doubt += 1
+
+    # Cards that are gone.
+
+    def _notice_gone(self, events: list[Observed]) -> None:
+        """Notices pieces that are no longer where they lay."""
+        for piece, known in list(self._known.items()):
+            if piece.kind is PieceKind.PASS and self._is_empty(known.spot):
+                del self._known[piece]
+                self._queue.append(_PassMoved(piece.number, False))
+                self._explained(known.spot, events)
+        occupied = sorted({known.spot for piece, known in self._known.items() if piece.kind is PieceKind.CARD})
+        empty = [spot for spot in occupied if self._is_empty(spot)]
+        if not empty:
+            return
+        if len(empty) == len(occupied):
+            for spot in CARD_SPOTS:
+                if self._spots[spot].suspect:
+                    self._raise_doubt(spot, self._spots[spot].explained, events)
+            self._remove(empty, events)
+            play = self._open_play()
+            if play is not None:
+                play.closed = True
+            self._queue.append(_Gone())
+            return
+        for spot in empty:
+            if self._spots[spot].gone_since is None:
+                self._spots[spot].gone_since = self._time
+        quiet = all(self._places[spot].still >= QUIET_FRAMES for spot in CARD_SPOTS)
+        gone = [spot for spot in empty if self._time - (self._spots[spot].gone_since or self._time) >= TAKEN_SECONDS]
+        if quiet and gone:
+            self._queue.append(_Gone(self._remove(gone, events)))
+
+    def _remove(self, spots: list[int], events: list[Observed]) -> dict[Card, int]:
+        """Forgets the cards of some places and returns them."""
+        removed = {
+            card: known.spot for piece, known in self._known.items() if known.spot in spots and (card := piece.card) is not None
+        }
+        for card in removed:
+            del self._known[_piece(card)]
+            self._tracks.pop(_piece(card), None)
+        for spot in spots:
+            self._spots[spot].gone_since = None
+            self._explained(spot, events)
+        return removed
+
+    def _is_empty(self, spot: int) -> bool:
+        """Whether a place has been empty for long enough."""
+        seen = self._places[spot]
+        return bool(seen.empty) and seen.still >= GONE_FRAMES
+
+    # Reporting.
+
+    def _flush(self, events: list[Observed]) -> None:
+        """Reports what need not wait any more, in order."""
+        while self._queue:
+            entry = self._queue[0]
+            if isinstance(entry, _Play):
+                if entry.doubts or not (entry.closed or self._is_quiet()):
+                    return
+                entry.closed = True
+                if entry.cards:
+                    cards = sorted(entry.cards, key=lambda card: entry.cards[card])
+                    events.append(Laid(self._frame, self._time, tuple(cards), tuple(entry.cards[card] + 1 for card in cards)))
+            elif isinstance(entry, _PassMoved):
+                events.append((PassShown if entry.shown else PassWithdrawn)(self._frame, self._time, entry.seat))
+            elif entry.cards is None:
+                events.append(Cleared(self._frame, self._time))
+            else:
+                cards = sorted(entry.cards, key=lambda card: entry.cards[card])
+                events.append(TakenBack(self._frame, self._time, tuple(cards), tuple(entry.cards[card] + 1 for card in cards)))
+            self._queue.pop(0)
+
+    def _is_quiet(self) -> bool:
+        """Whether nothing moves at the places for cards, and all of them are explained."""
+        return bool(self._places) and all(
+            self._places[spot].still >= QUIET_FRAMES and (self._spots[spot].since is None or self._spots[spot].doubt is not None)
+            for spot in CARD_SPOTS
+        )
+
+
+def _piece(card: Card) -> Piece:
+    """A card as a piece."""
+    return Piece(PieceKind.CARD, card.deck, card.index)
+
+
+def _centre(tag: SeenTag) -> tuple[float, float]:
+    """The centre of the card that has a tag, mm on the field."""
+    return _centre_of(tag.x, tag.y, tag.angle)
+
+
+def _centre_of(x: float, y: float, angle: float) -> tuple[float, float]:
+    """The centre of the card whose tag lies at a point, turned clockwise by an angle in degrees."""
+    turn = math.radians(angle)
+    right, down = _TAG_TO_CENTRE
+    return x + right * math.cos(turn) - down * math.sin(turn), y + right * math.sin(turn) + down * math.cos(turn)
+
+
+def _spot_of(piece: Piece, x: float, y: float) -> int | None:
+    """The place a piece lies at; None if it lies at none of its places."""
+    spots = (
+        CARD_SPOTS
+        if piece.kind is PieceKind.CARD
+        else [_FIRST_PASS + piece.number]
+        if piece.number < len(field.pass_places())
+        else []
+    )
+    nearest = min(spots, key=lambda spot: math.hypot(SPOTS[spot].x - x, SPOTS[spot].y - y), default=None)
+    if nearest is None or math.hypot(SPOTS[nearest].x - x, SPOTS[nearest].y - y) > REACH:
+        return None
+    return nearest

@@ -1,0 +1,69 @@
+"""Perception: frames in, events out. Joins the reader and the decider."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from chefshat_robot.deck import Card
+
+from .camera import Camera
+from .decider import SETTLE_READS, Decider
+from .events import Doubt, Observed, Picture
+from .frames import Frame
+from .reader import SPOTS, Reader, Sighting
+
+
+class Perception:
+    """Watches the table through one camera.
+
+    Start it while the field is empty: it then learns how empty places look.
+
+    Args:
+        camera: The intrinsics of the camera; None: a lens without distortion is assumed.
+        deck: The deck that is played with, 0..6; cards of other decks are ignored. None: any deck.
+
+    Attributes:
+        sighting: What the last frame showed; None before the first.
+    """
+
+    def __init__(self, camera: Camera | None = None, deck: int | None = None) -> None:
+        self.sighting: Sighting | None = None
+        self._reader = Reader(camera)
+        self._decider = Decider(deck)
+        self._pictures: dict[int, Picture] = {}
+
+    def see(self, frame: Frame) -> list[Observed]:
+        """Takes in the next frame and returns what is now certain, in order.
+
+        Raises:
+            ValueError: The camera was calibrated for pictures of other proportions.
+        """
+        self.sighting = self._reader.read(frame, attention=self._decider.unexplained)
+        events = self._decider.see(self.sighting)
+        for spot in self._decider.unexplained:
+            if self.sighting.places[spot].still == SETTLE_READS:
+                self._pictures[spot] = self._reader.cut_out(frame.image, spot)
+        return [self._with_picture(event) if isinstance(event, Doubt) else event for event in events]
+
+    def watch(self, frames: Iterable[Frame]) -> Iterator[Observed]:
+        """The events of a sequence of frames, as they become certain."""
+        for frame in frames:
+            yield from self.see(frame)
+
+    def answer(self, number: int, reading: Card | bool) -> list[Observed]:
+        """Answers a doubt and returns the events that were waiting for it; see `Decider.answer`."""
+        return self._decider.answer(number, reading)
+
+    def card_of_face(self, face: int) -> Card:
+        """A card of a face that does not lie on the field; see `Decider.card_of_face`."""
+        return self._decider.card_of_face(face)
+
+    @property
+    def on_table(self) -> dict[Card, int]:
+        """The cards that lie on the field and the place of each, 1..11; the lowest first."""
+        return self._decider.on_table
+
+    def _with_picture(self, doubt: Doubt) -> Doubt:
+        spot = next(number for number, place in enumerate(SPOTS) if place.name == doubt.place)
+        return replace(doubt, picture=self._pictures.get(spot))

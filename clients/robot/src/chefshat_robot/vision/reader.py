@@ -1,0 +1,366 @@
+"""What one frame shows: tags in millimetres, and for each place whether something moves there, how it looks, and whether it is empty.
+
+The reader knows nothing about cards or the game. It spends little: a map of the field at 1 mm tells where something changes, and
+tags are only read where nothing moves any more, for a few frames after each change and then in turn.
+
+A **look** is the number of a place's appearance: it grows when, after a movement, the place looks otherwise than before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from chefshat_robot import field
+from chefshat_robot.deck import FIELD_TAGS
+
+from .camera import Camera
+from .events import FieldState, Picture
+from .frames import Frame
+from .tags import TagReader
+from .view import FieldView
+
+STILL_FRAMES = 2
+"""A place is still when nothing has moved there for so many frames."""
+READ_FRAMES = 6
+"""For so many frames after it became still, a place is read in each frame."""
+REFRESH_FRAMES = 15
+"""After that a place is read once in so many frames; places take turns."""
+BLOCK = 4
+"""Edge of the blocks in which movement is looked for, in mm."""
+MOVEMENT = 0.07
+"""A block moves if its brightness, relative to its surroundings, changes by more than this from one frame to the next..."""
+MOVEMENT_SIGMAS = 7.0
+"""...and by more than so many standard deviations of the noise."""
+MOVING_BLOCKS = 3
+"""A place moves if so many of its blocks do."""
+NEAR = 8.0
+"""Movement this close to a card's outline at a place counts for the place, in mm."""
+CELL = 2
+"""Edge of the cells whose brightness makes a look, in mm."""
+CORE = (15.0, 15.0)
+"""The look of a place is that of its core: without this much on both sides, across and along, in mm. Cards at other places do not
+reach it."""
+DIFFERENT = 0.085
+"""Mean difference of two looks, relative to the local brightness, from which on they are different."""
+EMPTY = 0.06
+"""Mean difference from the empty place up to which a place is empty."""
+EMPTY_FRAMES = 4
+"""Frames for which a place must be still and without tags to be remembered as empty, at first."""
+ADAPT = 0.03
+"""How quickly the memory of a look follows the light: the weight of each new frame."""
+EDGE = 2
+"""Breadth of the edge of the field that is watched for arms, in blocks."""
+EDGE_CHANGE = 0.15
+"""Something reaches over the edge where its brightness, relative to its surroundings, differs by more than this from what it was."""
+EDGE_ADAPT = 0.01
+"""How quickly the memory of the edge takes in what lies there: the weight of each new frame."""
+SURROUNDINGS = 31
+"""Edge of the surroundings brightness is relative to, in mm; odd."""
+READ_MARGIN = 22.0
+"""Tags are read this far around a place, in mm."""
+TAG_SIZES = (0.8, 1.25)
+"""Smallest and biggest size of a card's tag that is believed, as a part of the printed size."""
+
+
+@dataclass(frozen=True)
+class SeenTag:
+    """A tag of a piece on the field.
+
+    Attributes:
+        number: Its number, 0..559.
+        x: Centre, mm on the field.
+        y: Centre, mm on the field.
+        angle: Degrees by which it is turned clockwise, -180..180.
+        hamming: Corrected bits.
+        margin: Contrast, in grey levels.
+    """
+
+    number: int
+    x: float
+    y: float
+    angle: float
+    hamming: int
+    margin: float
+
+
+@dataclass(frozen=True)
+class SeenPlace:
+    """A place in one frame.
+
+    Attributes:
+        still: For how many frames nothing has moved there; 0 while something moves.
+        look: Number of its look; the last one while something moves.
+        empty: Whether it looks as it did when it was empty; None while something moves, or before that is known.
+        read: Whether tags were read there in this frame.
+    """
+
+    still: int
+    look: int
+    empty: bool | None
+    read: bool
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """What one frame shows.
+
+    Attributes:
+        frame: Number of the frame.
+        time: Its time in s.
+        field: The change of the field's state, if any.
+        tags: The tags read, each once.
+        reaching: Whether an arm or something else reaches over the edge of the field.
+        places: The eleven places for cards, then the four for pass cards; empty while the field is not found.
+    """
+
+    frame: int
+    time: float
+    field: FieldState | None
+    tags: tuple[SeenTag, ...]
+    reaching: bool
+    places: tuple[SeenPlace, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The sighting as a JSON object."""
+        values = asdict(self)
+        values["field"] = self.field.value if self.field else None
+        values["places"] = [[place.still, place.look, place.empty, place.read] for place in self.places]
+        values["tags"] = [[tag.number, tag.x, tag.y, tag.angle, tag.hamming, tag.margin] for tag in self.tags]
+        return values
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Sighting:
+        """The sighting of a JSON object that `to_json` made.
+
+        Raises:
+            ValueError: It is not such an object.
+        """
+        try:
+            return cls(
+                frame=int(values["frame"]),
+                time=float(values["time"]),
+                field=FieldState(values["field"]) if values["field"] else None,
+                tags=tuple(SeenTag(*tag) for tag in values["tags"]),
+                reaching=bool(values["reaching"]),
+                places=tuple(SeenPlace(*place) for place in values["places"]),
+            )
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"not a line of a recording: {values!r}") from error
+
+
+SPOTS: Sequence[field.Place] = (*field.places(), *field.pass_places())
+"""All places in the order of `Sighting.places`."""
+
+
+def half_size(place: field.Place) -> tuple[float, float]:
+    """Half the width and height of a card lying at a place, in mm on the field."""
+    width, height = field.CARD_WIDTH / 2, field.CARD_HEIGHT / 2
+    return (height, width) if place.angle % 180 == 90 else (width, height)
+
+
+@dataclass
+class _Spot:
+    """What the reader remembers of a place."""
+
+    still: int = 0
+    look: int = 0
+    remembered: NDArray[np.float32] | None = None
+    """The present look."""
+    gathered: NDArray[np.float32] | None = None
+    """Sum of what was seen since it became still, until the look is decided."""
+    empty: NDArray[np.float32] | None = None
+    """The look of the empty place."""
+    bare: int = 0
+    """Frames read in a row without a tag, while the empty place is not known."""
+
+
+class Reader:
+    """Reads frames one after the other.
+
+    Args:
+        camera: The intrinsics of the camera; None: a lens without distortion is assumed.
+    """
+
+    def __init__(self, camera: Camera | None = None) -> None:
+        self.view = FieldView(camera)
+        self._tags: TagReader | None = None
+        self._spots = [_Spot() for _ in SPOTS]
+        self._before: NDArray[np.float32] | None = None
+        self._edge: NDArray[np.float32] | None = None
+
+    def read(self, frame: Frame, attention: Collection[int] = ()) -> Sighting:
+        """Reads the next frame.
+
+        Args:
+            frame: The frame.
+            attention: Places to read in this frame although they have been still for long; indices of `SPOTS`.
+
+        Raises:
+            ValueError: The camera was calibrated for pictures of other proportions.
+        """
+        grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        changed = self.view.update(grey, frame.time)
+        if not self.view.found:
+            self._before = None
+            return Sighting(frame.index, frame.time, changed, (), False, ())
+        if changed is not None:
+            self._tags = TagReader(self.view.scale * field.CARD_TAG_SIZE)
+            self._before = self._edge = None
+        relative = _relative(self.view.rectified(grey))
+        blocks = np.asarray(cv2.resize(relative, None, fx=1 / BLOCK, fy=1 / BLOCK, interpolation=cv2.INTER_AREA), dtype=np.float32)
+        moving = self._movement(blocks)
+        cells = cv2.resize(relative, None, fx=1 / CELL, fy=1 / CELL, interpolation=cv2.INTER_AREA)
+        to_read = [number for number in range(len(SPOTS)) if self._follow(number, moving, cells, frame.index, number in attention)]
+        tags = self._read_tags(grey, to_read)
+        places = tuple(self._seen(number, cells, number in to_read, tags) for number in range(len(SPOTS)))
+        return Sighting(frame.index, frame.time, changed, tuple(tags), self._is_reaching(blocks), places)
+
+    def cut_out(self, image: Picture, spot: int) -> Picture:
+        """The picture of a place, seen from straight above, `view.MAP_SCALE` pixels per mm."""
+        place, (half_width, half_height) = SPOTS[spot], half_size(SPOTS[spot])
+        return self.view.rectified(image)[
+            max(round(place.y - half_height - 12), 0) : round(place.y + half_height + 12),
+            max(round(place.x - half_width - 12), 0) : round(place.x + half_width + 12),
+        ].copy()
+
+    def _is_reaching(self, blocks: NDArray[np.float32]) -> bool:
+        """Whether something reaches over the edge of the field: the edge looks otherwise than it did."""
+        edge = np.concatenate([blocks[:EDGE].ravel(), blocks[-EDGE:].ravel(), blocks[:, :EDGE].ravel(), blocks[:, -EDGE:].ravel()])
+        if self._edge is None:
+            self._edge = edge
+        change = np.abs(edge - self._edge)
+        self._edge += EDGE_ADAPT * (edge - self._edge)
+        return int(np.count_nonzero(change > EDGE_CHANGE)) >= MOVING_BLOCKS
+
+    def _movement(self, blocks: NDArray[np.float32]) -> NDArray[np.bool_] | None:
+        """Which blocks of the map moved since the last frame; None if all must count as moved."""
+        before, self._before = self._before, blocks
+        if before is None:
+            return None
+        change = cv2.absdiff(blocks, before)
+        noise = float(np.median(change)) / 0.6745
+        return np.asarray(change > max(MOVEMENT, MOVEMENT_SIGMAS * noise))
+
+    def _follow(self, number: int, moving: NDArray[np.bool_] | None, cells: NDArray[np.float32], frame: int, wanted: bool) -> bool:
+        """Follows a place through the frame, and returns whether its tags should be read."""
+        spot = self._spots[number]
+        if moving is None or np.count_nonzero(moving[_OUTER[number]]) >= MOVING_BLOCKS:
+            spot.still, spot.gathered, spot.bare = 0, None, 0
+            return False
+        spot.still += 1
+        seen = cells[_CORE[number]]
+        if spot.still <= STILL_FRAMES:
+            spot.gathered = seen.copy() if spot.gathered is None else spot.gathered + seen
+            if spot.still == STILL_FRAMES:
+                look = spot.gathered / STILL_FRAMES
+                if spot.remembered is None or difference(look, spot.remembered) > DIFFERENT:
+                    spot.look += 1
+                    spot.remembered = look
+        elif spot.remembered is not None:
+            spot.remembered += ADAPT * (seen - spot.remembered)
+        return wanted or spot.still <= READ_FRAMES or frame % REFRESH_FRAMES == number
+
+    def _read_tags(self, grey: Picture, spots: list[int]) -> list[SeenTag]:
+        """The tags around some places, each once."""
+        assert self._tags is not None, "the field was found"
+        found: list[SeenTag] = []
+        for left, top, right, bottom in _merged([_AREA[number] for number in spots]):
+            outline = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+            pixels = self.view.to_pixels(outline)
+            first, last = np.maximum(pixels.min(axis=0), 0).astype(int), np.maximum(pixels.max(axis=0), 0).astype(int)
+            for tag in self._tags.read(grey, first[0], first[1], last[0], last[1]):
+                corners = self.view.to_table(tag.corners)
+                edges = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T) / field.CARD_TAG_SIZE
+                if tag.number >= FIELD_TAGS or edges.min() < TAG_SIZES[0] or edges.max() > TAG_SIZES[1]:
+                    continue
+                x, y = corners.mean(axis=0)
+                across = corners[1] - corners[0]
+                if all(other.number != tag.number or np.hypot(other.x - x, other.y - y) > 5 for other in found):
+                    angle = float(np.degrees(np.arctan2(across[1], across[0])))
+                    found.append(
+                        SeenTag(
+                            tag.number, round(float(x), 2), round(float(y), 2), round(angle, 1), tag.hamming, round(tag.margin, 1)
+                        )
+                    )
+        return found
+
+    def _seen(self, number: int, cells: NDArray[np.float32], read: bool, tags: list[SeenTag]) -> SeenPlace:
+        """What a place shows in this frame."""
+        spot = self._spots[number]
+        if spot.still < STILL_FRAMES:
+            return SeenPlace(spot.still, spot.look, None, read)
+        seen = cells[_CORE[number]]
+        if spot.empty is None:
+            left, top, right, bottom = _AREA[number]
+            has_tag = any(left < tag.x < right and top < tag.y < bottom for tag in tags)
+            spot.bare = 0 if has_tag else spot.bare + read
+            if spot.bare >= EMPTY_FRAMES:
+                spot.empty = seen.copy()
+            return SeenPlace(spot.still, spot.look, None, read)
+        empty = difference(seen, spot.empty) <= EMPTY
+        if empty:
+            spot.empty += ADAPT * (seen - spot.empty)
+        return SeenPlace(spot.still, spot.look, empty, read)
+
+
+def difference(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """The mean difference of two looks, relative to the local brightness."""
+    return float(cv2.norm(one, other, cv2.NORM_L1)) / one.size
+
+
+def _relative(grey: Picture) -> NDArray[np.float32]:
+    """The map relative to the brightness of its surroundings: about 1, without shadows and changes of light."""
+    values = grey.astype(np.float32)
+    around = cv2.blur(values, (SURROUNDINGS, SURROUNDINGS))
+    return np.asarray(cv2.divide(values, cv2.add(around, 8.0)), dtype=np.float32)
+
+
+def _slices(place: field.Place, grow: tuple[float, float], step: int) -> tuple[slice, slice]:
+    """The part of a map with cells of `step` mm that shows a place, made bigger by `grow` mm on each side."""
+    half_width, half_height = half_size(place)
+    if place.angle % 180 == 90:
+        grow = (grow[1], grow[0])
+    left, right = place.x - half_width - grow[0], place.x + half_width + grow[0]
+    top, bottom = place.y - half_height - grow[1], place.y + half_height + grow[1]
+    return (
+        slice(max(round(top / step), 0), min(round(bottom / step), round(field.HEIGHT) // step)),
+        slice(max(round(left / step), 0), min(round(right / step), round(field.WIDTH) // step)),
+    )
+
+
+_OUTER = [_slices(place, (NEAR, NEAR), BLOCK) for place in SPOTS]
+_CORE = [_slices(place, (-CORE[0], -CORE[1]), CELL) for place in SPOTS]
+_AREA = [
+    (
+        place.x - half_size(place)[0] - READ_MARGIN,
+        place.y - half_size(place)[1] - READ_MARGIN,
+        place.x + half_size(place)[0] + READ_MARGIN,
+        place.y + half_size(place)[1] + READ_MARGIN,
+    )
+    for place in SPOTS
+]
+
+
+def _merged(areas: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:
+    """Rectangles that overlap much, joined: each part of a picture should be searched only once."""
+    joined: list[tuple[float, float, float, float]] = []
+    for area in sorted(areas):
+        for number, other in enumerate(joined):
+            union = (min(area[0], other[0]), min(area[1], other[1]), max(area[2], other[2]), max(area[3], other[3]))
+            if _surface(union) < _surface(area) + _surface(other):
+                joined[number] = union
+                break
+        else:
+            joined.append(area)
+    return joined
+
+
+def _surface(area: tuple[float, float, float, float]) -> float:
+    """The surface of a rectangle, in mm²."""
+    return (area[2] - area[0]) * (area[3] - area[1])
