@@ -9,10 +9,10 @@ Every happening (cards laid, field cleared, pass card shown or withdrawn) is one
 - *asked*: reported exactly, after a doubt about it was answered with the truth;
 - *wrong*: missing, or reported otherwise than it was.
 
-A *false* event is one that was reported without a doubt and did not happen like this. *Needless* doubts are about places where nothing
-new lies. The latency is the time from the last card at rest to the event, in the frames' own time. Frames per second count reading and
-deciding, without painting the frames, on one thread. *Naive* is how often a reader that believes each single frame (OpenCV's detector on
-frames without a hand over the table) sees exactly the cards on top of the places.
+A *false* event is one that was reported without a doubt and did not happen like this. *Needless* doubts are about places where
+nothing new lies. The latency is the time from the last card at rest to the event, in the frames' own time. Frames per second count
+reading and deciding, without painting the frames, on one thread. *Naive* is how often a reader that believes each single frame
+(OpenCV's detector, on frames without a hand over the table) finds a tag of every piece that lies on top.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ import numpy as np
 from chefshat_robot.deck import Card
 from chefshat_robot.synthetic import DIFFICULTIES, Difficulty, FrameTruth, Happening, SyntheticTable, acts_of_steps, random_shift
 from chefshat_robot.vision import (
-    Cleared,
     Doubt,
     DoubtResolved,
     FieldChanged,
@@ -168,7 +167,7 @@ def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: flo
 
 
 def naive_is_right(detector: cv2.aruco.ArucoDetector, frame: Frame, truth: FrameTruth) -> bool:
-    """Whether every tag on top is read in this frame: both tags of each piece."""
+    """Whether a tag of every piece on top is read in this frame."""
     _, numbers, _ = detector.detectMarkers(frame.image)
     read = Counter([] if numbers is None else np.asarray(numbers).ravel().tolist())
     top = {(lying.piece.kind, lying.place): lying.piece.tag for lying in truth.lying}

@@ -52,6 +52,9 @@ COMMANDS = {
     "wizard": Entry("wizard", "robots", "let a robot do what a person on the page plays for it (Wizard of Oz)"),
     "affect": Entry("affect", "lsl", "forward what analysers of faces and voices read to the game"),
     "markers": Entry("markers", "lsl", "send the events of games as markers of Lab Streaming Layer"),
+    "calibrate": Entry("vision.command_calibrate", "vision", "measure the lens of a camera"),
+    "perceive": Entry("vision.command_perceive", "vision", "watch the table through a camera and print what happens"),
+    "table": Entry("synthetic.command", "vision", "write a video of a synthetic table, with the truth"),
     "print": Entry("printing.command", "print", "write the cards, the playing field and the calibration sheet as a PDF"),
 }
 

@@ -59,8 +59,8 @@ def tag_picture(tag: int, edge: int) -> Picture:
     return np.asarray(cv2.aruco.generateImageMarker(dictionary, tag, edge), dtype=np.uint8)
 
 
-@lru_cache(maxsize=200)
-def piece_picture(piece: Piece, face_down: bool = False) -> Picture:
+@lru_cache(maxsize=400)
+def piece_picture(piece: Piece, face_down: bool = False, smudged: tuple[bool, bool] = (False, False)) -> Picture:
     """A piece with a soft shadow around it: BGRA, colours multiplied by alpha, `PIECE_SCALE` pixels per mm."""
     scale = PIECE_SCALE
     width, height = round(field.CARD_WIDTH * scale), round(field.CARD_HEIGHT * scale)
@@ -69,6 +69,10 @@ def piece_picture(piece: Piece, face_down: bool = False) -> Picture:
         _paint_back(card)
     else:
         _paint_front(card, piece)
+        for smudge in smudged:
+            if smudge:
+                _smudge(card, piece.tag)
+            card = np.ascontiguousarray(card[::-1, ::-1])
     margin = round(PIECE_MARGIN * scale)
     shape = (height + 2 * margin, width + 2 * margin)
     mask = np.zeros(shape, np.uint8)
@@ -121,6 +125,15 @@ def _paint_front(card: Picture, piece: Piece) -> None:
         cv2.rectangle(card, (x0 - quiet, y0 - quiet), (x0 + edge + quiet, y0 + edge + quiet), (244, 244, 244), -1)
         card[y0 : y0 + edge, x0 : x0 + edge] = tag_picture(piece.tag, edge)[..., None]
         card[:] = card[::-1, ::-1].copy()
+
+
+def _smudge(card: Picture, seed: int) -> None:
+    """Makes the tag in the top left corner of a card unreadable."""
+    rng = np.random.default_rng(seed)
+    for _ in range(3):
+        x, y = ((np.array(field.CARD_TAG_CENTRE) + rng.uniform(-4, 4, 2)) * PIECE_SCALE).astype(int)
+        axes = (round(rng.uniform(5, 8) * PIECE_SCALE), round(rng.uniform(2, 4) * PIECE_SCALE))
+        cv2.ellipse(card, (int(x), int(y)), axes, rng.uniform(0, 180), 0, 360, (92, 120, 150), -1, cv2.LINE_AA)
 
 
 def _paint_back(card: Picture) -> None:

@@ -23,6 +23,7 @@ class Difficulty:
         shift: Standard deviation of how far cards lie from the centre of their place, in mm.
         turn: Standard deviation of how far cards are turned from their place, in degrees.
         upside_down: Probability that a card is turned by half a turn.
+        smudged: Probability, for each of a piece's two tags, that it cannot be read: a stain, a fold, a mirroring sleeve.
         hovers: Probability, at each turn, that a hand also passes over the places without doing anything.
         pause: Shortest and longest time between a hand's leaving and the next hand's coming, in s.
     """
@@ -41,6 +42,7 @@ class Difficulty:
     shift: float
     turn: float
     upside_down: float
+    smudged: float
     hovers: float
     pause: tuple[float, float]
 
@@ -60,6 +62,7 @@ EASY = Difficulty(
     shift=2.0,
     turn=2.0,
     upside_down=0.2,
+    smudged=0.0,
     hovers=0.0,
     pause=(0.7, 1.2),
 )
@@ -80,6 +83,7 @@ MEDIUM = Difficulty(
     shift=4.0,
     turn=6.0,
     upside_down=0.5,
+    smudged=0.03,
     hovers=0.1,
     pause=(0.6, 1.0),
 )
@@ -100,6 +104,7 @@ HARD = Difficulty(
     shift=6.0,
     turn=12.0,
     upside_down=0.5,
+    smudged=0.12,
     hovers=0.2,
     pause=(0.5, 0.9),
 )

@@ -10,7 +10,7 @@ import itertools
 import math
 from bisect import insort
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from functools import lru_cache
 from typing import Any
@@ -53,6 +53,7 @@ class Lying:
         angle: Degrees it is turned clockwise.
         since: When it came to rest, in s.
         face_down: Whether its back is up.
+        smudged: Whether its two tags cannot be read.
     """
 
     piece: Piece
@@ -62,6 +63,7 @@ class Lying:
     angle: float
     since: float
     face_down: bool = False
+    smudged: tuple[bool, bool] = (False, False)
 
 
 @dataclass(frozen=True)
@@ -274,9 +276,7 @@ class SyntheticTable:
     ) -> list[Lying]:
         """Plans a hand that lays pieces one after the other, and returns how they lie."""
         difficulty = self.difficulty
-        first = pieces[0][2]
-        outside = _outside(seat, first.x, first.y)
-        keys = [(start, *outside, _CARRY_HEIGHT)]
+        keys = [(start, *_outside(seat, pieces[0][2].x, pieces[0][2].y), _CARRY_HEIGHT)]
         laid: list[Lying] = []
         gesture = _Gesture(seat, keys)
         for number, (piece, place_number, place) in enumerate(pieces):
@@ -284,7 +284,8 @@ class SyntheticTable:
             dx, dy = np.clip(rng.normal(0, difficulty.shift, 2), -2.2 * difficulty.shift, 2.2 * difficulty.shift)
             angle = place.angle + float(np.clip(rng.normal(0, difficulty.turn), -2.2 * difficulty.turn, 2.2 * difficulty.turn))
             angle += 180.0 * float(rng.random() < difficulty.upside_down)
-            lies = Lying(piece, place_number, place.x + float(dx), place.y + float(dy), angle, time, face_down)
+            first, second = (bool(smudge) for smudge in rng.random(2) < difficulty.smudged)
+            lies = Lying(piece, place_number, place.x + float(dx), place.y + float(dy), angle, time, face_down, (first, second))
             laid.append(lies)
             keys.append((time, *_grip(seat, lies.x, lies.y), 2.0))
             gesture.carried.append((lies, start, time, None))
@@ -397,7 +398,7 @@ class SyntheticTable:
         self, image: Picture, lies: Lying, height: float, smear: tuple[float, float] = (0.0, 0.0)
     ) -> tuple[int, int, int, int] | None:
         """Paints a piece and returns the changed rectangle (left, top, right, bottom), or None if it is out of sight."""
-        art = _scaled_piece(lies.piece, lies.face_down, round(min(self._scale * 1.5, artwork.PIECE_SCALE), 1))
+        art = _scaled_piece(lies.piece, lies.face_down, lies.smudged, round(min(self._scale * 1.5, artwork.PIECE_SCALE), 1))
         half = (field.CARD_WIDTH / 2 + artwork.PIECE_MARGIN, field.CARD_HEIGHT / 2 + artwork.PIECE_MARGIN)
         outline = np.array([[-half[0], -half[1]], [half[0], -half[1]], [half[0], half[1]], [-half[0], half[1]]])
         target = self._project(artwork.placed((lies.x, lies.y), lies.angle, outline), height)
@@ -488,16 +489,16 @@ class SyntheticTable:
         held = [entry for entry in gesture.carried if entry[1] <= time < entry[2]]
         for number, (piece, _, _, offset) in enumerate(held):
             at = (x + dx * _GRIP, y + dy * _GRIP) if offset is None else (x + offset[0], y + offset[1])
-            carried = Lying(piece.piece, piece.place, at[0] + number * 1.5, at[1], piece.angle, piece.since, piece.face_down)
+            carried = replace(piece, x=at[0] + number * 1.5, y=at[1])
             rectangles.append(self._paint_piece(image, carried, height + number * 0.4, smear))
         rectangles.append(self._paint_hand(image, gesture, time, smear))
         return [rectangle for rectangle in rectangles if rectangle is not None]
 
 
 @lru_cache(maxsize=400)
-def _scaled_piece(piece: Piece, face_down: bool, scale: float) -> Picture:
+def _scaled_piece(piece: Piece, face_down: bool, smudged: tuple[bool, bool], scale: float) -> Picture:
     """A piece's picture at a scale in pixels per mm."""
-    art = artwork.piece_picture(piece, face_down)
+    art = artwork.piece_picture(piece, face_down, smudged)
     factor = scale / artwork.PIECE_SCALE
     return np.asarray(cv2.resize(art, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 

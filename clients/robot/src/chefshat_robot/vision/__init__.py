@@ -22,6 +22,7 @@ from .events import (
 )
 from .frames import Frame, SourceError, open_source
 from .perception import Perception
+from .recording import Recorder, replay
 
 __all__ = [
     "Camera",
@@ -37,9 +38,11 @@ __all__ = [
     "PassWithdrawn",
     "Perception",
     "Picture",
+    "Recorder",
     "SourceError",
     "TakenBack",
     "from_json",
     "open_source",
+    "replay",
     "to_json",
 ]

@@ -64,7 +64,8 @@ class Camera:
             return self
         if abs(height - self.height * factor) > 1.0:
             raise ValueError(
-                f"the camera was calibrated with pictures of {self.width}x{self.height}, these are {width}x{height}; calibrate again"
+                f"the camera was calibrated with pictures of {self.width}x{self.height}, "
+                f"these are {width}x{height}; calibrate again"
             )
         matrix = self.matrix * factor
         matrix[2, 2] = 1.0

@@ -4,9 +4,9 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
 
 - A card **settles** when its tag was read `SETTLE_READS` times within `STILL_MM` while nothing moved around its place.
 - Cards that settled are reported together as soon as nothing moves at any place for cards (`QUIET_FRAMES`) and every place is
-  **explained**: its look is the one it had before, it is empty, or the card on top of it was read since the look changed.
-- A place that stays unexplained for `DOUBT_SECONDS` while no arm reaches over the edge of the field becomes a doubt, and so does one
-  that is covered again before it could be read.
+  **explained**: its look is the one it had before, it is empty, or the card on top of it was read since then.
+- A place that stays unexplained for `DOUBT_SECONDS` while no arm reaches over the edge of the field becomes a doubt, and so does
+  one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
 - A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone;
   if others stay for `TAKEN_SECONDS`, the cards were taken back.
@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field as dataclass_field
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 from chefshat_robot import field
 from chefshat_robot.deck import Card, Piece, PieceKind, deck, piece_of_tag
@@ -79,8 +80,10 @@ class _Spot:
 
     explained: int = 0
     """The last look that was explained."""
+    unexplained: bool = False
+    """Whether it is still and unexplained."""
     since: float | None = None
-    """Since when it is still and unexplained, in s."""
+    """Since when it is unexplained while no arm reaches over the field, in s."""
     frames: int = 0
     """For how many frames it is still and unexplained."""
     suspect: bool = False
@@ -154,7 +157,7 @@ class Decider:
     @property
     def unexplained(self) -> set[int]:
         """The places that should be read again: something new lies there. Indices of `SPOTS`."""
-        return {number for number, spot in enumerate(self._spots) if spot.since is not None}
+        return {number for number, spot in enumerate(self._spots) if spot.unexplained}
 
     @property
     def on_table(self) -> dict[Card, int]:
@@ -202,8 +205,8 @@ class Decider:
 
         Args:
             number: The number of the doubt.
-            reading: The card that lies there. At a pass place: whether the pass card lies there. False at a place for cards: nothing
-                new lies there.
+            reading: The card that lies there. At a pass place: whether the pass card lies there. False at a place for cards:
+                nothing new lies there.
 
         Raises:
             ValueError: There is no such open doubt, or the answer does not fit its place.
@@ -258,7 +261,7 @@ class Decider:
         if spot.doubt == number:
             spot.doubt = None
             spot.explained = doubt.look
-            spot.since = None
+            spot.unexplained, spot.since = False, None
         events.append(DoubtResolved(self._frame, self._time, number))
 
     # Following tags.
@@ -269,7 +272,7 @@ class Decider:
         for spot, seen in zip(self._spots, self._places, strict=True):
             if seen.still == 0:
                 spot.suspect = spot.suspect or spot.frames >= SETTLE_READS
-                spot.since, spot.frames, spot.gone_since = None, 0, None
+                spot.unexplained, spot.since, spot.frames, spot.gone_since = False, None, 0, None
 
     def _follow_tags(self, tags: Iterable[SeenTag]) -> None:
         """Counts the readings of each piece."""
@@ -360,7 +363,7 @@ class Decider:
         """A place's present look is explained, and with it a doubt about this look."""
         spot = self._spots[number]
         spot.explained = self._places[number].look
-        spot.since, spot.frames, spot.suspect = None, 0, False
+        spot.unexplained, spot.since, spot.frames, spot.suspect = False, None, 0, False
         if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
             self._close_doubt(spot.doubt, events)
 
@@ -370,11 +373,10 @@ class Decider:
             if seen.still < STILL_FRAMES:
                 continue
             occupied = self._top(number) is not None
-            if seen.look == spot.explained or (not occupied and seen.empty is not False and not spot.suspect):
-                spot.since, spot.frames = None, 0
-                if not occupied:
-                    spot.explained = seen.look
-            elif seen.empty or self._reaching:
+            if not occupied and seen.empty is not False and not spot.suspect:
+                spot.explained = seen.look
+            spot.unexplained = seen.look != spot.explained and not seen.empty
+            if not spot.unexplained or self._reaching:
                 spot.since, spot.frames = None, 0
             else:
                 spot.since = self._time if spot.since is None else spot.since
@@ -466,23 +468,27 @@ class Decider:
                     return
                 entry.closed = True
                 if entry.cards:
-                    cards = sorted(entry.cards, key=lambda card: entry.cards[card])
-                    events.append(Laid(self._frame, self._time, tuple(cards), tuple(entry.cards[card] + 1 for card in cards)))
+                    events.append(Laid(self._frame, self._time, *_in_order(entry.cards)))
             elif isinstance(entry, _PassMoved):
                 events.append((PassShown if entry.shown else PassWithdrawn)(self._frame, self._time, entry.seat))
             elif entry.cards is None:
                 events.append(Cleared(self._frame, self._time))
             else:
-                cards = sorted(entry.cards, key=lambda card: entry.cards[card])
-                events.append(TakenBack(self._frame, self._time, tuple(cards), tuple(entry.cards[card] + 1 for card in cards)))
+                events.append(TakenBack(self._frame, self._time, *_in_order(entry.cards)))
             self._queue.pop(0)
 
     def _is_quiet(self) -> bool:
         """Whether nothing moves at the places for cards, and all of them are explained."""
         return bool(self._places) and all(
-            self._places[spot].still >= QUIET_FRAMES and (self._spots[spot].since is None or self._spots[spot].doubt is not None)
+            self._places[spot].still >= QUIET_FRAMES and (not self._spots[spot].unexplained or self._spots[spot].doubt is not None)
             for spot in CARD_SPOTS
         )
+
+
+def _in_order(cards: dict[Card, int]) -> tuple[tuple[Card, ...], tuple[int, ...]]:
+    """Cards in the order of their places, and the place of each, 1..11."""
+    ordered = sorted(cards, key=lambda card: cards[card])
+    return tuple(ordered), tuple(cards[card] + 1 for card in ordered)
 
 
 def _piece(card: Card) -> Piece:

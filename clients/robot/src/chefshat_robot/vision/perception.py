@@ -12,6 +12,7 @@ from .decider import SETTLE_READS, Decider
 from .events import Doubt, Observed, Picture
 from .frames import Frame
 from .reader import SPOTS, Reader, Sighting
+from .recording import Recorder
 
 
 class Perception:
@@ -22,15 +23,17 @@ class Perception:
     Args:
         camera: The intrinsics of the camera; None: a lens without distortion is assumed.
         deck: The deck that is played with, 0..6; cards of other decks are ignored. None: any deck.
+        recorder: Writes what is seen, answered and reported.
 
     Attributes:
         sighting: What the last frame showed; None before the first.
     """
 
-    def __init__(self, camera: Camera | None = None, deck: int | None = None) -> None:
+    def __init__(self, camera: Camera | None = None, deck: int | None = None, recorder: Recorder | None = None) -> None:
         self.sighting: Sighting | None = None
         self._reader = Reader(camera)
         self._decider = Decider(deck)
+        self._recorder = recorder
         self._pictures: dict[int, Picture] = {}
 
     def see(self, frame: Frame) -> list[Observed]:
@@ -44,7 +47,9 @@ class Perception:
         for spot in self._decider.unexplained:
             if self.sighting.places[spot].still == SETTLE_READS:
                 self._pictures[spot] = self._reader.cut_out(frame.image, spot)
-        return [self._with_picture(event) if isinstance(event, Doubt) else event for event in events]
+        if self._recorder is not None:
+            self._recorder.saw(frame, self.sighting)
+        return self._reported([self._with_picture(event) if isinstance(event, Doubt) else event for event in events])
 
     def watch(self, frames: Iterable[Frame]) -> Iterator[Observed]:
         """The events of a sequence of frames, as they become certain."""
@@ -53,7 +58,10 @@ class Perception:
 
     def answer(self, number: int, reading: Card | bool) -> list[Observed]:
         """Answers a doubt and returns the events that were waiting for it; see `Decider.answer`."""
-        return self._decider.answer(number, reading)
+        events = self._decider.answer(number, reading)
+        if self._recorder is not None:
+            self._recorder.answered(number, reading)
+        return self._reported(events)
 
     def card_of_face(self, face: int) -> Card:
         """A card of a face that does not lie on the field; see `Decider.card_of_face`."""
@@ -63,6 +71,13 @@ class Perception:
     def on_table(self) -> dict[Card, int]:
         """The cards that lie on the field and the place of each, 1..11; the lowest first."""
         return self._decider.on_table
+
+    def _reported(self, events: list[Observed]) -> list[Observed]:
+        """The events, written to the recording too."""
+        if self._recorder is not None:
+            for event in events:
+                self._recorder.reported(event)
+        return events
 
     def _with_picture(self, doubt: Doubt) -> Doubt:
         spot = next(number for number, place in enumerate(SPOTS) if place.name == doubt.place)

@@ -1,4 +1,4 @@
-"""What one frame shows: tags in millimetres, and for each place whether something moves there, how it looks, and whether it is empty.
+"""What one frame shows: tags in mm, and for each place whether something moves there, how it looks, and whether it is empty.
 
 The reader knows nothing about cards or the game. It spends little: a map of the field at 1 mm tells where something changes, and
 tags are only read where nothing moves any more, for a few frames after each change and then in turn.
@@ -22,7 +22,7 @@ from chefshat_robot.deck import FIELD_TAGS
 from .camera import Camera
 from .events import FieldState, Picture
 from .frames import Frame
-from .tags import TagReader
+from .tags import Tag, TagReader
 from .view import FieldView
 
 STILL_FRAMES = 2
@@ -55,9 +55,11 @@ EMPTY_FRAMES = 4
 ADAPT = 0.03
 """How quickly the memory of a look follows the light: the weight of each new frame."""
 EDGE = 2
-"""Breadth of the edge of the field that is watched for arms, in blocks."""
-EDGE_CHANGE = 0.15
-"""Something reaches over the edge where its brightness, relative to its surroundings, differs by more than this from what it was."""
+"""Breadth of the edge of the field that is watched for arms, and length of its pieces, in blocks."""
+EDGE_BLOCKS = 2
+"""Something reaches over the edge if so many pieces of it look otherwise."""
+EDGE_CHANGE = 0.12
+"""Something reaches over the edge where its brightness, relative to its surroundings, changed by more than this."""
 EDGE_ADAPT = 0.01
 """How quickly the memory of the edge takes in what lies there: the weight of each new frame."""
 SURROUNDINGS = 31
@@ -199,7 +201,7 @@ class Reader:
 
         Args:
             frame: The frame.
-            attention: Places to read in this frame although they have been still for long; indices of `SPOTS`.
+            attention: Places to read closely in this frame, although they have been still for long; indices of `SPOTS`.
 
         Raises:
             ValueError: The camera was calibrated for pictures of other proportions.
@@ -213,11 +215,13 @@ class Reader:
             self._tags = TagReader(self.view.scale * field.CARD_TAG_SIZE)
             self._before = self._edge = None
         relative = _relative(self.view.rectified(grey))
-        blocks = np.asarray(cv2.resize(relative, None, fx=1 / BLOCK, fy=1 / BLOCK, interpolation=cv2.INTER_AREA), dtype=np.float32)
+        blocks = _shrunk(relative, BLOCK)
         moving = self._movement(blocks)
-        cells = cv2.resize(relative, None, fx=1 / CELL, fy=1 / CELL, interpolation=cv2.INTER_AREA)
-        to_read = [number for number in range(len(SPOTS)) if self._follow(number, moving, cells, frame.index, number in attention)]
-        tags = self._read_tags(grey, to_read)
+        cells = _shrunk(relative, CELL)
+        to_read = [number for number in range(len(SPOTS)) if self._follow(number, moving, cells, frame.index)]
+        closely = [number for number in attention if self._spots[number].still]
+        to_read += [number for number in closely if number not in to_read]
+        tags = self._read_tags(grey, [number for number in to_read if number not in closely], closely)
         places = tuple(self._seen(number, cells, number in to_read, tags) for number in range(len(SPOTS)))
         return Sighting(frame.index, frame.time, changed, tuple(tags), self._is_reaching(blocks), places)
 
@@ -231,12 +235,14 @@ class Reader:
 
     def _is_reaching(self, blocks: NDArray[np.float32]) -> bool:
         """Whether something reaches over the edge of the field: the edge looks otherwise than it did."""
-        edge = np.concatenate([blocks[:EDGE].ravel(), blocks[-EDGE:].ravel(), blocks[:, :EDGE].ravel(), blocks[:, -EDGE:].ravel()])
+        coarse = _shrunk(blocks, EDGE)
+        edge = np.concatenate([coarse[0], coarse[-1], coarse[:, 0], coarse[:, -1]])
         if self._edge is None:
             self._edge = edge
         change = np.abs(edge - self._edge)
         self._edge += EDGE_ADAPT * (edge - self._edge)
-        return int(np.count_nonzero(change > EDGE_CHANGE)) >= MOVING_BLOCKS
+        noise = float(np.median(change)) / 0.6745
+        return int(np.count_nonzero(change > max(EDGE_CHANGE, MOVEMENT_SIGMAS * noise))) >= EDGE_BLOCKS
 
     def _movement(self, blocks: NDArray[np.float32]) -> NDArray[np.bool_] | None:
         """Which blocks of the map moved since the last frame; None if all must count as moved."""
@@ -247,7 +253,7 @@ class Reader:
         noise = float(np.median(change)) / 0.6745
         return np.asarray(change > max(MOVEMENT, MOVEMENT_SIGMAS * noise))
 
-    def _follow(self, number: int, moving: NDArray[np.bool_] | None, cells: NDArray[np.float32], frame: int, wanted: bool) -> bool:
+    def _follow(self, number: int, moving: NDArray[np.bool_] | None, cells: NDArray[np.float32], frame: int) -> bool:
         """Follows a place through the frame, and returns whether its tags should be read."""
         spot = self._spots[number]
         if moving is None or np.count_nonzero(moving[_OUTER[number]]) >= MOVING_BLOCKS:
@@ -258,37 +264,42 @@ class Reader:
         if spot.still <= STILL_FRAMES:
             spot.gathered = seen.copy() if spot.gathered is None else spot.gathered + seen
             if spot.still == STILL_FRAMES:
-                look = spot.gathered / STILL_FRAMES
+                look = np.asarray(spot.gathered / STILL_FRAMES, dtype=np.float32)
                 if spot.remembered is None or difference(look, spot.remembered) > DIFFERENT:
                     spot.look += 1
                     spot.remembered = look
         elif spot.remembered is not None:
             spot.remembered += ADAPT * (seen - spot.remembered)
-        return wanted or spot.still <= READ_FRAMES or frame % REFRESH_FRAMES == number
+        return spot.still <= READ_FRAMES or frame % REFRESH_FRAMES == number
 
-    def _read_tags(self, grey: Picture, spots: list[int]) -> list[SeenTag]:
+    def _read_tags(self, grey: Picture, spots: list[int], closely: list[int]) -> list[SeenTag]:
         """The tags around some places, each once."""
         assert self._tags is not None, "the field was found"
         found: list[SeenTag] = []
-        for left, top, right, bottom in _merged([_AREA[number] for number in spots]):
+        areas = [(area, False) for area in _merged([_AREA[number] for number in spots])]
+        areas += [(area, True) for area in _merged([_AREA[number] for number in closely])]
+        for (left, top, right, bottom), fine in areas:
             outline = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
             pixels = self.view.to_pixels(outline)
             first, last = np.maximum(pixels.min(axis=0), 0).astype(int), np.maximum(pixels.max(axis=0), 0).astype(int)
-            for tag in self._tags.read(grey, first[0], first[1], last[0], last[1]):
-                corners = self.view.to_table(tag.corners)
-                edges = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T) / field.CARD_TAG_SIZE
-                if tag.number >= FIELD_TAGS or edges.min() < TAG_SIZES[0] or edges.max() > TAG_SIZES[1]:
-                    continue
-                x, y = corners.mean(axis=0)
-                across = corners[1] - corners[0]
-                if all(other.number != tag.number or np.hypot(other.x - x, other.y - y) > 5 for other in found):
-                    angle = float(np.degrees(np.arctan2(across[1], across[0])))
-                    found.append(
-                        SeenTag(
-                            tag.number, round(float(x), 2), round(float(y), 2), round(angle, 1), tag.hamming, round(tag.margin, 1)
-                        )
-                    )
+            for tag in self._tags.read(grey, first[0], first[1], last[0], last[1], fine):
+                seen = self._on_table(tag)
+                if seen is not None and all(
+                    other.number != seen.number or np.hypot(other.x - seen.x, other.y - seen.y) > 5 for other in found
+                ):
+                    found.append(seen)
         return found
+
+    def _on_table(self, tag: Tag) -> SeenTag | None:
+        """A tag in mm; None if it has not the size of a card's tag."""
+        corners = self.view.to_table(tag.corners)
+        edges = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T) / field.CARD_TAG_SIZE
+        if tag.number >= FIELD_TAGS or edges.min() < TAG_SIZES[0] or edges.max() > TAG_SIZES[1]:
+            return None
+        x, y = corners.mean(axis=0)
+        across = corners[1] - corners[0]
+        angle = float(np.degrees(np.arctan2(across[1], across[0])))
+        return SeenTag(tag.number, round(float(x), 2), round(float(y), 2), round(angle, 1), tag.hamming, round(tag.margin, 1))
 
     def _seen(self, number: int, cells: NDArray[np.float32], read: bool, tags: list[SeenTag]) -> SeenPlace:
         """What a place shows in this frame."""
@@ -317,8 +328,13 @@ def difference(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
 def _relative(grey: Picture) -> NDArray[np.float32]:
     """The map relative to the brightness of its surroundings: about 1, without shadows and changes of light."""
     values = grey.astype(np.float32)
-    around = cv2.blur(values, (SURROUNDINGS, SURROUNDINGS))
-    return np.asarray(cv2.divide(values, cv2.add(around, 8.0)), dtype=np.float32)
+    around = np.asarray(cv2.blur(values, (SURROUNDINGS, SURROUNDINGS)), dtype=np.float32)
+    return np.asarray(cv2.divide(values, around + np.float32(8.0)), dtype=np.float32)
+
+
+def _shrunk(relative: NDArray[np.float32], step: int) -> NDArray[np.float32]:
+    """The map with pixels of `step` mm."""
+    return np.asarray(cv2.resize(relative, None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
 def _slices(place: field.Place, grow: tuple[float, float], step: int) -> tuple[slice, slice]:

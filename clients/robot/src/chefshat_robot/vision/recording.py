@@ -1,0 +1,104 @@
+"""Recordings: what the camera saw, in a folder, to be run again without the camera.
+
+A folder holds `sightings.jsonl` (a header, then one line for each frame and one for each answer to a doubt), `events.jsonl` (what
+was reported) and, if wanted, the frames as `frames/00000000.jpg`. Running the sightings again gives the same events; running the
+frames again also tests the reading of tags, but their compression may change what is read.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TextIO
+
+import cv2
+
+from chefshat_robot.deck import Card
+
+from .decider import Decider
+from .events import Observed, to_json
+from .frames import Frame
+from .reader import Sighting
+
+VERSION = 1
+"""Version of the format."""
+JPEG_QUALITY = 92
+
+
+class Recorder:
+    """Writes a recording.
+
+    Args:
+        folder: The folder; it is created, and must not hold a recording yet.
+        deck: The deck that is played with, as `Perception` got it.
+        frames: Whether to keep the frames too: about 10 MB a minute in JPEG for each frame per second.
+
+    Raises:
+        FileExistsError: The folder holds a recording.
+    """
+
+    def __init__(self, folder: Path, deck: int | None = None, frames: bool = False) -> None:
+        self._frames = folder / "frames" if frames else None
+        (self._frames or folder).mkdir(parents=True, exist_ok=True)
+        self._sightings = (folder / "sightings.jsonl").open("x", encoding="utf-8")
+        self._events = (folder / "events.jsonl").open("w", encoding="utf-8")
+        _write(self._sightings, {"recording": VERSION, "deck": deck})
+
+    def saw(self, frame: Frame, sighting: Sighting) -> None:
+        """Writes what a frame showed."""
+        _write(self._sightings, sighting.to_json())
+        if self._frames is not None:
+            path = self._frames / f"{frame.index:08}.jpg"
+            cv2.imwrite(str(path), frame.image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+
+    def answered(self, number: int, reading: Card | bool) -> None:
+        """Writes the answer to a doubt."""
+        value = {"deck": reading.deck, "index": reading.index} if isinstance(reading, Card) else reading
+        _write(self._sightings, {"answer": number, "reading": value})
+
+    def reported(self, event: Observed) -> None:
+        """Writes an event."""
+        _write(self._events, to_json(event))
+
+    def close(self) -> None:
+        """Closes the files."""
+        self._sightings.close()
+        self._events.close()
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def replay(folder: Path) -> Iterator[Observed]:
+    """The events of a recording, decided again from its sightings and answers.
+
+    Raises:
+        OSError: The recording cannot be read.
+        ValueError: A line of it is not one of a recording, or of another version; the message names it.
+    """
+    path = folder / "sightings.jsonl"
+    decider: Decider | None = None
+    with path.open(encoding="utf-8") as lines:
+        for number, line in enumerate(lines, start=1):
+            try:
+                values: dict[str, Any] = json.loads(line)
+                if decider is None:
+                    if values["recording"] != VERSION:
+                        raise ValueError(f"version {values['recording']}; this program reads version {VERSION}")
+                    decider = Decider(values["deck"])
+                elif "answer" in values:
+                    reading = values["reading"]
+                    yield from decider.answer(values["answer"], reading if isinstance(reading, bool) else Card(**reading))
+                else:
+                    yield from decider.see(Sighting.from_json(values))
+            except (KeyError, TypeError, ValueError) as error:
+                raise ValueError(f"{path}, line {number}: {error}") from error
+
+
+def _write(file: TextIO, values: dict[str, Any]) -> None:
+    file.write(json.dumps(values, separators=(",", ":")) + "\n")
