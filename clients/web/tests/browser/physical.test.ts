@@ -4,8 +4,8 @@
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
-import { nextDecision, sitDown } from "./play";
-import { gameOf } from "./rooms";
+import { focus, hearing, nextDecision, sitDown, tabTo } from "./play";
+import { gameOf, newPhysicalRoom } from "./rooms";
 import { browser, person, server, until, useStage } from "./stage";
 
 useStage();
@@ -152,4 +152,41 @@ test("an attendant enters a Shift, with a question, a violation and a correction
   await slider.fill((await slider.getAttribute("max")) ?? "");
   await attendant.getByRole("heading", { name: "Cleo won" }).waitFor();
   expect([...faults, ...faultsOfCleo, ...faultsOfTablet]).toEqual([]);
+});
+
+test("with the keyboard alone: a hand is typed, a play and a pass are reported, and what comes next is heard", async () => {
+  const { roomId, tableTicket } = await newPhysicalRoom(server, ["Ada", "Bo", "Cleo"]);
+  const { page, faults } = await person(browser);
+  const heard = await hearing(page);
+  const hears = (words: string) => expect.poll(() => heard.join(" ")).toContain(words);
+  const press = async (name: string) => {
+    await tabTo(page, (on) => on.label === name);
+    await page.keyboard.press("Enter");
+  };
+  await page.goto(`${server.url}/rooms/${roomId}/table#ticket=${tableTicket}`);
+  await awaits(page, "Show the hand of greedy");
+  await tabTo(page, (on) => on.label === "Cards");
+  await page.keyboard.type("1 2 2 3x3 4x4 5x5 6 2xJ");
+  await tabTo(page, (on) => on.label === "Remove 5, chilli");
+  await page.keyboard.press("Enter");
+  await page.locator('[data-part~="entry"]').getByText("17 of 17 cards").waitFor({ state: "attached" });
+  await tabTo(page, (on) => on.label === "Cards", "Shift+Tab");
+  await page.keyboard.press("Enter");
+  await hears("The player with the Golden 11 opens the Shift.");
+  await press("0 Ada");
+  await press("11, mozzarella");
+  await press("More: How many");
+  await press("Ada lays 2 × 11, Golden");
+  await hears("Bo to play.");
+  await press("Bo passes");
+  await hears("Cleo to play.");
+  await press("Cleo passes");
+  // The built-in agent decides at once; its cards are laid for it.
+  const item = page.locator('[data-part~="to-lay-item"]');
+  await item.waitFor();
+  await tabTo(page, (on) => on.label.startsWith("Done: "));
+  await page.keyboard.press("Enter");
+  await item.waitFor({ state: "detached" });
+  expect(await focus(page)).not.toMatchObject({ label: "" });
+  expect(faults).toEqual([]);
 });

@@ -96,6 +96,20 @@ export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "T
   throw new Error(`not to be reached with ${key}; the focus is on "${(await focus(page)).label}"`);
 }
 
+/** The announcements of the pages that are opened from now on, as they are made. */
+export async function hearing(page: Page): Promise<string[]> {
+  const heard: string[] = [];
+  await page.exposeFunction("hear", (text: string) => heard.push(text));
+  await page.addInitScript(() => {
+    const { hear } = globalThis as unknown as { hear(text: string): void };
+    new MutationObserver((changes) => {
+      const region = document.querySelector('[data-testid="announcer"]');
+      if (region && changes.some(({ target }) => region.contains(target))) hear(region.textContent);
+    }).observe(document, { subtree: true, childList: true, characterData: true });
+  });
+  return heard;
+}
+
 /** Label of the hand, which has the focus itself after a decision. */
 export const HAND = "Your hand";
 

@@ -3,7 +3,7 @@
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
-import { byClicks, byKeys, focus, HAND, nextDecision, playOn, sitDown, tabTo } from "./play";
+import { byClicks, byKeys, focus, HAND, hearing, nextDecision, playOn, sitDown, tabTo } from "./play";
 import { agent, gameOf, newRoom, recordOf } from "./rooms";
 import { browser, person, server, startBrowser, useStage } from "./stage";
 
@@ -32,9 +32,7 @@ test("a person plays a complete Shift by clicking, and continues after a reload"
 test("a person plays a complete Shift with the keyboard alone, and hears every turn", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });
   const { page, faults } = await person(browser);
-  const heard: string[] = [];
-  await page.exposeFunction("hear", (text: string) => heard.push(text));
-  await page.addInitScript(listen);
+  const heard = await hearing(page);
   await page.goto(`${server.url}/join/${code}`);
   await page.getByLabel("Your name").waitFor();
   await tabTo(page, (on) => on.label.startsWith("Your name"));
@@ -152,15 +150,6 @@ test("two people in two browsers and two agents play in one room to its end", as
     await other.close();
   }
 });
-
-/** Runs in the page: forwards every announcement. */
-function listen(): void {
-  const { hear } = globalThis as unknown as { hear(text: string): void };
-  new MutationObserver((changes) => {
-    const region = changes[0]?.target.parentElement?.closest("[role=status]") ?? changes[0]?.target;
-    if (region instanceof Element && region.matches("[role=status]")) hear(region.textContent);
-  }).observe(document, { subtree: true, childList: true, characterData: true });
-}
 
 /** The open decision as the page shows it, and what led to it. */
 async function seen(page: Page): Promise<Record<"decision" | "hand" | "heading" | "points", unknown>> {

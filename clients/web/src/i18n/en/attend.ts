@@ -73,7 +73,6 @@ export const attend = {
     },
     seat: "Who",
     face: "Face",
-    joker: "J",
     jokerAlone: "a joker alone",
     number: "How many",
     jokers: "Jokers with them",
@@ -164,7 +163,6 @@ export const attend = {
   },
   room: {
     attend: "Attend to the table",
-    watch: "Watch",
     replay: "Replay",
     realCards: "real cards",
   },

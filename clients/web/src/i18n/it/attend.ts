@@ -80,7 +80,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Chi",
     face: "Valore",
-    joker: "J",
     jokerAlone: "un jolly da solo",
     number: "Quante",
     jokers: "Jolly insieme",
@@ -171,7 +170,6 @@ export const attend: Texts["attend"] = {
   },
   room: {
     attend: "Assisti al tavolo",
-    watch: "Guarda",
     replay: "Replay",
     realCards: "carte vere",
   },
