@@ -9,12 +9,13 @@ import pytest
 from chefshat import ChefsHatError, RandomAgent, aio, pb
 
 from chefshat_robot import layout
-from chefshat_robot.drivers.driver import CardMove, Pick, Pose
+from chefshat_robot.drivers.driver import CardMove, Heard, Pick, Pose, Say
+from chefshat_robot.questions import option_said
 from chefshat_robot.reporting import report_of
 from chefshat_robot.robot import play_seat
 from chefshat_robot.table import TableState
 from chefshat_robot.words import Words
-from tests.loop import run
+from tests.loop import run, until
 from tests.robots import SEATS, ScriptedRobot
 
 ROBOT, DAN = 0, 3
@@ -133,3 +134,60 @@ def test_what_a_robot_carries_is_a_report() -> None:
     assert shown is not None
     assert getattr(shown, "pass").seat == 1
     assert carried(["pass"], [rest]) is None
+
+
+@pytest.mark.server
+def test_a_robot_says_violations_and_asks_the_tables_questions(server_address: str) -> None:
+    robot = ScriptedRobot()
+    question = pb.TableQuestion(question_id="q1", text="7 or 9 at place 4?", options=["7", "9"])
+
+    def said(text: str) -> bool:
+        return any(isinstance(act, Say) and act.text == text for act in robot.acts)
+
+    async def test() -> None:
+        async with aio.Client(server_address) as client:
+            rules = pb.RuleSet(target_shifts=1)
+            dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
+            made = await client.create_room("doubt", seats=[None, dan, dan, dan], rules=rules, physical=True)
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+            ticket = made.table_ticket
+            playing = asyncio.create_task(
+                play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("it"), table_ticket=ticket, referee=True)
+            )
+            await until(lambda: robot.seen)
+            hand = pb.SeenCards(cards=[2, 2, 5, 7, 9, 9, 9, 10, 10, 10, 11, 11, 11, 11, 11, 12, 12], golden=False)
+            assert (await client.report(ticket, pb.TableReport(hand=pb.HandSeen(seat=ROBOT, cards=hand)))).verdict == 1
+            # Nobody may open a Shift with a 3.
+            wrong = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[3], golden=False)))
+            violation = await client.report(ticket, wrong)
+            assert violation.verdict == pb.REPORT_VERDICT_VIOLATION
+            await until(lambda: said(violation.detail))
+
+            await client.report(ticket, pb.TableReport(question=question))
+            await until(lambda: said("7 or 9 at place 4?"))
+            for heard in (Heard("seven or nine?"), Heard("nine", 0.2), Heard("It is a nine.", 0.9)):
+                robot.report(heard)
+            async for state in client.watch_table(ticket):
+                if not state.questions:
+                    break
+            await client.close_room(made.room.room_id, made.owner_token)
+            assert (await playing).abort_reason == "CLOSED"
+
+    run(test())
+
+
+@pytest.mark.parametrize(
+    ("text", "option"),
+    [
+        ("nine", 1),
+        ("It's a 9, I think", 1),
+        ("credo che sia un sette", 0),
+        ("seven or nine?", None),
+        ("no idea", None),
+        ("", None),
+        ("the golden one", 2),
+        ("79", None),
+    ],
+)
+def test_an_answer_is_one_option_that_was_said(text: str, option: int | None) -> None:
+    assert option_said(text, ["7", "9", "golden"]) == option

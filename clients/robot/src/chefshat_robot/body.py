@@ -240,9 +240,9 @@ class Body:
         self._given.append(piece)
         return self._need(self._gift_job([piece], receiver, stand))
 
-    def say(self, text: str) -> None:
-        """Says a line, before anything less urgent."""
-        self._need(_Job((Say(text, self.words.language),)))
+    def say(self, text: str, language: str | None = None) -> None:
+        """Says a line, before anything less urgent; in the robot's language unless told otherwise."""
+        self._need(_Job((Say(text, language or self.words.language),)))
 
     def express(self, label: str, valence: float = 0.0, arousal: float = 0.0) -> None:
         """Shows an expression, before anything less urgent."""

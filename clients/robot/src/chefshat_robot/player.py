@@ -33,6 +33,7 @@ class RobotPlayer(chefshat.Agent):
         *,
         hold_s: float | None = None,
         on_robot_event: Callable[[RobotEvent], None] = lambda event: None,
+        says_violations: bool = False,
     ) -> None:
         """Creates the player.
 
@@ -41,11 +42,13 @@ class RobotPlayer(chefshat.Agent):
             body: acts.
             hold_s: most seconds by which the robot's acts may delay an answer; None: as long as the decision's time allows.
             on_robot_event: called with what the robot hears, reads in faces, and with its buttons.
+            says_violations: whether it says what is wrong when a physical table's referee finds a violation.
         """
         self._agent = agent
         self._body = body
         self._hold_s = hold_s
         self._on_robot_event = on_robot_event
+        self._says_violations = says_violations
         self._listener: asyncio.Task[None] | None = None
         # The gift decided last at a physical table: number of the decision, face and receiver.
         self._gift: tuple[int, int, int] | None = None
@@ -92,6 +95,8 @@ class RobotPlayer(chefshat.Agent):
         """Lets the agent and the robot follow the game."""
         self._agent.on_event(event)
         self._body.on_event(event)
+        if self._says_violations and event.HasField("violation") and event.sequence >= self._body.live_from:
+            self._body.say(event.violation.text, "en")
 
     def on_snapshot(self, snapshot: pb.Snapshot) -> None:
         """Passes it to the agent."""

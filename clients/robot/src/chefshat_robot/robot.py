@@ -23,8 +23,9 @@ from chefshat_robot import drivers, speech, wire
 from chefshat_robot.affect import Forwarder, tickets
 from chefshat_robot.body import Body, Notice, Times
 from chefshat_robot.cli import CommandError
-from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Express, Outcome, Pick, RobotEvent, Say
+from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Express, Heard, Outcome, Pick, RobotEvent, Say
 from chefshat_robot.player import RobotPlayer
+from chefshat_robot.questions import Questions
 from chefshat_robot.reporting import Reporter
 from chefshat_robot.running import run_command
 from chefshat_robot.words import LANGUAGES, Words
@@ -62,6 +63,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         metavar="TICKET",
         help="of a physical room: report what the robot has laid, passed and given, so that no camera or attendant has to",
+    )
+    parser.add_argument(
+        "--referee",
+        action="store_true",
+        help="in a physical room: say what the referee says of violations and, with --table-ticket, ask its questions",
     )
     parser.add_argument(
         "--people",
@@ -113,6 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
                 hold_s=arguments.hold,
                 times=Times().times(arguments.patience),
                 table_ticket=arguments.table_ticket,
+                referee=arguments.referee,
                 people=Forwarder(client, tickets(arguments.people)) if arguments.people else None,
                 notify=attendant(arguments.json),
             )
@@ -133,6 +140,7 @@ async def play_seat(
     times: Times | None = None,
     people: Forwarder | None = None,
     table_ticket: str = "",
+    referee: bool = False,
     notify: Callable[[Notice], None] = lambda notice: None,
 ) -> SeatResult:
     """Plays one seat with a robot until its game is over.
@@ -150,6 +158,8 @@ async def play_seat(
         times: limits of its acts.
         people: where to send the expressions that the robot reads in people's faces and voices; None: nowhere.
         table_ticket: of a physical table, to which the robot reports what it has laid, passed and given; empty: it does not report.
+        referee: whether it says the referee's words at a physical table: violations and, with the table's ticket, questions,
+            whose answers it reports if it hears them.
         notify: called with messages to the attendant, in addition.
 
     Raises:
@@ -182,10 +192,18 @@ async def play_seat(
             reading = asyncio.create_task(_forward(people, event))
             readings.add(reading)
             reading.add_done_callback(readings.discard)
+        if isinstance(event, Heard) and questions is not None:
+            answer = asyncio.create_task(questions.heard(event))
+            readings.add(answer)
+            answer.add_done_callback(readings.discard)
 
     body = Body(driver, words, notify=noticed, on_act=acted, times=times, handles_cards=handles_cards)
+    questions = Questions(client, table_ticket, body) if referee and table_ticket else None
     async with outbox, reporter or nullcontext(), body:
-        player = RobotPlayer(agent, body, hold_s=hold_s, on_robot_event=perceived)
+        player = RobotPlayer(agent, body, hold_s=hold_s, on_robot_event=perceived, says_violations=referee)
+        if questions is not None:
+            asking = asyncio.create_task(questions.follow())
+            readings.add(asking)
         result = await client.play(player, ticket, options=PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
     await asyncio.gather(*readings)
     return result
