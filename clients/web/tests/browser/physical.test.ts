@@ -5,7 +5,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { focus, hearing, nextDecision, sitDown, tabTo } from "./play";
-import { gameOf, newPhysicalRoom } from "./rooms";
+import { clientsOf, gameOf, newPhysicalRoom } from "./rooms";
 import { browser, person, server, until, useStage } from "./stage";
 
 useStage();
@@ -15,6 +15,9 @@ useStage();
  * remote, has 1 2 3.
  */
 const CLEOS_HAND = "1 2 3";
+
+/** A picture of one pixel. */
+const PICTURE = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";
 
 /** Creates the room on the page and returns its id. */
 async function createTable(page: Page): Promise<string> {
@@ -188,5 +191,31 @@ test("with the keyboard alone: a hand is typed, a play and a pass are reported, 
   await page.keyboard.press("Enter");
   await item.waitFor({ state: "detached" });
   expect(await focus(page)).not.toMatchObject({ label: "" });
+  expect(faults).toEqual([]);
+});
+
+test("a doubt of the camera is shown with its picture, also to an attendant who comes later, and answered once", async () => {
+  const { roomId, tableTicket } = await newPhysicalRoom(server, ["Ada", "Bo", "Cleo"]);
+  const { page, faults } = await person(browser);
+  const { page: later } = await person(browser, { locale: "it-IT" });
+  const link = `${server.url}/rooms/${roomId}/table#ticket=${tableTicket}`;
+  await page.goto(link);
+  await awaits(page, "Show the hand of greedy");
+  const { tables } = clientsOf(server);
+  const question = { questionId: "place-4", text: "7 or 9 at place 4?", options: ["7", "9"] };
+  const picture = Uint8Array.from(Buffer.from(PICTURE, "base64"));
+  await tables.report({
+    tableTicket,
+    reportId: "camera-1",
+    report: { kind: { case: "question", value: { ...question, picture } } },
+  });
+  await later.goto(link);
+  for (const one of [page, later]) {
+    const image = one.locator('[data-part~="question-card"] img');
+    await until(() => image.evaluate((shown: HTMLImageElement) => shown.complete && shown.naturalWidth > 0));
+  }
+  await page.getByRole("heading", { name: "7 or 9 at place 4?" }).waitFor();
+  await page.locator('[data-part~="question-card"]').getByRole("button", { name: "9", exact: true }).click();
+  for (const one of [page, later]) await one.locator('[data-part~="question-card"]').waitFor({ state: "detached" });
   expect(faults).toEqual([]);
 });

@@ -10,13 +10,18 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { type RecordLine, RecordLineSchema } from "../../src/gen/chefshat/v1/record_pb";
 import { ParticipantKind, type RoomPolicy } from "../../src/gen/chefshat/v1/room_pb";
 import { RoomService } from "../../src/gen/chefshat/v1/room_service_pb";
+import { TableService } from "../../src/gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../../src/gen/chefshat/v1/tournament_service_pb";
 import { type Server, until } from "./stage";
 
 /** Clients of a server's services, for Node. */
 export function clientsOf(server: Server) {
   const transport = createGrpcWebTransport({ baseUrl: server.url });
-  return { rooms: createClient(RoomService, transport), tournaments: createClient(TournamentService, transport) };
+  return {
+    rooms: createClient(RoomService, transport),
+    tournaments: createClient(TournamentService, transport),
+    tables: createClient(TableService, transport),
+  };
 }
 
 /** The options of a room. */
