@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import chefshat
@@ -156,6 +157,60 @@ def test_events_of_the_past_are_followed_without_acts() -> None:
             assert not body.state.golden
             await body.take_turn(Turn(11, 1, 0)).wait()
             assert [move.piece for move in carried(robot)] == ["11"]
+
+    run(test())
+
+
+def test_turns_that_a_correction_repeats_are_not_performed_again() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        hand = body.state.hand
+        opened, played = play(0, 11, 1, cards_left=16), play(1, 9, 1, cards_left=16)
+        corrected: dict[str, object] = {"correction": pb.Correction(first_void=3, text="Ada laid two 11s, not one")}
+        turns = (opened, played, corrected, play(0, 11, 2, cards_left=15), played, play(1, 7, 1, cards_left=15))
+        events = list(numbered({}, {}, *turns))[2:]
+        for event in events[:3]:
+            body.on_event(event)
+        assert body.state.hand == hand
+        assert body.state.board_size == 0
+        for event in events[3:]:
+            body.on_event(event)
+        await body.idle()
+        assert said(robot) == ["I play one 9.", "I play one 7."]
+        assert [move.piece for move in carried(robot)] == ["9", "7"]
+        assert sum(body.state.hand) == 15
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_a_turn_that_a_correction_changes_is_performed() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        corrected: dict[str, object] = {"correction": pb.Correction(first_void=3, text="not a 9")}
+        for event in list(numbered({}, {}, play(1, 9, 1, cards_left=16), corrected, play(1, 7, 1, cards_left=16)))[2:]:
+            body.on_event(event)
+        await body.idle()
+        assert [move.piece for move in carried(robot)] == ["9", "7"]
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_a_pass_for_one_turn_is_taken_back_before_the_next_play() -> None:
+    async def test() -> None:
+        robot, notices = ScriptedRobot(), list[Notice]()
+        body = await table(robot, notices)
+        body.state = replace(body.state, pass_scope_turn=True)
+        await body.take_turn(PASS).wait()
+        await body.take_turn(Turn(9, 1, 0)).wait()
+        await body.idle()
+        down, back, played = carried(robot)
+        assert (down.piece, back.piece, played.piece) == ("pass", "pass", "9")
+        assert back.end == down.start
+        await body.__aexit__(None, None, None)
 
     run(test())
 

@@ -12,9 +12,9 @@ from chefshat import RandomAgent, aio, pb
 from chefshat_robot import cli, drivers, layout, speech
 from chefshat_robot.affect import Forwarder
 from chefshat_robot.body import Body, Notice, Turn
-from chefshat_robot.drivers.driver import Affect, Done, Express, Failed, Pick, Say
+from chefshat_robot.drivers.driver import Affect, CardMove, Done, Express, Failed, Pick, Pose, Say
 from chefshat_robot.player import RobotPlayer
-from chefshat_robot.robot import play_seat
+from chefshat_robot.robot import attendant, play_seat
 from chefshat_robot.words import TEXTS, Words
 from tests.loop import run
 from tests.robots import ScriptedRobot
@@ -218,6 +218,15 @@ def test_a_robot_that_is_not_there_at_the_start_is_an_error(server_address: str,
     err = capsys.readouterr().err
     assert "no robot listens at 127.0.0.1:1" in err
     assert "--ticket" not in err  # It has not taken the seat.
+
+
+def test_requests_for_help_name_the_cards(capsys: pytest.CaptureFixture[str]) -> None:
+    moves = tuple(CardMove(piece, None, Pose(1.0, 2.0)) for piece in ("9", "joker"))
+    attendant(False)(Notice("help", "Please lay my cards.", "jammed", moves))
+    attendant(True)(Notice("help", "Please lay my cards.", "jammed", moves))
+    out, err = capsys.readouterr()
+    assert err == "HELP: Please lay my cards. [9, joker] (jammed)\n"
+    assert json.loads(out)["cards"][0]["end"] == {"x": 1.0, "y": 2.0, "angle": 0.0}
 
 
 def test_drivers_are_listed_with_their_options(capsys: pytest.CaptureFixture[str]) -> None:

@@ -178,6 +178,11 @@ class Body:
         self._pass_is_down = False
         # The own turn that is being performed and that the game has not confirmed yet.
         self._announced: Turn | None = None
+        # Of the Shift: the state before each event, by its number, and the own turns. Corrections at physical tables need them.
+        self._past: list[tuple[int, TableState]] = []
+        self._turns: list[tuple[int, Turn]] = []
+        # Own turns that a correction has made void, and whose events come again.
+        self._repeated: list[Turn] = []
         # Pieces that were given in the exchange, which is not complete yet.
         self._given: list[str] = []
         self._needed: deque[_Job] = deque()
@@ -227,7 +232,7 @@ class Body:
     def take_turn(self, turn: Turn) -> asyncio.Event:
         """Starts to perform an own turn. Returns an event that is set when its acts have ended."""
         self._announced = turn
-        return self._need(self._turn_job(turn, self.state))
+        return self._need_turn(turn, self.state)
 
     def give(self, face: int, receiver: int) -> asyncio.Event:
         """Starts to give a card in the exchange; face F+1 is a joker. Returns as `take_turn`. What the card is is not said."""
@@ -256,7 +261,7 @@ class Body:
     def on_event(self, event: pb.GameEvent) -> None:
         """Follows the game, and queues what the robot does about it. Call it for every event, in order."""
         before = self.state
-        after = self.state = follow(before, event)
+        after = self.state = self._follow(before, event)
         live = event.sequence >= self.live_from
         if self._handles_cards:
             self._follow_cards(event, after, live)
@@ -271,6 +276,22 @@ class Body:
         if after.to_act is not None and after.to_act != before.to_act and after.to_act != after.seat:
             face = layout.face_of(after.to_act, after.players)
             self._reaction(Gaze(face.x, face.y, face.z))
+
+    def _follow(self, before: TableState, event: pb.GameEvent) -> TableState:
+        """Returns the state after an event; after a correction, the state before the first void event."""
+        if event.HasField("shift_started"):
+            self._past.clear()
+            self._turns.clear()
+            self._repeated.clear()
+        if not event.HasField("correction"):
+            self._past.append((event.sequence, before))
+            return follow(before, event)
+        first = event.correction.first_void
+        if not first:
+            return before
+        self._repeated = [turn for sequence, turn in self._turns if sequence >= first]
+        self._turns = [entry for entry in self._turns if entry[0] < first]
+        return next((state for sequence, state in self._past if sequence >= first), before)
 
     # Cards.
 
@@ -296,11 +317,19 @@ class Body:
             self._exchanged(event.cards_exchanged, after, stand, live)
         elif kind == "cards_exchanged" and event.cards_exchanged.receiver == own and after.hand:
             stand.settle(after.hand, after.golden)
-        elif kind == "pizza_done" and self._pass_is_down:
-            self._pass_is_down = False
-            rest, place = layout.pass_rest(own, after.players), layout.pass_place(own)
-            if live and place is not None:
-                self._need(_Job((Pick((CardMove("pass", place, rest),)),), self.words.say("please_return_pass")))
+        elif kind == "pizza_done":
+            self._take_pass_back(after, live)
+
+    def _take_pass_back(self, state: TableState, live: bool = True) -> None:
+        """Takes the own pass card back, if it lies on the field."""
+        own = state.seat
+        if own is None or not self._pass_is_down:
+            return
+        self._pass_is_down = False
+        place = layout.pass_place(own)
+        if live and place is not None:
+            move = CardMove("pass", place, layout.pass_rest(own, state.players))
+            self._need(_Job((Pick((move,)),), self.words.say("please_return_pass")))
 
     def _exchanged(self, given: pb.CardsExchanged, after: TableState, stand: Stand, live: bool) -> None:
         """Carries the gifts that no decision has carried: those without a choice, and what a default decision gave instead."""
@@ -330,6 +359,12 @@ class Body:
         told = Say(words.say("give", count=count, name=name), words.language)
         return _Job((told, Pick(moves)), words.say("please_give", count=count, name=name))
 
+    def _need_turn(self, turn: Turn, state: TableState) -> asyncio.Event:
+        """Queues what the robot does for a turn in a state."""
+        if not turn.is_pass:
+            self._take_pass_back(state)
+        return self._need(self._turn_job(turn, state))
+
     def _turn_job(self, turn: Turn, state: TableState) -> _Job:
         """Returns what the robot does for a turn in a state, and takes the cards out of its stand."""
         words = self.words
@@ -355,7 +390,7 @@ class Body:
             place = layout.pass_place(own)
             if place is None or self._pass_is_down:
                 return ()
-            self._pass_is_down = not state.pass_scope_turn
+            self._pass_is_down = True
             return (CardMove("pass", layout.pass_rest(own, state.players), place),)
         golden = plays_golden(state, turn.face, turn.quantity)
         if not state.hand:  # A spectator sees no hand, only that the opening includes the Golden card.
@@ -364,8 +399,13 @@ class Body:
         stand = self._stand if self._stand is not None else Stand.at(own, state.players)
         return stand.take(pieces, layout.play_places(len(pieces)))
 
-    def _own_turn(self, turn: Turn, before: TableState, after: TableState) -> None:
+    def _own_turn(self, sequence: int, turn: Turn, before: TableState, after: TableState) -> None:
         """Confirms the announced turn, or performs the one that counted instead."""
+        self._turns.append((sequence, turn))
+        if self._repeated:
+            if self._repeated.pop(0) == turn:
+                return  # It has been performed: only what happened before it was corrected.
+            self._repeated.clear()
         announced, self._announced = self._announced, None
         if announced == turn:
             return
@@ -375,7 +415,7 @@ class Body:
             text = self.words.say("please_take_back", cards=cards)
             self.say(text)
             self._notify(Notice("help", text, "the decision was too late, and the default decision counted"))
-        self._need(self._turn_job(turn, before))
+        self._need_turn(turn, before)
         if self._stand is not None and after.hand:
             self._stand.settle(after.hand, after.golden)
 
@@ -385,9 +425,10 @@ class Body:
         match event.WhichOneof("kind"):
             case "play" if event.play.seat == own:
                 play = event.play
-                self._own_turn(Turn(play.face if play.quantity else 0, play.quantity, play.jokers), before, after)
+                turn = Turn(play.face if play.quantity else 0, play.quantity, play.jokers)
+                self._own_turn(event.sequence, turn, before, after)
             case "pass" if getattr(event, "pass").seat == own:
-                self._own_turn(PASS, before, after)
+                self._own_turn(event.sequence, PASS, before, after)
             case "special_action_declared" if event.special_action_declared.seat == own and self._announces:
                 food_fight = event.special_action_declared.action == pb.SPECIAL_ACTION_FOOD_FIGHT
                 self.say(self.words.say("food_fight" if food_fight else "dinner"))

@@ -227,7 +227,8 @@ def attendant(as_json: bool) -> Callable[[Notice], None]:
             print(json.dumps(line, ensure_ascii=False), flush=True)
         else:
             kind = "HELP" if notice.kind == "help" else "NOT SAID"
-            print(f"{kind}: {notice.text} ({notice.reason})", file=sys.stderr, flush=True)
+            pieces = f" [{', '.join(move.piece for move in notice.cards)}]" if notice.cards else ""
+            print(f"{kind}: {notice.text}{pieces} ({notice.reason})", file=sys.stderr, flush=True)
 
     return show
 
