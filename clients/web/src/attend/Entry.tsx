@@ -19,7 +19,6 @@ import {
   type EntryKind,
   entriesAt,
   isBeforePlay,
-  mayBeGolden,
   NO_PLAY,
   type PlayDraft,
   parseHand,
@@ -182,7 +181,7 @@ export function TurnFields({
         deck={deck}
         draft={draft.play}
         requirement={fixed ? undefined : state.playRequirement}
-        golden={fixed || mayBeGolden(state)}
+        golden={fixed || isBeforePlay(state)}
         onChange={(play) => change({ play })}
       />
       <Actions>
@@ -256,7 +255,7 @@ export function GiftFields(props: FieldsProps & { fixed?: boolean }) {
 
 /** Whether to ask for the Golden card: an earlier report may be from before it was played. */
 function asksGolden(state: TableState, fixed: boolean): boolean {
-  return fixed || mayBeGolden(state);
+  return fixed || isBeforePlay(state);
 }
 
 /** The typed cards as they are reported. */

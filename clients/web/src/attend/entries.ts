@@ -2,7 +2,7 @@
 // the moment. The forms are in Entry.tsx; the referee in the server judges what was entered.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { Opening, type RuleSet } from "../gen/chefshat/v1/rules_pb";
+import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import { type SeenCards, type SeenCardsSchema, TableStage, type TableState } from "../gen/chefshat/v1/table_service_pb";
 import { type Card, cardsFromNumbers, playedCards } from "../table/model/cards";
 
@@ -100,7 +100,10 @@ export function handText(cards: readonly number[], { faces }: Deck): string {
 /** What can be entered. */
 export type EntryKind = "turn" | "hand" | "special" | "gift" | "role" | "passWithdrawn" | "cleared";
 
-/** Whether nobody has played or passed in this Shift. */
+/**
+ * Whether nobody has played or passed in this Shift. Then the Golden card is in a hand: a table with
+ * real cards opens with it.
+ */
 export function isBeforePlay({ observation }: TableState): boolean {
   return (
     observation === undefined ||
@@ -130,9 +133,4 @@ export function awaitedEntry({ stage }: TableState): EntryKind {
     default:
       return "turn";
   }
-}
-
-/** Whether a play of the top face may include the Golden card now. */
-export function mayBeGolden(state: TableState): boolean {
-  return isBeforePlay(state) || state.room?.rules?.opening === Opening.ANY_TOP_FACE;
 }
