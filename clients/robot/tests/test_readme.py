@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import argparse
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 from chefshat_robot import cli, drivers
-from chefshat_robot.drivers import Done, Express, Failed, Gaze, Say, driver
+from chefshat_robot.drivers import CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Pose, Say, driver
 from tests.loop import run
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_sample_of_a_driver_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    (sample,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    (sample,) = [code for code in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "class Lamp" in code]
     (tmp_path / "my_module.py").write_text(sample, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "my_module", raising=False)
@@ -35,6 +36,25 @@ def test_the_sample_of_a_driver_works(tmp_path: Path, monkeypatch: pytest.Monkey
         "turns to the colour of joy",
         "off",
     ]
+
+
+def test_the_sample_of_a_robots_program_works() -> None:
+    program = Path(__file__).parent.parent / "samples" / "json_lines_robot.py"
+    with subprocess.Popen([sys.executable, str(program), "0"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            port = process.stdout.readline().split()[-1]
+
+            async def test() -> list[Outcome]:
+                async with drivers.create(f"jsonlines:port={port}") as robot:
+                    move = CardMove("9", None, Pose(97.5, 151.0))
+                    return [await driver.attempt(robot, act, 60) for act in (Say("I pass."), Pick((move,)), Gaze(0.0, 0.0))]
+
+            assert run(test()) == [Done(), Done(), Failed("this robot cannot turn its head")]
+            lines = [process.stdout.readline().strip() for _ in range(2)]
+            assert lines == ["says: I pass.", "carries the 9 to x 97.5 mm, y 151.0 mm"]
+        finally:
+            process.kill()
 
 
 def test_every_command_with_robots_and_every_driver_is_described() -> None:
