@@ -8,8 +8,8 @@ import { Opening, PassScope, RuleSetSchema } from "../src/gen/chefshat/v1/rules_
 import { gameProblems, withPreset } from "../src/lobby/game-form";
 import {
   MAX_NAME,
-  namesMissing,
   newForm,
+  physicalProblems,
   quickGame,
   type RoomForm,
   requestOf,
@@ -41,9 +41,10 @@ test("with real cards everybody but built-in agents sits at the table, with a na
     seats: real.seats.with(1, "at-table robot").with(2, "agent"),
     seatNames: [" Ada ", "", "Cy"],
   };
-  expect(namesMissing(named)).toBe(true);
+  expect(physicalProblems(named)).toEqual({ seatNames: "nameMissing" });
   const complete = { ...named, seatNames: [" Ada ", "Bo", "Cy"] };
-  expect(namesMissing(complete)).toBe(false);
+  expect(physicalProblems(complete)).toEqual({});
+  expect(physicalProblems({ ...complete, opening: "anyTopFace" })).toEqual({ opening: "realOpening" });
   const request = asked(complete);
   expect(request.physical).toBe(true);
   expect(request.seats.map(({ filledBy, name }) => [filledBy.case, filledBy.value, name])).toEqual([
@@ -57,7 +58,7 @@ test("with real cards everybody but built-in agents sits at the table, with a na
 test("with cards dealt by the server nobody sits at the table", () => {
   const real = withCards(form({ seats: ["at-table human", "at-table robot", "agent", "built-in greedy"] }), "dealt");
   expect(real.seats).toEqual(["human", "robot", "agent", "built-in greedy"]);
-  expect(namesMissing(real)).toBe(false);
+  expect(physicalProblems({ ...real, opening: "anyTopFace" })).toEqual({});
   expect(asked(real).physical).toBe(false);
 });
 

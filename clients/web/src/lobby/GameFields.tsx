@@ -92,6 +92,7 @@ export function RuleFields(props: GameProps & { players: number; presets: RuleSe
         <Typed {...props} name="jokers" label={words.jokers} hint="0–2" />
         <SelectField
           label={words.opening}
+          fault={props.faults.opening}
           value={form.opening}
           options={[
             { value: "golden", label: words.openingGolden },

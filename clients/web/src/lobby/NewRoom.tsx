@@ -9,7 +9,7 @@ import { FormFrame, FormPage, FormPart } from "./FormPage";
 import { type FieldFaults, useFormState } from "./form-state";
 import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
 import { gameProblems } from "./game-form";
-import { type FieldName, namesMissing, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
+import { type FieldName, newForm, physicalProblems, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
 import { createRoom } from "./seat";
 
@@ -30,7 +30,7 @@ function RoomFormView({ offered }: { offered: Offered }) {
   const state = useFormState(() => newForm(offered.agents), {
     check: (form) => ({
       ...wordsOfProblems<FieldName>(gameProblems(form, form.seats.length)),
-      ...(namesMissing(form) ? { seatNames: words.nameMissing } : {}),
+      ...wordsOfPhysical(form),
     }),
     fields: ROOM_FIELDS,
     send: async (form) => {
@@ -65,4 +65,11 @@ function RoomFormView({ offered }: { offered: Offered }) {
       </FormPart>
     </FormFrame>
   );
+}
+
+/** What is wrong with a room for real cards, in words. */
+function wordsOfPhysical(form: RoomForm): FieldFaults<FieldName> {
+  const words = t().lobby.make;
+  const entries = Object.entries(physicalProblems(form));
+  return Object.fromEntries(entries.map(([field, problem]) => [field, words[problem]]));
 }

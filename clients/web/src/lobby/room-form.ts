@@ -70,8 +70,17 @@ export function isAtTable(choice: SeatChoice): choice is AtTable {
   return choice.startsWith("at-table ");
 }
 
+/** What is wrong with a room for real cards, by field. */
+export function physicalProblems(form: RoomForm): { seatNames?: "nameMissing"; opening?: "realOpening" } {
+  return {
+    ...(namesMissing(form) ? { seatNames: "nameMissing" } : {}),
+    // Nobody draws a seat there.
+    ...(form.cards === "real" && form.opening !== "golden" ? { opening: "realOpening" } : {}),
+  };
+}
+
 /** Whether a player at the table has no name yet. */
-export function namesMissing({ seats, seatNames }: RoomForm): boolean {
+function namesMissing({ seats, seatNames }: RoomForm): boolean {
   return seats.some((choice, seat) => isAtTable(choice) && (seatNames[seat] ?? "").trim() === "");
 }
 

@@ -117,6 +117,7 @@ export const lobby = {
       "Somebody attends to the table: a camera, a robot or a person at a screen reports what happens. The server deals nothing and checks the rules.",
     nameOf: (seat: number) => `Name, seat ${seat}`,
     nameMissing: "Enter the name of each player at the table.",
+    realOpening: "With real cards, the holder of the Golden card opens.",
     players: "Players",
     seats: "Who sits where",
     choices: {

@@ -118,6 +118,7 @@ export const lobby: Texts["lobby"] = {
       "Qualcuno assiste al tavolo: una telecamera, un robot o una persona a uno schermo segnala che cosa succede. Il server non distribuisce carte e controlla le regole.",
     nameOf: (seat) => `Nome, posto ${seat}`,
     nameMissing: "Scrivi il nome di ogni giocatore al tavolo.",
+    realOpening: "Con carte vere apre chi ha la carta d’oro.",
     players: "Giocatori",
     seats: "Chi si siede dove",
     choices: {
