@@ -1,6 +1,6 @@
 //! The client and its calls about servers, rooms, seats and records. `tournaments` adds calls about
-//! tournaments, `vector` those about games stepped in batches. A `Client` holds only a connection:
-//! it is cheap to clone, and calls may run in parallel.
+//! tournaments, `vector` those about games stepped in batches, `table` those about physical tables.
+//! A `Client` holds only a connection: it is cheap to clone, and calls may run in parallel.
 
 use tonic::transport::Channel;
 

@@ -1,7 +1,7 @@
 //! The modules: agents ([`Agent`]), connections and calls ([`Client`]), results of games
-//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]). The messages of the protocol are
-//! re-exported as [`v1`]. The crate contains no rules of the game: the server sends the legal
-//! actions.
+//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]), physical tables ([`TableFollower`]). The
+//! messages of the protocol are re-exported as [`v1`]. The crate contains no rules of the game: the
+//! server sends the legal actions.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
 
@@ -20,6 +20,7 @@ mod run;
 mod seat;
 mod session;
 mod spectate;
+mod table;
 mod tournaments;
 mod vector;
 
@@ -33,5 +34,6 @@ pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
 pub use spectate::Spectator;
+pub use table::TableFollower;
 pub use tournaments::TournamentFollower;
 pub use vector::VectorGames;

@@ -11,6 +11,7 @@ mod examiner;
 mod faults;
 mod languages;
 mod lists;
+mod physical;
 mod played;
 mod records;
 mod restarts;

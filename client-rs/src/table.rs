@@ -1,0 +1,145 @@
+//! Physical tables: reporting what happens there, and following their state.
+
+use futures::Stream;
+use rand::TryRng as _;
+use tokio::time::{Instant, sleep};
+use tonic::transport::Channel;
+use tonic::{Status, Streaming};
+
+use crate::backoff::{Backoff, Outage};
+use crate::client::Client;
+use crate::connection::MAX_RESPONSE_BYTES;
+use crate::error::{Error, may_retry};
+use crate::repeat::repeated;
+use crate::v1::{self, table_service_client::TableServiceClient};
+
+impl Client {
+    /// Reports something that happened at a physical table. `table_ticket` comes from
+    /// [`Client::create_room`]. If the response is lost, the call is repeated and reports nothing
+    /// twice.
+    ///
+    /// A report that the rules or the cards do not allow is no error: see `verdict` and `detail`.
+    ///
+    /// # Errors
+    /// `TICKET_UNKNOWN`, `REPORT_REFUSED` with the malformed field in the metadata,
+    /// `GAME_NOT_STARTED`, `GAME_OVER`, `TOO_MANY_REPORTS`, `TOO_MANY_QUESTIONS`.
+    ///
+    /// # Panics
+    /// If the operating system has no random bytes.
+    pub async fn report(
+        &self,
+        table_ticket: impl Into<String>,
+        report: v1::TableReport,
+    ) -> Result<v1::ReportResponse, Error> {
+        let mut id = [0; 16];
+        rand::rngs::SysRng
+            .try_fill_bytes(&mut id)
+            .expect("the operating system gives random bytes");
+        let request = v1::ReportRequest {
+            table_ticket: table_ticket.into(),
+            report_id: id.map(|byte| format!("{byte:02x}")).concat(),
+            report: Some(report),
+        };
+        let service = service(self);
+        repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.report(request).await }
+        })
+        .await
+    }
+
+    /// Follows the state of a physical table. Connects when the first state is requested.
+    pub fn follow_table(&self, table_ticket: impl Into<String>) -> TableFollower {
+        TableFollower {
+            service: service(self),
+            table_ticket: table_ticket.into(),
+            backoff: Backoff::default(),
+            outage: Outage::default(),
+            stream: None,
+            over: false,
+        }
+    }
+}
+
+/// Follows one table across lost connections; created by [`Client::follow_table`].
+#[derive(Debug)]
+pub struct TableFollower {
+    service: TableServiceClient<Channel>,
+    table_ticket: String,
+    backoff: Backoff,
+    outage: Outage,
+    stream: Option<Streaming<v1::TableServiceWatchResponse>>,
+    over: bool,
+}
+
+impl TableFollower {
+    /// Replaces the default backoff.
+    #[must_use]
+    pub fn with_backoff(mut self, backoff: Backoff) -> Self {
+        self.backoff = backoff;
+        self
+    }
+
+    /// The state of the table: at once, then after every change; `None` after the state in which
+    /// the game is over. Cancel safe: dropping the future loses nothing.
+    ///
+    /// # Errors
+    /// The server's refusal (`TICKET_UNKNOWN`, `TOO_MANY_SPECTATORS`), or the last failure if the
+    /// connection cannot be restored in time. After an error there are no more states.
+    pub async fn next(&mut self) -> Result<Option<v1::TableState>, Error> {
+        while !self.over {
+            match self.receive().await {
+                Ok(response) => {
+                    self.outage.over();
+                    // A response without a state is a heartbeat.
+                    if let Some(state) = response.state {
+                        self.over = state.stage() == v1::TableStage::Over;
+                        return Ok(Some(state));
+                    }
+                }
+                Err(status) => self.lost(status).await?,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Converts the follower to a [`Stream`].
+    pub fn into_stream(self) -> impl Stream<Item = Result<v1::TableState, Error>> + Send {
+        futures::stream::try_unfold(self, |mut follower| async {
+            let state = follower.next().await?;
+            Ok(state.map(|state| (state, follower)))
+        })
+    }
+
+    async fn receive(&mut self) -> Result<v1::TableServiceWatchResponse, Status> {
+        let stream = match &mut self.stream {
+            Some(stream) => stream,
+            none => {
+                let request = v1::TableServiceWatchRequest {
+                    table_ticket: self.table_ticket.clone(),
+                };
+                none.insert(self.service.watch(request).await?.into_inner())
+            }
+        };
+        let response = stream.message().await?;
+        response.ok_or_else(|| Status::unavailable("the server ended the stream"))
+    }
+
+    async fn lost(&mut self, status: Status) -> Result<(), Error> {
+        self.stream = None;
+        let retry = may_retry(status.code())
+            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
+            .flatten();
+        let Some(delay) = retry else {
+            self.over = true;
+            return Err(status.into());
+        };
+        tracing::info!(?delay, "connection lost: {status}");
+        sleep(delay).await;
+        Ok(())
+    }
+}
+
+fn service(client: &Client) -> TableServiceClient<Channel> {
+    TableServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
+}
