@@ -112,11 +112,14 @@ impl Referee {
             _ => false,
         };
         let of_shift = |shift: usize| {
-            let entries = self.shifts[shift].entries.iter();
-            let open = entries
-                .enumerate()
-                .find(|(_, entry)| same(entry) && !entry.confirmed);
-            open.map(|(index, _)| (shift, index))
+            let mut entries = self.shifts[shift].entries.iter();
+            let open = |entry: &Entry| same(entry) && !entry.confirmed;
+            // Earlier passes need not be shown any more.
+            let index = match action {
+                Action::Pass => entries.rposition(open),
+                _ => entries.position(open),
+            };
+            Some((shift, index?))
         };
         let open = self.recent_shifts().find_map(of_shift);
         if let Some((shift, index)) = open {
