@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -227,6 +228,18 @@ def test_requests_for_help_name_the_cards(capsys: pytest.CaptureFixture[str]) ->
     out, err = capsys.readouterr()
     assert err == "HELP: Please lay my cards. [9, joker] (jammed)\n"
     assert json.loads(out)["cards"][0]["end"] == {"x": 1.0, "y": 2.0, "angle": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("driver", "package"),
+    [("ros2", "zenoh"), ("ros2", "rosbags.typesys"), ("rosbridge", "roslibpy"), ("naoqi", "qi"), ("furhat", "furhat_realtime_api")],
+)
+def test_a_missing_package_of_a_driver_is_named_with_its_extra(driver: str, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(drivers.RobotError) as error:
+        drivers.create(driver)
+    assert package in str(error.value)
+    assert f"pip install 'chefshat-robot[{driver}]'" in str(error.value)
 
 
 def test_drivers_are_listed_with_their_options(capsys: pytest.CaptureFixture[str]) -> None:
