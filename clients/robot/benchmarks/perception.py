@@ -11,8 +11,8 @@ Every happening (cards laid, field cleared, pass card shown or withdrawn) is one
 
 A *false* event is one that was reported without a doubt and did not happen like this. *Needless* doubts are about places where
 nothing new lies. The latency is the time from the last card at rest to the event, in the frames' own time. Frames per second count
-reading and deciding, without painting the frames, on one thread. *Naive* is how often a reader that believes each single frame
-(OpenCV's detector, on frames without a hand over the table) finds a tag of every piece that lies on top.
+processor time for reading and deciding, on one thread and without painting the frames. *Naive* is how often a reader that believes
+each single frame (OpenCV's detector, on frames without a hand over the table) finds a tag of every piece that lies on top.
 """
 
 from __future__ import annotations
@@ -134,29 +134,31 @@ def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: flo
     result = Result()
     events: list[tuple[Observed, bool]] = []
     """Each event with whether an answer made it certain."""
-    open_doubts: list[tuple[float, Doubt, FrameTruth]] = []
+    open_doubts: list[tuple[float, Doubt]] = []
+    truths: list[FrameTruth] = []
     last = 0.0
     for frame, truth in table.frames():
         if max_frames is not None and frame.index >= max_frames:
             break
-        started = time.perf_counter()
+        started = time.process_time()
         seen = perception.see(frame)
-        took = time.perf_counter() - started
+        took = time.process_time() - started
         result.frames += 1
         result.seconds += took
         result.slowest = max(result.slowest, took if frame.index else 0.0)
         last = truth.time
+        truths.append(truth)
         for event in seen:
             if isinstance(event, Doubt):
                 result.doubts += 1
-                open_doubts.append((frame.time + ANSWER_SECONDS, event, truth))
+                open_doubts.append((frame.time + ANSWER_SECONDS, event))
             elif isinstance(event, DoubtResolved):
                 open_doubts = [entry for entry in open_doubts if entry[1].number != event.number]
             else:
                 events.append((event, False))
         while open_doubts and open_doubts[0][0] <= frame.time:
-            _, doubt, asked = open_doubts.pop(0)
-            reading = answer(doubt, asked, perception.on_table)
+            _, doubt = open_doubts.pop(0)
+            reading = answer(doubt, truths[round(doubt.seen * fps)], perception.on_table)
             result.needless += reading is False
             events += [(event, True) for event in perception.answer(doubt.number, reading) if not isinstance(event, DoubtResolved)]
         if frame.index % NAIVE_EVERY == 0 and truth.lying and not truth.hands:

@@ -21,9 +21,9 @@ PIECE_SCALE = 4.0
 """Pixels per mm of the pictures of pieces."""
 PIECE_MARGIN = 5.0
 """Margin around a piece for its shadow, in mm."""
-TABLE_SCALE = 2.5
+TABLE_SCALE = 2.0
 """Pixels per mm of the table and the field sheet."""
-TABLE_MARGIN = 420.0
+TABLE_MARGIN = 300.0
 """How far the table reaches beyond the field on each side, in mm."""
 HAND_SCALE = 2.0
 """Pixels per mm of a hand."""

@@ -37,6 +37,8 @@ _CARRY_HEIGHT = 45.0
 """Height of a hand on its way, in mm above the table."""
 _TREMBLE = 1.2
 """How far a hand that holds still moves about, in mm."""
+_MAP_STEP = 8.0
+"""The lens is computed for one pixel in so many, in each direction, and interpolated between."""
 _LIGHT_UNIT = 150.0
 """Grey level of the light map at which the light is as painted."""
 
@@ -367,14 +369,18 @@ class SyntheticTable:
     def _table_maps(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """For each pixel, where in the picture of the table it looks."""
         width, height = self.size
-        xs, ys = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
+        xs, ys = np.meshgrid(np.arange(0.0, width + _MAP_STEP, _MAP_STEP), np.arange(0.0, height + _MAP_STEP, _MAP_STEP))
         pixels = self.camera.undistort(np.column_stack([xs.ravel(), ys.ravel()]))
         rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(self.camera.matrix).T @ self._rotation
         eye = -np.array([0.0, 0.0, self._distance]) @ self._rotation
         reach = -eye[2] / rays[:, 2]
         points = (eye[:2] + rays[:, :2] * reach[:, None] + self._centre[:2] + artwork.TABLE_MARGIN) * artwork.TABLE_SCALE
-        first = points[:, 0].reshape(height, width).astype(np.float32)
-        second = points[:, 1].reshape(height, width).astype(np.float32)
+        coarse = points.reshape(*xs.shape, 2).astype(np.float32)
+        enlarge = np.diag([1 / _MAP_STEP, 1 / _MAP_STEP])
+        between = cv2.warpAffine(
+            coarse, np.column_stack([enlarge, [0.0, 0.0]]), (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        )
+        first, second = cv2.split(between)
         map_xy, map_fraction = cv2.convertMaps(first, second, cv2.CV_16SC2)
         return np.asarray(map_xy), np.asarray(map_fraction)
 

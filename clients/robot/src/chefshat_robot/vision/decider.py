@@ -82,12 +82,14 @@ class _Spot:
     """The last look that was explained."""
     unexplained: bool = False
     """Whether it is still and unexplained."""
-    since: float | None = None
-    """Since when it is unexplained while no arm reaches over the field, in s."""
+    waited: float = 0.0
+    """For how long it has been unexplained while no arm reached over the field, in s."""
     frames: int = 0
-    """For how many frames it is still and unexplained."""
-    suspect: bool = False
-    """Whether it was covered before an unexplained look was explained."""
+    """For how many such frames."""
+    seen: float = 0.0
+    """When it was last seen so, in s."""
+    suspect: int | None = None
+    """An unexplained look that was covered before it could be explained."""
     doubt: int | None = None
     """The open doubt about its present look."""
     gone_since: float | None = None
@@ -183,6 +185,7 @@ class Decider:
 
     def see(self, sighting: Sighting) -> list[Observed]:
         """Takes in the next frame and returns what is now certain."""
+        passed = sighting.time - self._time
         self._frame, self._time = sighting.frame, sighting.time
         events: list[Observed] = []
         if sighting.field is not None:
@@ -194,7 +197,7 @@ class Decider:
             self._forget_moved()
             self._follow_tags(sighting.tags)
             self._settle(events)
-            self._explain()
+            self._explain(passed)
             self._notice_gone(events)
             self._raise_doubts(events)
         self._flush(events)
@@ -240,7 +243,10 @@ class Decider:
                             self._queue.remove(play)
                         return
         doubt.play.cards[card] = doubt.spot
-        self._known[_piece(card)] = _Known(doubt.spot, told=True)
+        later = self._queue[self._queue.index(doubt.play) + 1 :]
+        if not any(isinstance(entry, _Gone) and entry.cards is None for entry in later):
+            # Cards that were laid on top in the meantime stay on top.
+            self._known = {_piece(card): _Known(doubt.spot, told=True), **self._known}
 
     def _tell_pass(self, doubt: _OpenDoubt, shown: bool) -> None:
         """Puts the answer to a doubt about a pass card in its place in the queue."""
@@ -260,8 +266,9 @@ class Decider:
         spot = self._spots[doubt.spot]
         if spot.doubt == number:
             spot.doubt = None
-            spot.explained = doubt.look
-            spot.unexplained, spot.since = False, None
+            if self._places and self._places[doubt.spot].look == doubt.look:
+                spot.explained = doubt.look
+                spot.unexplained, spot.waited, spot.frames = False, 0.0, 0
         events.append(DoubtResolved(self._frame, self._time, number))
 
     # Following tags.
@@ -271,8 +278,9 @@ class Decider:
         self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
         for spot, seen in zip(self._spots, self._places, strict=True):
             if seen.still == 0:
-                spot.suspect = spot.suspect or spot.frames >= SETTLE_READS
-                spot.unexplained, spot.since, spot.frames, spot.gone_since = False, None, 0, None
+                if spot.frames >= SETTLE_READS and spot.suspect is None and spot.doubt is None:
+                    spot.suspect = seen.look
+                spot.unexplained, spot.waited, spot.frames, spot.gone_since = False, 0.0, 0, None
 
     def _follow_tags(self, tags: Iterable[SeenTag]) -> None:
         """Counts the readings of each piece."""
@@ -337,12 +345,11 @@ class Decider:
             self._doubts[spot.doubt].play.cards[card] = track.spot
             self._explained(track.spot, events)
             return
-        if spot.suspect:
-            self._raise_doubt(track.spot, self._places[track.spot].look - 1, events)
         play = self._open_play()
-        if play is None or track.spot in play.cards.values():
-            if play is not None:
-                play.closed = True
+        if spot.suspect is not None or (play is not None and track.spot in play.cards.values()):
+            self._close_play(events)
+            play = None
+        if play is None:
             play = _Play()
             self._queue.append(play)
         play.cards[card] = track.spot
@@ -352,6 +359,16 @@ class Decider:
         """The play that further cards may belong to."""
         last = next((entry for entry in reversed(self._queue) if not isinstance(entry, _PassMoved)), None)
         return last if isinstance(last, _Play) and not last.closed else None
+
+    def _close_play(self, events: list[Observed]) -> None:
+        """Ends the play that is open, as the next one begins: asks about cards of it that were covered before they could be read."""
+        play = self._open_play()
+        for number in CARD_SPOTS:
+            spot = self._spots[number]
+            if spot.suspect is not None:
+                self._raise_doubt(number, spot.suspect, events, play)
+        if play is not None:
+            play.closed = True
 
     def _top(self, spot: int) -> Piece | None:
         """The piece on top of a place."""
@@ -363,39 +380,40 @@ class Decider:
         """A place's present look is explained, and with it a doubt about this look."""
         spot = self._spots[number]
         spot.explained = self._places[number].look
-        spot.unexplained, spot.since, spot.frames, spot.suspect = False, None, 0, False
+        spot.unexplained, spot.waited, spot.frames, spot.suspect = False, 0.0, 0, None
         if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
             self._close_doubt(spot.doubt, events)
 
-    def _explain(self) -> None:
-        """Finds the places that are still and not explained."""
+    def _explain(self, passed: float) -> None:
+        """Finds the places that are still and not explained; `passed` is the time since the last frame, in s."""
         for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
             if seen.still < STILL_FRAMES:
                 continue
             occupied = self._top(number) is not None
-            if not occupied and seen.empty is not False and not spot.suspect:
+            if not occupied and seen.empty is not False:
                 spot.explained = seen.look
             spot.unexplained = seen.look != spot.explained and not seen.empty
-            if not spot.unexplained or self._reaching:
-                spot.since, spot.frames = None, 0
-            else:
-                spot.since = self._time if spot.since is None else spot.since
+            if not spot.unexplained:
+                spot.waited, spot.frames = 0.0, 0
+            elif not self._reaching:
+                spot.waited += passed
                 spot.frames += 1
+                spot.seen = self._time
 
     def _raise_doubts(self, events: list[Observed]) -> None:
         """Asks about places that stay unexplained."""
         for number, spot in enumerate(self._spots):
             seen = self._places[number]
-            if spot.doubt is None and spot.since is not None and self._time - spot.since >= DOUBT_SECONDS:
-                self._raise_doubt(number, seen.look, events)
+            open_play = self._open_play() if number in CARD_SPOTS else None
+            if spot.suspect is not None and self._top(number) is None and self._is_empty(number):
+                self._raise_doubt(number, spot.suspect, events, open_play)
+            elif spot.doubt is None and spot.waited >= DOUBT_SECONDS:
+                self._raise_doubt(number, seen.look, events, open_play)
 
-    def _raise_doubt(self, number: int, look: int, events: list[Observed]) -> None:
-        """Asks about a place."""
+    def _raise_doubt(self, number: int, look: int, events: list[Observed], play: _Play | None) -> None:
+        """Asks about a look of a place, whose card belongs to a play; None: to one of its own."""
         spot = self._spots[number]
-        spot.suspect = False
-        if spot.doubt is not None:
-            return
-        play = self._open_play() if number < _FIRST_PASS else None
+        spot.suspect = None
         if play is None or number in play.cards.values():
             play = _Play()
             self._queue.append(play)
@@ -403,9 +421,10 @@ class Decider:
         options = tuple(card for track in candidates if track.piece not in self._known and (card := track.piece.card) is not None)
         play.doubts.add(self._next_doubt)
         play.closed = True
-        spot.doubt = self._next_doubt
+        if look == self._places[number].look:
+            spot.doubt = self._next_doubt
         self._doubts[self._next_doubt] = _OpenDoubt(number, look, play, options)
-        events.append(Doubt(self._frame, self._time, self._next_doubt, SPOTS[number].name, options))
+        events.append(Doubt(self._frame, self._time, self._next_doubt, SPOTS[number].name, spot.seen, options))
         self._next_doubt += 1
 
     # Cards that are gone.
@@ -422,13 +441,8 @@ class Decider:
         if not empty:
             return
         if len(empty) == len(occupied):
-            for spot in CARD_SPOTS:
-                if self._spots[spot].suspect:
-                    self._raise_doubt(spot, self._spots[spot].explained, events)
+            self._close_play(events)
             self._remove(empty, events)
-            play = self._open_play()
-            if play is not None:
-                play.closed = True
             self._queue.append(_Gone())
             return
         for spot in empty:

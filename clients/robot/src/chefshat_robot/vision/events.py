@@ -96,6 +96,7 @@ class Doubt:
     Attributes:
         number: Identifies the doubt, from 1.
         place: The place, as `field.Place.name`: `1`..`11`, or `pass 0`..`pass 3`.
+        seen: When it was last seen, in s. Earlier than `time` if it was covered or taken away in the meantime.
         options: What it may be, the likeliest first; empty if nothing is known. At a pass place always empty: the question is
             whether the pass card lies there.
         picture: The place, cut out of the rectified frame; None when a recording without frames is run again.
@@ -105,6 +106,7 @@ class Doubt:
     time: float
     number: int
     place: str
+    seen: float
     options: tuple[Card, ...]
     picture: Picture | None = field(default=None, compare=False, repr=False)
 

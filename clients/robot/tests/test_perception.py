@@ -1,0 +1,325 @@
+"""From frames of the synthetic table to events: short Shifts, each disturbance alone, doubts, a moved camera, and recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from chefshat_robot.deck import Card
+from chefshat_robot.synthetic import (
+    DIFFICULTIES,
+    EASY,
+    HARD,
+    MEDIUM,
+    Act,
+    Bump,
+    Clear,
+    Difficulty,
+    FrameTruth,
+    Happening,
+    Hover,
+    LayCards,
+    ShowPass,
+    SyntheticTable,
+    TakeBack,
+    WithdrawPass,
+    acts_of_steps,
+    random_shift,
+)
+from chefshat_robot.vision import (
+    Cleared,
+    Doubt,
+    DoubtResolved,
+    FieldChanged,
+    FieldState,
+    Frame,
+    Laid,
+    Observed,
+    PassShown,
+    PassWithdrawn,
+    Perception,
+    Recorder,
+    TakenBack,
+    open_source,
+    replay,
+    to_json,
+)
+
+ROUND: list[Act] = [
+    LayCards(0.6, 0, (Card(0, 65), Card(0, 58)), (1, 2)),
+    ShowPass(2.0, 1),
+    LayCards(3.2, 2, (Card(0, 20), Card(0, 66)), (1, 2)),
+    Clear(5.0, 3),
+    WithdrawPass(5.2, 1),
+]
+"""A short pizza: a play, a pass, a play on top of it, and clearing."""
+
+
+def said(event: Observed | Happening) -> tuple[Any, ...]:
+    """What an event or a happening says, without its time."""
+    match event:
+        case Happening(kind="laid" | "taken_back" as kind, cards=cards, places=places):
+            return (kind, *sorted(zip(places, cards, strict=True)))
+        case Happening(kind="cleared" as kind):
+            return (kind,)
+        case Happening(kind=kind, seat=seat):
+            return (kind, seat)
+        case Laid(cards=cards, places=places):
+            return ("laid", *sorted(zip(places, cards, strict=True)))
+        case TakenBack(cards=cards, places=places):
+            return ("taken_back", *sorted(zip(places, cards, strict=True)))
+        case Cleared():
+            return ("cleared",)
+        case PassShown(seat=seat):
+            return ("pass_shown", seat)
+        case PassWithdrawn(seat=seat):
+            return ("pass_withdrawn", seat)
+        case _:
+            return (type(event).__name__,)
+
+
+def the_truth(doubt: Doubt, truth: FrameTruth, perception: Perception) -> Card | bool:
+    """The true answer to a doubt."""
+    if doubt.place.startswith("pass"):
+        return any(lying.piece.card is None and f"pass {lying.place}" == doubt.place for lying in truth.lying)
+    there = [card for lying in truth.lying if (card := lying.piece.card) is not None and str(lying.place) == doubt.place]
+    return there[-1] if there and there[-1] not in perception.on_table else False
+
+
+def watch(
+    table: SyntheticTable,
+    perception: Perception | None = None,
+    answer: Callable[[Doubt, FrameTruth, Perception], Card | bool] | None = the_truth,
+) -> list[Observed]:
+    """The events of a table; each doubt is answered at once, unless `answer` is None."""
+    perception = perception or Perception(table.camera)
+    events: list[Observed] = []
+    truths: list[FrameTruth] = []
+    for frame, truth in table.frames():
+        truths.append(truth)
+        seen = perception.see(frame)
+        events += seen
+        for event in seen:
+            if isinstance(event, Doubt) and answer is not None:
+                events += perception.answer(event.number, answer(event, truths[round(event.seen * table.fps)], perception))
+    return events
+
+
+def happened(events: Sequence[Observed]) -> list[tuple[Any, ...]]:
+    """What events say happened at the table."""
+    return [said(event) for event in events if not isinstance(event, FieldChanged | Doubt | DoubtResolved)]
+
+
+def assert_true(table: SyntheticTable, events: Sequence[Observed]) -> None:
+    """The events are what truly happened; withdrawn pass cards may come before or after the clearing beside them."""
+    assert sorted(map(str, happened(events))) == sorted(str(said(happening)) for happening in table.happenings)
+    laid = [event for event in happened(events) if event[0] in ("laid", "cleared")]
+    assert laid == [said(happening) for happening in table.happenings if happening.kind in ("laid", "cleared")]
+
+
+@pytest.mark.parametrize("name", list(DIFFICULTIES))
+def test_the_first_pizzas_of_a_shift(name: str) -> None:
+    difficulty = DIFFICULTIES[name]
+    acts = [act for act in acts_of_steps(random_shift(11), 11, difficulty.pause, difficulty.hovers) if act.start < 18.0]
+    table = SyntheticTable(acts, difficulty, seed=11)
+    assert len(table.happenings) >= 8
+    assert_true(table, watch(table))
+
+
+DISTURBANCES: dict[str, Difficulty] = {
+    "tilt": replace(EASY, tilt=HARD.tilt),
+    "distortion": replace(EASY, distortion=HARD.distortion),
+    "blur": replace(EASY, blur=HARD.blur),
+    "noise": replace(EASY, noise=HARD.noise),
+    "light": replace(EASY, light_change=HARD.light_change, flicker=HARD.flicker, vignette=HARD.vignette),
+    "shadows": replace(EASY, shadows=HARD.shadows),
+    "glare": replace(EASY, glare=HARD.glare),
+    "crooked": replace(EASY, shift=HARD.shift, turn=HARD.turn),
+    "upside down": replace(EASY, upside_down=1.0),
+    "one tag a card": replace(EASY, smudged=0.3),
+}
+
+
+@pytest.mark.parametrize("name", list(DISTURBANCES))
+def test_each_disturbance_alone(name: str) -> None:
+    table = SyntheticTable(ROUND, DISTURBANCES[name], seed=3)
+    assert_true(table, watch(table))
+
+
+def test_big_frames() -> None:
+    table = SyntheticTable(ROUND[:2], MEDIUM, seed=3, size=(1920, 1080))
+    assert_true(table, watch(table))
+
+
+def test_a_camera_that_is_not_calibrated() -> None:
+    table = SyntheticTable(ROUND, MEDIUM, seed=3)
+    assert_true(table, watch(table, Perception()))
+
+
+def test_hands_that_pass_over_are_nothing() -> None:
+    acts: list[Act] = [
+        LayCards(0.6, 0, (Card(0, 65),), (1,)),
+        Hover(2.2, 1, 1, 0.6),
+        Hover(4.0, 2, 3, 0.8, card=Card(0, 40)),
+        Hover(6.0, 3, 1, 0.8, card=Card(0, 41)),
+    ]
+    table = SyntheticTable(acts, MEDIUM, seed=6)
+    assert_true(table, watch(table))
+
+
+def test_a_card_taken_back() -> None:
+    acts: list[Act] = [
+        LayCards(0.6, 0, (Card(0, 50), Card(0, 51)), (1, 2)),
+        LayCards(2.2, 1, (Card(0, 20), Card(0, 21), Card(0, 22)), (1, 2, 3)),
+        TakeBack(4.2, 1, (3,)),
+    ]
+    table = SyntheticTable(acts, EASY, seed=6)
+    assert_true(table, watch(table))
+
+
+def test_a_card_that_cannot_be_read_is_asked_about() -> None:
+    unreadable = replace(EASY, smudged=1.0)
+    table = SyntheticTable([LayCards(0.6, 0, (Card(0, 30),), (4,))], unreadable, seed=7)
+    events = watch(table)
+    doubt = next(event for event in events if isinstance(event, Doubt))
+    assert doubt.place == "4"
+    assert doubt.picture is not None
+    assert doubt.picture.shape == (112, 87, 3)
+    assert happened(events) == [("laid", (4, Card(0, 30)))]
+    assert any(isinstance(event, DoubtResolved) and event.number == doubt.number for event in events)
+
+
+def test_cards_laid_with_an_unreadable_one_wait_for_the_answer() -> None:
+    down: list[Act] = [
+        LayCards(0.6, 0, (Card(0, 30), Card(0, 31)), (1, 2)),
+        LayCards(0.7, 1, (Card(0, 32),), (3,), face_down=True),
+    ]
+    table = SyntheticTable(down, EASY, seed=7)
+    assert happened(watch(table, answer=None)) == []
+    assert happened(watch(table)) == [("laid", (1, Card(0, 30)), (2, Card(0, 31)), (3, Card(0, 32)))]
+    assert happened(watch(table, answer=lambda *_: False)) == [("laid", (1, Card(0, 30)), (2, Card(0, 31)))]
+
+
+def test_a_pass_card_that_cannot_be_read_is_asked_about() -> None:
+    table = SyntheticTable([ShowPass(0.6, 2), WithdrawPass(3.5, 2)], replace(EASY, smudged=1.0), seed=7)
+    events = watch(table)
+    assert [event.place for event in events if isinstance(event, Doubt)] == ["pass 2"]
+    assert happened(events) == [("pass_shown", 2), ("pass_withdrawn", 2)]
+
+
+def test_answers_must_fit() -> None:
+    table = SyntheticTable([LayCards(0.6, 0, (Card(0, 30),), (4,))], replace(EASY, smudged=1.0), seed=7)
+    perception = Perception(table.camera)
+    events = watch(table, perception, answer=None)
+    number = next(event.number for event in events if isinstance(event, Doubt))
+    with pytest.raises(ValueError, match="with a card or False"):
+        perception.answer(number, True)
+    with pytest.raises(ValueError, match="not open"):
+        perception.answer(number + 1, False)
+    card = perception.card_of_face(12)
+    assert card.is_joker
+    assert happened(perception.answer(number, card)) == [("laid", (4, card))]
+    assert perception.on_table == {card: 4}
+
+
+def test_a_moved_camera_is_noticed_and_reading_resumes() -> None:
+    acts: list[Act] = [LayCards(0.6, 0, (Card(0, 65),), (1,)), LayCards(5.0, 1, (Card(0, 30),), (1,)), Clear(7.0, 2)]
+    table = SyntheticTable(acts, EASY, seed=8, bumps=[Bump(2.5, (15.0, -8.0), 1.5)])
+    events = watch(table)
+    assert [event.state for event in events if isinstance(event, FieldChanged)] == [FieldState.FOUND, FieldState.MOVED]
+    assert_true(table, events)
+
+
+def test_a_field_out_of_sight_is_reported() -> None:
+    table = SyntheticTable([LayCards(0.6, 0, (Card(0, 65),), (1,))], EASY, seed=8, tail=1.0)
+    frames = [frame for frame, _ in table.frames()]
+
+    def covered() -> Iterator[Frame]:
+        dark = np.zeros_like(frames[0].image)
+        for index, image in enumerate([frame.image for frame in frames] + [dark] * 60 + [frames[-1].image] * 30):
+            yield Frame(index, index / 15.0, image)
+
+    events = list(Perception(table.camera).watch(covered()))
+    states = [event.state for event in events if isinstance(event, FieldChanged)]
+    assert states == [FieldState.FOUND, FieldState.LOST, FieldState.FOUND]
+    assert happened(events) == [("laid", (1, Card(0, 65)))]
+
+
+def test_cards_of_another_deck_are_ignored() -> None:
+    acts: list[Act] = [LayCards(0.6, 0, (Card(1, 30),), (4,)), LayCards(0.8, 1, (Card(0, 40),), (1,))]
+    table = SyntheticTable(acts, EASY, seed=9)
+    events = watch(table, Perception(table.camera, deck=0), answer=lambda *_: False)
+    assert happened(events) == [("laid", (1, Card(0, 40)))]
+
+
+def test_a_recording_gives_the_same_events_again(tmp_path: Path) -> None:
+    acts = [*ROUND, LayCards(7.2, 0, (Card(0, 40),), (5,), face_down=True)]
+    table = SyntheticTable(acts, MEDIUM, seed=12)
+    with Recorder(tmp_path, frames=True) as recorder:
+        events = watch(table, Perception(table.camera, recorder=recorder))
+    assert any(isinstance(event, Doubt) for event in events)
+    assert list(replay(tmp_path)) == events
+    lines = (tmp_path / "events.jsonl").read_text().splitlines()
+    assert len(lines) == len(events)
+    again = list(Perception(table.camera).watch(open_source(str(tmp_path / "frames"))))
+    before_doubt = happened(events[: next(i for i, event in enumerate(events) if isinstance(event, Doubt))])
+    assert happened(again) == before_doubt
+    with pytest.raises(FileExistsError):
+        Recorder(tmp_path)
+
+
+def test_a_damaged_recording_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "sightings.jsonl").write_text('{"recording":1,"deck":null}\n{"frame":0}\n')
+    with pytest.raises(ValueError, match="line 2"):
+        list(replay(tmp_path))
+    (tmp_path / "sightings.jsonl").write_text('{"recording":99,"deck":null}\n')
+    with pytest.raises(ValueError, match="version 99"):
+        list(replay(tmp_path))
+
+
+def test_events_survive_json() -> None:
+    from chefshat_robot.vision import from_json
+
+    events: list[Observed] = [
+        Laid(1, 0.1, (Card(0, 3), Card(0, 4)), (1, 2)),
+        TakenBack(2, 0.2, (Card(0, 3),), (1,)),
+        Cleared(3, 0.3),
+        PassShown(4, 0.4, 2),
+        PassWithdrawn(5, 0.5, 2),
+        Doubt(6, 0.6, 1, "4", 0.5, (Card(0, 5),), np.zeros((2, 2, 3), np.uint8)),
+        DoubtResolved(7, 0.7, 1),
+        FieldChanged(8, 0.8, FieldState.MOVED),
+    ]
+    assert [from_json(to_json(event)) for event in events] == events
+    with pytest.raises(ValueError, match="not an event"):
+        from_json({"event": "dance"})
+
+
+def test_sources_that_cannot_be_used(tmp_path: Path) -> None:
+    from chefshat_robot.vision import SourceError
+
+    with pytest.raises(SourceError, match="no pictures"):
+        open_source(str(tmp_path))
+    with pytest.raises(SourceError, match="no file or folder"):
+        open_source(str(tmp_path / "missing.mp4"))
+    (tmp_path / "notes.mp4").write_text("hello")
+    with pytest.raises(SourceError, match="not a video"):
+        open_source(str(tmp_path / "notes.mp4"))
+
+
+def test_a_video_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "video.mp4"
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 10.0, (64, 48))
+    for grey in (0, 100, 200):
+        video.write(np.full((48, 64, 3), grey, np.uint8))
+    video.release()
+    frames = list(open_source(str(path)))
+    assert [frame.index for frame in frames] == [0, 1, 2]
+    assert [round(frame.time, 3) for frame in frames] == [0.0, 0.1, 0.2]
+    assert abs(int(frames[2].image.mean()) - 200) < 8
