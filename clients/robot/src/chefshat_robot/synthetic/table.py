@@ -439,7 +439,7 @@ class SyntheticTable:
         lying: list[Lying] = []
         still, sharp = self._still(maps, lying, blur)
         for index in itertools.count():
-            if index >= int(self.duration * self.fps):
+            if index + 1 > self.duration * self.fps:
                 return
             time = index / self.fps
             changed = False
