@@ -361,7 +361,7 @@ class Decider:
         return last if isinstance(last, _Play) and not last.closed else None
 
     def _close_play(self, events: list[Observed]) -> None:
-        """Ends the play that is open, as the next one begins: asks about cards of it that were covered before they could be read."""
+        """Ends the play that is open, as the next one begins: asks about its cards that were covered before they were read."""
         play = self._open_play()
         for number in CARD_SPOTS:
             spot = self._spots[number]
