@@ -8,7 +8,7 @@ use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::journal::{Change, Decided, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
-use crate::physical::{RoomGame, micros};
+use crate::table::{RoomGame, micros};
 
 impl Core {
     pub(super) fn fold(&mut self, at: Duration, change: &Change) {

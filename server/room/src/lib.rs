@@ -17,6 +17,7 @@ pub mod log;
 mod physical;
 pub mod policy;
 mod revive;
+mod table;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 #[cfg(test)]
@@ -40,15 +41,15 @@ pub use limits::{
     MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_REPORTS,
     MAX_SEATINGS, RECALL_TIME,
 };
-pub use physical::{Made, PhysicalTable};
 pub use revive::BadJournal;
+pub use table::{Made, PhysicalTable};
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
 
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
 use crate::log::Log;
-use crate::physical::RoomGame;
+use crate::table::RoomGame;
 
 /// The state of a room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

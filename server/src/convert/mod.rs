@@ -13,6 +13,7 @@ mod record;
 mod room;
 mod standings;
 mod start;
+mod summary;
 mod table;
 mod tournament;
 mod vector;
@@ -24,13 +25,14 @@ pub use name::checked_name;
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto, simulation_policy};
 pub use ratings::{leaderboard, rating_to_proto};
-pub use record::{lines_of, record_lines, summary};
+pub use record::{lines_of, record_lines};
 pub use room::{
     describe, display_names_from_proto, fills_from_proto, participants, seats_to_proto,
     tournament_id,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
+pub use summary::summary;
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,

@@ -15,10 +15,10 @@ use tracing::error;
 use super::decision::source_to_proto;
 use super::event::event_to_proto;
 use super::policy::millis;
-use super::record::{elapsed_ms, record_header};
+use super::summary::{elapsed_ms, record_header};
+use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, Fill, GameHeader};
 use chefshat_room::log::RoomEvent;
-use chefshat_room::{Core, PhysicalTable};
 
 /// Where an entry of the record stands: after the changes before, and among what follows from the
 /// same change.
@@ -33,13 +33,6 @@ enum Phase {
     Decided,
     /// Other events.
     After,
-}
-
-/// Number of decisions of a game, as its record has them.
-pub(super) fn decisions_at_table(table: &PhysicalTable) -> u64 {
-    let shifts = table.referee().story();
-    let decisions: usize = shifts.iter().map(|shift| shift.decisions.len()).sum();
-    u64::try_from(decisions).unwrap_or(u64::MAX)
 }
 
 /// All lines of the record of a physical room.

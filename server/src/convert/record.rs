@@ -5,18 +5,14 @@ use std::sync::Arc;
 
 use chefshat_engine::Viewer;
 use chefshat_proto::v1::{self, record_line::Line};
-use chefshat_record::convert::{action_space, invalid_reward, rules_to_proto, seat_number};
-use chefshat_record::jsonl::FORMAT_VERSION;
+use chefshat_record::convert::{invalid_reward, seat_number};
 use prost::Message as _;
 
 use super::decision::{mask_bytes, source_to_proto};
-use super::event::{event_to_proto, standings};
-use super::physical_record::{decisions_at_table, physical_record_lines};
-use super::policy::policy_of;
-use super::room::{
-    aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
-};
-use super::start::{origin, start_to_proto};
+use super::event::event_to_proto;
+use super::physical_record::physical_record_lines;
+use super::room::state_to_proto;
+use super::summary::{elapsed_ms, record_header};
 use crate::store::StoredGame;
 use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
@@ -70,57 +66,6 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         .collect()
 }
 
-pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
-    let header = core.header();
-    v1::RecordHeader {
-        format_version: FORMAT_VERSION,
-        game_id: header.game_id.to_string(),
-        room_id: header.room_id.to_string(),
-        room_name: header.name.clone(),
-        origin: origin(header).into(),
-        rules: Some(rules_to_proto(&header.rules)),
-        rules_version: header.rules_version,
-        policy: Some(policy_of(core)),
-        seats: participants(core),
-        seed_commitment: seed_commitment(header),
-        created_at_ms: header.created_at_ms,
-        server_version: env!("CARGO_PKG_VERSION").into(),
-        action_space: Some(action_space(&header.rules.actions())),
-        start: start_to_proto(&header.start, header.rules.faces()),
-        tournament_id: tournament_id(header),
-        series_id: series_id(header),
-    }
-}
-
-/// The summary of a record. The game ended with the last event.
-pub fn summary(core: &Core) -> v1::RecordSummary {
-    let header = core.header();
-    let last = core.log().len().checked_sub(1);
-    let ended_at_ms =
-        (last.and_then(|last| core.log().get(last))).map_or(0, |entry| u64::from(entry.at_ms));
-    v1::RecordSummary {
-        game_id: header.game_id.to_string(),
-        room_id: header.room_id.to_string(),
-        room_name: header.name.clone(),
-        state: state_to_proto(core.state()).into(),
-        origin: origin(header).into(),
-        created_at_ms: header.created_at_ms,
-        ended_at_ms: header.created_at_ms.saturating_add(ended_at_ms),
-        rules: Some(rules_to_proto(&header.rules)),
-        seats: participants(core),
-        standings: standings(core),
-        shifts: core.game().map_or(0, |game| game.shift()),
-        decisions: match core.table() {
-            Some(table) => decisions_at_table(table),
-            None => core.decisions(),
-        },
-        added: false,
-        abort_reason: aborted_because(core.state()).into(),
-        tournament_id: tournament_id(header),
-        substituted: core.was_substituted(),
-    }
-}
-
 /// All lines of the record of a stored game.
 pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match stored {
@@ -157,8 +102,4 @@ fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> 
             .and_then(|open| invalid_reward(scheme, open.decision.kind, attempts.len())),
         elapsed_ms: elapsed_ms(entry),
     }
-}
-
-pub(super) fn elapsed_ms(entry: &Entry) -> u64 {
-    u64::try_from(entry.at.as_millis()).unwrap_or(u64::MAX)
 }

@@ -17,8 +17,8 @@ use crate::journal::{
     Reported, SeatedParticipant,
 };
 use crate::log::RoomEvent;
-use crate::physical::RoomGame;
 use crate::policy::Policy;
+use crate::table::RoomGame;
 use crate::{Answer, Answered, ConnectionId, Core, JoinError, ReportOutcome, Verdict};
 
 pub const OPEN: Fill = Fill::Open { reserved_for: None };
