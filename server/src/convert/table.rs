@@ -309,10 +309,7 @@ fn kind_of_report(report: &Report, deck: Deck) -> Kind {
             }))
         }
         Report::Question(question) => Kind::Question(question_to_proto(question, Vec::new())),
-        Report::Answer { id, option } => Kind::Answer(v1::QuestionAnswered {
-            question_id: id.clone(),
-            option: option.map(|option| u32::try_from(option).unwrap_or(u32::MAX)),
-        }),
+        Report::Answer { id, option } => Kind::Answer(answer_to_proto(id, *option)),
         Report::Pause(paused) => Kind::Pause(v1::TablePause { paused: *paused }),
     }
 }
@@ -346,6 +343,13 @@ fn question_to_proto(question: &Question, picture: Vec<u8>) -> v1::TableQuestion
         options: question.options.clone(),
         seat: question.seat.map(seat_number),
         picture,
+    }
+}
+
+fn answer_to_proto(question: &str, option: Option<usize>) -> v1::QuestionAnswered {
+    v1::QuestionAnswered {
+        question_id: question.to_owned(),
+        option: option.map(|option| u32::try_from(option).unwrap_or(u32::MAX)),
     }
 }
 
@@ -444,6 +448,9 @@ fn put_table(
     let to_lay = referee.to_lay().iter();
     state.to_lay = to_lay
         .map(|it| to_lay_to_proto(it, referee.describe_to_lay(it), deck))
+        .collect();
+    state.answers = (referee.answers())
+        .map(|answer| answer_to_proto(&answer.question, answer.option))
         .collect();
     let questions = referee.questions().iter();
     state.questions = questions

@@ -1,6 +1,6 @@
 //! Corrections: an earlier report was wrong. What came after it is replayed.
 
-use chefshat_engine::{Seat, Viewer};
+use chefshat_engine::{Action, Seat, Viewer};
 
 use super::turns::{seat_of, with_seat};
 use super::{Judged, Referee};
@@ -10,9 +10,17 @@ use crate::{Corrected, Report, Ruling, Verdict, ViolatedRule};
 impl Referee {
     /// Takes a pass back.
     pub(super) fn withdraw_pass(&mut self, seat: Seat, ruling: &mut Ruling) -> Judged {
-        let passed = |entry: &&Entry| matches!(entry.act, Act::Turn(of, chefshat_engine::Action::Pass) if of == seat);
-        let last = self.shift().entries.iter().rfind(passed);
-        match last.map(|entry| (entry.number, entry.report.is_some())) {
+        let passed =
+            |entry: &&Entry| matches!(entry.act, Act::Turn(of, Action::Pass) if of == seat);
+        let shift = self.shift();
+        let last = shift.entries.iter().rfind(passed);
+        // When a pizza is over, all take their pass cards back.
+        let still_passed = self.game().observe(Viewer::Spectator).passed[seat]
+            || shift.turns().next_back() == Some((seat, Action::Pass));
+        match last
+            .filter(|_| still_passed)
+            .map(|entry| (entry.number, entry.report.is_some()))
+        {
             Some((_, false)) => Err((
                 Some(seat),
                 (

@@ -7,6 +7,8 @@ mod corrections;
 mod state;
 mod turns;
 
+use std::collections::VecDeque;
+
 use chefshat_engine::{
     Action, ActionId, BySeat, Event, Game, Observation, Opening, RuleSet, Seat, Viewer,
 };
@@ -22,6 +24,8 @@ use crate::{
 
 /// The most open questions of bridges.
 pub const MAX_QUESTIONS: usize = 16;
+/// The most answers that are kept for the bridge that asked.
+const MAX_ANSWERS: usize = 16;
 /// The most reports that wait for an answer.
 pub const MAX_HELD: usize = 32;
 
@@ -44,9 +48,20 @@ pub struct Referee {
     held: Vec<(u64, Report)>,
     /// Open questions, those of bridges and of the referee.
     questions: Vec<Question>,
+    /// The last answers.
+    answers: VecDeque<Answer>,
     violation: Option<(u64, Violation)>,
     to_lay: Vec<ToLay>,
     paused: bool,
+}
+
+/// The answer to a question.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// The question.
+    pub question: String,
+    /// Index of the right option; `None`: the question was withdrawn.
+    pub option: Option<usize>,
 }
 
 /// A question of the referee.
@@ -107,6 +122,7 @@ impl Referee {
             asked: None,
             held: Vec::new(),
             questions: Vec::new(),
+            answers: VecDeque::new(),
             violation: None,
             to_lay: Vec::new(),
             paused: false,
@@ -344,6 +360,11 @@ impl Referee {
     /// Open questions of bridges and of the referee, oldest first.
     pub fn questions(&self) -> &[Question] {
         &self.questions
+    }
+
+    /// The last answers to questions, oldest first.
+    pub fn answers(&self) -> impl Iterator<Item = &Answer> {
+        self.answers.iter()
     }
 
     /// Decisions of remote seats that nobody has carried out yet, oldest first.

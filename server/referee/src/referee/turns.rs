@@ -5,7 +5,7 @@ use chefshat_engine::{
 };
 
 use super::before::counts_of_action;
-use super::{Asked, Doubt, Judged, MAX_HELD, Referee};
+use super::{Answer, Asked, Doubt, Judged, MAX_ANSWERS, MAX_HELD, Referee};
 use crate::judge::{as_play, check_play};
 use crate::shift::{Act, Entry, Shift, play};
 use crate::words::turn_text;
@@ -306,10 +306,16 @@ impl Referee {
 
     fn clear(&mut self, number: u64, report: &Report) -> Judged {
         let now = self.game().observe(Viewer::Spectator);
-        if now.board.size == 0 || !self.shift().has_turns() {
+        let pizza = now.pizza;
+        // A remote seat may decide on the next pizza before the cards of the last one are cleared.
+        let on_table = |entry: &Entry| match entry.act {
+            Act::Turn(_, Action::Pass) => false,
+            Act::Turn(seat, _) => entry.pizza == pizza && (entry.confirmed || !self.remote[seat]),
+            _ => false,
+        };
+        if now.board.size == 0 || !self.shift().entries.iter().any(on_table) {
             return Ok(Verdict::Known);
         }
-        let pizza = now.pizza;
         let is_done = |game: &Game| game.observe(Viewer::Spectator).pizza != pizza;
         let to_act = self.to_act();
         let (missed, _) = self.passes_before(is_done).ok_or_else(|| {
@@ -473,6 +479,13 @@ impl Referee {
         }
         let asked = self.asked.clone().filter(|asked| asked.id == id);
         self.close_question(id);
+        if self.answers.len() == MAX_ANSWERS {
+            self.answers.pop_front();
+        }
+        self.answers.push_back(Answer {
+            question: id.to_owned(),
+            option,
+        });
         let Some(asked) = asked else {
             return Ok(Verdict::Accepted);
         };

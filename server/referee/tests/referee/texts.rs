@@ -35,10 +35,22 @@ fn pass(seat: usize) -> Report {
 
 impl Evening {
     fn new() -> Self {
+        Self::with_remote(BySeat::filled(4, false))
+    }
+
+    fn with_remote(remote: BySeat<bool>) -> Self {
         let names = ["Ada", "Bo", "Cy", "Di"].map(str::to_owned).to_vec();
-        let mut referee = Referee::new(rules(4, 11, 3), BySeat::filled(4, false), names);
+        let mut referee = Referee::new(rules(4, 11, 3), remote, names);
         referee.start();
         Self { referee, number: 0 }
+    }
+
+    /// Lets a remote seat decide.
+    fn decide(&mut self, seat: usize, action: &str) {
+        self.number += 1;
+        let action = rules(4, 11, 3).actions().parse(action).unwrap();
+        let ruling = (self.referee).decide(self.number, Seat::new(seat), action);
+        assert!(!ruling.events.is_empty());
     }
 
     /// What the referee says to a report: "accepted", "known", the violation, or its question.
@@ -147,6 +159,32 @@ fn a_missed_pass_is_asked_for() {
         (Report::PassWithdrawn { seat: Seat::new(0) }, "known"),
     ]);
     assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
+}
+
+#[test]
+fn a_remote_seat_decides_before_the_board_is_cleared() {
+    let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(3)));
+    let hand = cards(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10], None);
+    evening.check(&[
+        (
+            Report::Hand {
+                seat: Seat::new(3),
+                cards: hand,
+            },
+            "accepted",
+        ),
+        (laid(0, &[11]), "accepted"),
+        (pass(1), "accepted"),
+        (pass(2), "accepted"),
+    ]);
+    evening.decide(3, "C10;Q1;J0");
+    evening.check(&[(laid(3, &[10]), "accepted"), (pass(0), "accepted")]);
+    evening.decide(3, "C7;Q2;J0");
+    evening.check(&[
+        (Report::Cleared, "known"),
+        (laid(3, &[7, 7]), "accepted"),
+        (Report::Cleared, "Did Ada, Bo and Cy pass?"),
+    ]);
 }
 
 #[test]

@@ -739,6 +739,7 @@ class TableState(_message.Message):
     REPORTS_FIELD_NUMBER: _builtins.int
     VIOLATION_FIELD_NUMBER: _builtins.int
     PLAY_REQUIREMENT_FIELD_NUMBER: _builtins.int
+    ANSWERS_FIELD_NUMBER: _builtins.int
     version: _builtins.int
     """Later states have higher versions, also after a restart of the server."""
     stage: Global___TableStage.ValueType
@@ -783,6 +784,10 @@ class TableState(_message.Message):
     def play_requirement(self) -> _decision_pb2.PlayRequirement:
         """What a play must be, if a turn is awaited."""
 
+    @_builtins.property
+    def answers(self) -> _containers.RepeatedCompositeFieldContainer[Global___QuestionAnswered]:
+        """The last answers, at most 16, oldest first, for the bridge that asked."""
+
     def __init__(
         self,
         *,
@@ -799,10 +804,11 @@ class TableState(_message.Message):
         reports: _abc.Iterable[Global___AcceptedReport] | None = ...,
         violation: _table_pb2.Violation | None = ...,
         play_requirement: _decision_pb2.PlayRequirement | None = ...,
+        answers: _abc.Iterable[Global___QuestionAnswered] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "observation", b"observation", "play_requirement", b"play_requirement", "room", b"room", "seat", b"seat", "violation", b"violation"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "observation", b"observation", "paused", b"paused", "play_requirement", b"play_requirement", "questions", b"questions", "reports", b"reports", "room", b"room", "seat", b"seat", "seats", b"seats", "stage", b"stage", "to_lay", b"to_lay", "version", b"version", "violation", b"violation", "waiting_for", b"waiting_for"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "answers", b"answers", "observation", b"observation", "paused", b"paused", "play_requirement", b"play_requirement", "questions", b"questions", "reports", b"reports", "room", b"room", "seat", b"seat", "seats", b"seats", "stage", b"stage", "to_lay", b"to_lay", "version", b"version", "violation", b"violation", "waiting_for", b"waiting_for"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
     _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015
