@@ -24,7 +24,8 @@ use super::start::{StartArgs, players_of};
                   chefshat room create --preset rulebook --target-shifts 10 --decision-time-ms 60000\n  \
                   chefshat room create --code-file ./join-code\n  \
                   chefshat room create --branch GAME-ID@40 --seat replay:GAME-ID:0 --seat greedy\n  \
-                  chefshat room create --hands ./hands.json --durability ephemeral"
+                  chefshat room create --hands ./hands.json --durability ephemeral\n  \
+                  chefshat room create --physical --seat table=Ada --seat table=Bo --seat greedy --seat open"
 )]
 pub(super) struct Create {
     /// Display name.
@@ -34,10 +35,15 @@ pub(super) struct Create {
     server: ServerArg,
     /// How to fill the next seat: random, random_unmasked, greedy or trained (played by the
     /// server), replay:GAME-ID:SEAT (imitates the player who had that seat in a recorded game),
-    /// each optionally with =NAME for another name; or open, agent, human or robot (who may join).
+    /// each optionally with =NAME for another name; open, agent, human or robot (who may join); or,
+    /// with --physical, table=NAME or table_robot=NAME (a person or a robot at the table).
     /// Repeatable; seats not listed are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
     seats: Vec<v1::SeatConfig>,
+    /// Play with real cards: the server deals nothing, and what happens at the table is reported, by
+    /// a camera, on the page, or with `chefshat table`.
+    #[arg(long, conflicts_with_all = ["game_seed", "branch", "hands"])]
+    physical: bool,
     /// Game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
     #[arg(long, value_name = "HEX", value_parser = game_seed)]
     game_seed: Option<[u8; 32]>,
@@ -85,16 +91,33 @@ impl Create {
             .ok_or("the server did not return the created room")?;
         let written = code_file.map_or(Ok(()), |file| file.write(&created.join_code));
         let (code, owner) = (created.join_code, created.owner_token);
+        let table = self.physical.then(|| Table {
+            link: attendant_link(self.server.url(), &room, &created.table_ticket),
+            ticket: created.table_ticket,
+        });
         if self.json {
-            let line = serde_json::json!({
+            let mut line = serde_json::json!({
                 "event": "created", "room": room, "join_code": code, "owner_token": owner,
             });
+            if let Some(table) = table {
+                line["table_ticket"] = table.ticket.into();
+                line["attendant_link"] = table.link.into();
+            }
             say(format_args!("{line}"))?;
         } else {
             say(format_args!("room         {}", room.room_id))?;
             say(format_args!("game         {}", room.game_id))?;
             say(format_args!("join code    {code}"))?;
             say(format_args!("owner token  {owner}"))?;
+            if let Some(table) = table {
+                say(format_args!("table ticket {}", table.ticket))?;
+                say(format_args!("attendant    {}", table.link))?;
+                let server = self.server.url();
+                say(format_args!(
+                    "or report what happens at the table here: chefshat table --server {server} --ticket {}",
+                    table.ticket
+                ))?;
+            }
             if let Some(words) = next_step(&room, self.server.url(), &code) {
                 say(words)?;
             }
@@ -129,6 +152,10 @@ impl Create {
                 format!("--seat: {described} seats are described, but {players} play").into(),
             );
         }
+        let at_table = |seat: &v1::SeatConfig| matches!(seat.filled_by, Some(FilledBy::AtTable(_)));
+        if !self.physical && self.seats.iter().any(at_table) {
+            return Err("--seat table: only a room with --physical has seats at a table".into());
+        }
         let open = v1::SeatConfig {
             filled_by: Some(FilledBy::ReservedFor(0)),
             ..v1::SeatConfig::default()
@@ -144,9 +171,22 @@ impl Create {
             }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             start,
+            physical: self.physical,
             ..v1::CreateRoomRequest::default()
         })
     }
+}
+
+/// What the attendant of a physical table needs.
+struct Table {
+    ticket: String,
+    link: String,
+}
+
+/// The address of the attendant's view. Browsers send what follows the # to no server.
+fn attendant_link(server: &str, room: &v1::Room, ticket: &str) -> String {
+    let server = server.trim_end_matches('/');
+    format!("{server}/rooms/{}/table#ticket={ticket}", room.room_id)
 }
 
 fn seat(word: &str) -> Result<v1::SeatConfig, String> {
@@ -157,8 +197,11 @@ fn seat(word: &str) -> Result<v1::SeatConfig, String> {
     };
     if !name.is_empty() && matches!(filled_by, FilledBy::ReservedFor(_)) {
         return Err(
-            "only a built-in agent can be named; participants bring their own names".into(),
+            "only a built-in agent or a player at the table can be named; participants bring their own names".into(),
         );
+    }
+    if name.is_empty() && matches!(filled_by, FilledBy::AtTable(_)) {
+        return Err(format!("name the player at the table: {word}=NAME"));
     }
     Ok(v1::SeatConfig {
         filled_by: Some(filled_by),
@@ -169,6 +212,14 @@ fn seat(word: &str) -> Result<v1::SeatConfig, String> {
 fn filled_by(word: &str) -> Result<FilledBy, String> {
     if let Some(player) = word.strip_prefix("replay:") {
         return recorded_player(player).map(FilledBy::Replay);
+    }
+    let at_table = match word {
+        "table" => Some(v1::ParticipantKind::Human),
+        "table_robot" => Some(v1::ParticipantKind::Robot),
+        _ => None,
+    };
+    if let Some(kind) = at_table {
+        return Ok(FilledBy::AtTable(kind.into()));
     }
     let reserved = match word {
         "open" => Some(v1::ParticipantKind::Unspecified),
@@ -307,6 +358,38 @@ mod tests {
         assert_eq!(names, ["Greta", "", "", ""]);
         let greedy = FilledBy::BuiltInAgent("greedy".into());
         assert_eq!(request.seats[0].filled_by, Some(greedy));
+    }
+
+    #[test]
+    fn a_player_at_the_table_has_a_name() {
+        let request =
+            request("--physical --seat table=Ada --seat table_robot=Pepper").expect("a room");
+        assert!(request.physical);
+        let names: Vec<&str> = request.seats.iter().map(|seat| &*seat.name).collect();
+        assert_eq!(names, ["Ada", "Pepper", "", ""]);
+        let kinds = [v1::ParticipantKind::Human, v1::ParticipantKind::Robot];
+        for (seat, kind) in request.seats.iter().zip(kinds) {
+            assert_eq!(seat.filled_by, Some(FilledBy::AtTable(kind.into())));
+        }
+        assert!(seat("table").is_err());
+    }
+
+    #[test]
+    fn only_a_physical_room_has_seats_at_a_table() {
+        let error = request("--seat table=Ada").expect_err("the cards are not real");
+        assert!(error.to_string().contains("--physical"), "{error}");
+    }
+
+    #[test]
+    fn the_attendants_link_opens_the_page() {
+        let room = v1::Room {
+            room_id: "5f".into(),
+            ..v1::Room::default()
+        };
+        assert_eq!(
+            attendant_link("http://[::1]:7/", &room, "ab"),
+            "http://[::1]:7/rooms/5f/table#ticket=ab"
+        );
     }
 
     #[test]

@@ -105,6 +105,7 @@ fn in_a_line(room: &v1::Room) -> String {
     let beginning = match room.origin() {
         v1::GameOrigin::Branched => "  (branched)",
         v1::GameOrigin::Scripted => "  (given hands)",
+        v1::GameOrigin::Physical => "  (real cards)",
         _ => "",
     };
     let line = format!(
@@ -127,7 +128,9 @@ fn in_full(room: &v1::Room) -> String {
     if let Some(words) = beginning(room) {
         out.push_str(&format!("start {words}\n"));
     }
-    if room.seed_fixed {
+    if room.origin() == v1::GameOrigin::Physical {
+        out.push_str("deal  at a table\n");
+    } else if room.seed_fixed {
         out.push_str("deal  from a seed its creator fixed\n");
     } else {
         out.push_str(&format!(
@@ -158,8 +161,11 @@ pub(super) fn beginning(room: &v1::Room) -> Option<String> {
             "as game {game} until after decision {decisions}, {deals}"
         ));
     }
-    let scripted = room.origin() == v1::GameOrigin::Scripted;
-    scripted.then(|| "with hands its creator gave".to_owned())
+    match room.origin() {
+        v1::GameOrigin::Scripted => Some("with hands its creator gave".to_owned()),
+        v1::GameOrigin::Physical => Some("with real cards".to_owned()),
+        _ => None,
+    }
 }
 
 fn seat_in_words(seat: &v1::Participant) -> String {
@@ -179,6 +185,9 @@ fn seat_in_words(seat: &v1::Participant) -> String {
             true => format!("{name}, played by the server"),
             false => format!("{name}, played by the server as {}", seat.built_in_agent),
         };
+    }
+    if seat.at_table {
+        return format!("{name}, {}, at the table", kind_name(seat.kind()));
     }
     let there = match (seat.substituted, seat.connected) {
         (true, _) => "substituted",
@@ -243,5 +252,28 @@ mod tests {
         let words = beginning(&scripted);
         assert_eq!(words.as_deref(), Some("with hands its creator gave"));
         assert_eq!(beginning(&v1::Room::default()), None);
+    }
+
+    #[test]
+    fn a_physical_room_has_no_deal_of_the_server() {
+        let room = v1::Room {
+            room_id: "a".into(),
+            game_id: "b".into(),
+            state: v1::RoomState::Playing.into(),
+            origin: v1::GameOrigin::Physical.into(),
+            seats: vec![v1::Participant {
+                name: "Ada".into(),
+                kind: v1::ParticipantKind::Human.into(),
+                at_table: true,
+                ..v1::Participant::default()
+            }],
+            ..v1::Room::default()
+        };
+        assert_eq!(
+            in_full(&room),
+            "room  a\ngame  b\nstate playing\nstart with real cards\ndeal  at a table\n\
+             seat 0 Ada, human, at the table\n"
+        );
+        assert_eq!(in_a_line(&room), "a  playing   1/1 seats    (real cards)");
     }
 }
