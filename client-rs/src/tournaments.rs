@@ -87,6 +87,40 @@ impl Client {
         .await
     }
 
+    /// Adds a participant who plays at a physical table with real cards, and for whom nobody
+    /// connects. Returns the tournament and the participant's number.
+    ///
+    /// # Errors
+    /// `OWNER_TOKEN_WRONG`, `NO_PHYSICAL_TABLES`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_REFUSED`,
+    /// `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `TOURNAMENT_UNKNOWN`.
+    pub async fn add_table_participant(
+        &self,
+        request: v1::AddTableParticipantRequest,
+    ) -> Result<v1::AddTableParticipantResponse, Error> {
+        let response = service(self).add_table_participant(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// The secrets of the physical table at which a game is being played.
+    ///
+    /// # Errors
+    /// `OWNER_TOKEN_WRONG`, `GAME_NOT_PHYSICAL`, `GAME_NOT_STARTED`, `GAME_OVER`, `GAME_UNKNOWN`,
+    /// `TOURNAMENT_UNKNOWN`.
+    pub async fn physical_table(
+        &self,
+        tournament_id: impl Into<String>,
+        owner_token: impl Into<String>,
+        game: u32,
+    ) -> Result<v1::GetPhysicalTableResponse, Error> {
+        let request = v1::GetPhysicalTableRequest {
+            tournament_id: tournament_id.into(),
+            owner_token: owner_token.into(),
+            game,
+        };
+        let response = service(self).get_physical_table(request).await?;
+        Ok(response.into_inner())
+    }
+
     /// Starts a tournament.
     ///
     /// # Errors

@@ -114,6 +114,15 @@ impl Token {
         }
     }
 
+    /// The owner token of a tournament's room, the same whenever it is computed. Only the server and
+    /// the tournament's owner know `key`, the hash of the tournament's owner token.
+    pub fn of_tournament_room(room: Id, key: &SecretHash) -> Self {
+        Self {
+            room,
+            secret: digest(b"chefshat.v1 tournament room", &[key.bytes(), &room.0]),
+        }
+    }
+
     /// The ticket of the physical table of a room, which follows from the owner token.
     pub fn of_table(owner: &Self) -> Self {
         Self {
@@ -244,6 +253,9 @@ mod tests {
             ticket,
             Token::of_request(room, &SecretHash::of(b"other"), &[1; 32])
         );
+        let hosted = Token::of_tournament_room(room, &key);
+        assert_eq!(hosted, Token::of_tournament_room(room, &key));
+        assert_ne!(hosted, Token::of_tournament_room(Id::random(), &key));
         let request = RequestKey::new([1; 32], b"content");
         let table = Token::of_table(&request.owner());
         assert_eq!(table, Token::of_table(&request.owner()));

@@ -4,6 +4,7 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_referee::Referee;
 use chefshat_tournament::{
     Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
 };
@@ -66,6 +67,15 @@ pub fn tournament_plan(
         );
         return Err(FieldProblem::new("built_in_agents", problem));
     }
+    let physical_tables = count(message.physical_tables);
+    let deal_seed = seed("deal_seed", &message.deal_seed)?;
+    if physical_tables > 0 {
+        Referee::check_rules(&rules).map_err(|problem| FieldProblem::new("rules", problem))?;
+        if deal_seed.is_some() {
+            let problem = "leave it unset: at a physical table the server deals nothing";
+            return Err(FieldProblem::new("deal_seed", problem));
+        }
+    }
     Ok(TournamentPlan {
         core: Settings {
             format: format_from_proto(message.format)?,
@@ -80,6 +90,7 @@ pub fn tournament_plan(
             no_show_ms: no_show_ms.into(),
             max_calls: standard(message.max_calls, DEFAULT_CALLS),
             max_parallel: count(standard(message.max_parallel_games, DEFAULT_PARALLEL)),
+            physical_tables,
             draw_seed: seed("draw_seed", &message.draw_seed)?.unwrap_or(draw_seed),
             filler: agent("filler", &message.filler)?.unwrap_or(AgentKind::Random),
         },
@@ -92,7 +103,7 @@ pub fn tournament_plan(
             .collect::<Result<_, _>>()?,
         rules,
         built_in,
-        deal_seed: seed("deal_seed", &message.deal_seed)?,
+        deal_seed,
     })
 }
 
@@ -203,6 +214,7 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
         draw_seed: core.draw_seed.to_vec(),
         filler: core.filler.name().to_owned(),
         deal_seed: (plan.deal_seed).map_or_else(Vec::new, |seed| seed.to_vec()),
+        physical_tables: number(core.physical_tables),
     }
 }
 
@@ -248,6 +260,7 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
             stateless: entrant.stateless,
             max_games: number(entrant.max_games),
             connected: tournament.is_present(index),
+            at_table: entrant.at_table,
         })
         .collect()
 }
@@ -305,6 +318,7 @@ pub fn tournament_game(
         series_id: series.map_or_else(String::new, |series| series.to_string()),
         rated: is_rated(game, plan),
         shifts: result.map_or(0, |result| result.shifts),
+        physical: game.physical,
     }
 }
 

@@ -23,9 +23,10 @@ use super::status::{
 use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
 use crate::convert;
 use crate::tournaments::{
-    CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TournamentHandle, Tournaments,
+    CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
+    Tournaments,
 };
-use chefshat_room::ids::{Id, RequestKey, random_bytes};
+use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use chefshat_room::journal::ParticipantKind;
 
 /// Default page size of games, and default number of rows of a leaderboard.
@@ -211,6 +212,44 @@ impl TournamentService for TournamentCalls {
         }))
     }
 
+    async fn add_table_participant(
+        &self,
+        request: Request<v1::AddTableParticipantRequest>,
+    ) -> Result<Response<v1::AddTableParticipantResponse>, Status> {
+        let request = request.into_inner();
+        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Human);
+        let name = convert::checked_name("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let added = handle.add_at_table(name, kind).await.map_err(stopped)?;
+        let participant = added.map_err(join_problem)?;
+        Ok(Response::new(v1::AddTableParticipantResponse {
+            tournament: Some(handle.describe()),
+            participant: convert::number(participant),
+        }))
+    }
+
+    async fn get_physical_table(
+        &self,
+        request: Request<v1::GetPhysicalTableRequest>,
+    ) -> Result<Response<v1::GetPhysicalTableResponse>, Status> {
+        let request = request.into_inner();
+        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let game = usize::try_from(request.game).unwrap_or(usize::MAX);
+        let owner = handle.physical_room(game).map_err(table_problem)?;
+        // It is created after its id is committed.
+        if self.recorded.rooms().get(owner.room).is_none() {
+            return Err(table_problem(TableProblem::NotStarted));
+        }
+        Ok(Response::new(v1::GetPhysicalTableResponse {
+            room_id: owner.room.to_string(),
+            table_ticket: Token::of_table(&owner).to_text(),
+            owner_token: owner.to_text(),
+        }))
+    }
+
     async fn start_tournament(
         &self,
         request: Request<v1::StartTournamentRequest>,
@@ -373,14 +412,28 @@ fn create_refused(problem: CreateProblem) -> Status {
 }
 
 fn join_refused(refusal: JoinRefusal) -> Status {
-    let problem = match refusal {
-        JoinRefusal::Rules(problem) => problem,
-        JoinRefusal::RequestIdUsed => return request_id_used(&refusal.to_string()),
+    match refusal {
+        JoinRefusal::Rules(problem) => join_problem(problem),
+        JoinRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
+    }
+}
+
+fn table_problem(problem: TableProblem) -> Status {
+    let (code, reason) = match problem {
+        TableProblem::Unknown => (Code::NotFound, "GAME_UNKNOWN"),
+        TableProblem::NotPhysical => (Code::FailedPrecondition, "GAME_NOT_PHYSICAL"),
+        TableProblem::NotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
+        TableProblem::Over => (Code::FailedPrecondition, "GAME_OVER"),
     };
+    status(code, reason, problem.to_string(), [("field", "game")])
+}
+
+fn join_problem(problem: JoinProblem) -> Status {
     let (code, reason) = match problem {
         JoinProblem::Full => (Code::ResourceExhausted, "TOURNAMENT_FULL"),
         JoinProblem::Started => (Code::FailedPrecondition, "TOURNAMENT_STARTED"),
         JoinProblem::NameTaken => (Code::FailedPrecondition, "NAME_TAKEN"),
+        JoinProblem::NoTables => (Code::FailedPrecondition, "NO_PHYSICAL_TABLES"),
         JoinProblem::NotStateless => (Code::FailedPrecondition, "NOT_STATELESS"),
         JoinProblem::MaxGames => (Code::InvalidArgument, "MAX_GAMES_REFUSED"),
     };

@@ -61,8 +61,8 @@ pub struct NewRoom {
 pub struct Seating {
     /// The id of its game's tournament and series.
     pub game: TournamentGame,
-    /// The room's id, which the tournament has committed before.
-    pub room_id: Id,
+    /// The room's owner token, with the id that the tournament has committed before.
+    pub owner: Token,
     /// The game's id.
     pub game_id: Id,
     /// The participants on the open seats.
@@ -129,7 +129,7 @@ impl Rooms {
     /// There are too many rooms, the server shuts down, or the store failed.
     pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
         let owner = match (&new.seating, &new.request) {
-            (Some(seating), _) => Token::random(seating.room_id),
+            (Some(seating), _) => seating.owner,
             (None, Some(request)) => request.owner(),
             (None, None) => Token::random(Id::random()),
         };

@@ -36,7 +36,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
                 tournament: Id([1; 16]),
                 series: None,
             },
-            room_id: Id([2; 16]),
+            owner: Token::random(Id([2; 16])),
             game_id: Id([3; 16]),
             participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
             server_seed: None,

@@ -179,7 +179,7 @@ impl Task {
         let entrants = state.core.participants();
         let (mut participants, mut display_names) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
-        let fills = fills
+        let fills: Vec<Fill> = fills
             .map(|(seat, participant)| {
                 let entrant = &entrants[*participant];
                 if game.forfeited.contains(participant) {
@@ -190,6 +190,10 @@ impl Task {
                     return Fill::BuiltIn(kind);
                 }
                 let kind = entrant.kind;
+                if entrant.at_table {
+                    display_names.insert(seat, entrant.name.clone());
+                    return Fill::AtTable(kind);
+                }
                 if let Some(ticket) = state.tickets.get(participant) {
                     let (name, ticket) = (entrant.name.clone(), *ticket);
                     participants.insert(seat, SeatedParticipant { name, kind, ticket });
@@ -199,6 +203,7 @@ impl Task {
                 }
             })
             .collect();
+        let physical = fills.iter().any(|fill| matches!(fill, Fill::AtTable(_)));
         let (room_id, game_id) = state.placed[&number];
         let place = format!(
             " · round {}, table {}, game {}",
@@ -222,14 +227,14 @@ impl Task {
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.handle.game_seed(number, game.deal),
-            physical: false,
+            physical,
             request: None,
             seating: Some(Seating {
                 game: TournamentGame {
                     tournament: self.handle.id(),
                     series: game.deal.map(|deal| self.handle.series(deal)),
                 },
-                room_id,
+                owner: self.handle.room_owner(room_id),
                 game_id,
                 participants,
                 server_seed: game.deal.map(|deal| self.handle.server_seed(deal)),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
-use chefshat_tournament::{BeginProblem, Entrant, JoinProblem, Tournament};
+use chefshat_tournament::{BeginProblem, Entrant, GameState, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -74,6 +74,7 @@ impl Entry {
             filler: false,
             stateless: self.stateless,
             max_games: self.max_games,
+            at_table: false,
         }
     }
 }
@@ -91,12 +92,30 @@ pub enum JoinRefusal {
     RequestIdUsed,
 }
 
+/// Why a game has no physical table now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum TableProblem {
+    /// There is no such game.
+    #[error("this tournament has not drawn a game with this number")]
+    Unknown,
+    /// The cards are dealt by the server.
+    #[error("nobody plays this game at a physical table")]
+    NotPhysical,
+    /// It has no room yet.
+    #[error("the game has not started yet; ask again when it is being played")]
+    NotStarted,
+    /// It is counted or void.
+    #[error("the game is over")]
+    Over,
+}
+
 /// The tournament's task has stopped because the server ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped;
 
 pub(super) enum Message {
     Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
+    AddAtTable(Entrant, oneshot::Sender<Result<usize, JoinProblem>>),
     Begin(oneshot::Sender<Result<(), BeginProblem>>),
     Close(oneshot::Sender<()>),
     Enter(usize, u64, Connection),
@@ -236,6 +255,55 @@ impl TournamentHandle {
             Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started.into())),
             joined => joined,
         }
+    }
+
+    /// Adds a participant at a physical table; returns its number.
+    ///
+    /// # Errors
+    /// The server ends, or (inner result) the participant is refused.
+    pub async fn add_at_table(
+        &self,
+        name: String,
+        kind: ParticipantKind,
+    ) -> Result<Result<usize, JoinProblem>, Stopped> {
+        let entrant = Entrant {
+            name,
+            kind,
+            built_in: None,
+            filler: false,
+            stateless: false,
+            max_games: 1,
+            at_table: true,
+        };
+        match self.ask(|reply| Message::AddAtTable(entrant, reply)).await {
+            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started)),
+            added => added,
+        }
+    }
+
+    /// The owner token of the room of a physical game in progress.
+    ///
+    /// # Errors
+    /// The game has no physical table now.
+    pub fn physical_room(&self, number: usize) -> Result<Token, TableProblem> {
+        let state = self.committed();
+        let game = (state.core.games().get(number)).ok_or(TableProblem::Unknown)?;
+        if !game.physical {
+            return Err(TableProblem::NotPhysical);
+        }
+        match game.state {
+            GameState::Due => Err(TableProblem::NotStarted),
+            GameState::Counted(_) | GameState::Void => Err(TableProblem::Over),
+            GameState::Playing => {
+                let (room, _) = state.placed.get(&number).ok_or(TableProblem::NotStarted)?;
+                Ok(self.room_owner(*room))
+            }
+        }
+    }
+
+    /// The owner token of a room of this tournament.
+    pub(super) fn room_owner(&self, room: Id) -> Token {
+        Token::of_tournament_room(room, &self.header.owner)
     }
 
     /// Starts it.

@@ -19,7 +19,7 @@ use tokio::sync::{Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-pub use handle::{Call, Connection, Entry, JoinRefusal, Stopped, TournamentHandle};
+pub use handle::{Call, Connection, Entry, JoinRefusal, Stopped, TableProblem, TournamentHandle};
 pub use leaderboard::Leaderboard;
 pub use shared::ComputeError;
 
@@ -312,6 +312,7 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
             filler: false,
             stateless: true,
             max_games: chefshat_tournament::MAX_GAMES_AT_A_TIME,
+            at_table: false,
         });
     }
     entrants

@@ -3,11 +3,11 @@
 //! games to check.
 //!
 //! A game is called, in the order of the schedule, when all its participants are present and can
-//! play one more game. If only absent participants block it, it waits for the no-show time. That
-//! counts as a call, and the game is queued again behind the others. The last call starts it
-//! without the absentees. If a participant misses the last call itself, the game is called once
-//! more without it; other absentees are waited for as before. A game that all participants forfeit,
-//! or that is aborted on its last call, is voided.
+//! play one more game, and a physical table is free if it needs one. If only absent participants
+//! block it, it waits for the no-show time. That counts as a call, and the game is queued again
+//! behind the others. The last call starts it without the absentees. If a participant misses the
+//! last call itself, the game is called once more without it; other absentees are waited for as
+//! before. A game that all participants forfeit, or that is aborted on its last call, is voided.
 
 #[cfg(test)]
 mod tests;
@@ -22,6 +22,8 @@ use chefshat_engine::SeatStatistics;
 enum Readiness {
     /// This participant cannot play one more game now.
     Busy(usize),
+    /// All physical tables are occupied.
+    NoTable,
     /// These participants are absent or forfeit; nothing else blocks the game.
     Missing(Vec<usize>),
     /// The game can be called; these participants forfeit it.
@@ -29,9 +31,10 @@ enum Readiness {
 }
 
 impl Tournament {
-    /// Sets whether a participant is present, that is, can take a seat at once. Built-in agents are
-    /// always present. The wait of a game restarts once all its participants were present together,
-    /// so one participant who comes and goes does not prolong it for the others.
+    /// Sets whether a participant is present, that is, can take a seat at once. Built-in agents and
+    /// participants at a physical table are always present. The wait of a game restarts once all its
+    /// participants were present together, so one participant who comes and goes does not prolong it
+    /// for the others.
     pub fn set_present(&mut self, participant: usize, present: bool) {
         let Tournament {
             state, scheduler, ..
@@ -121,6 +124,7 @@ impl Tournament {
             let game = &state.games[index];
             match readiness(state, scheduler, game) {
                 Readiness::Busy(by) => scheduler.block(state, due, by),
+                Readiness::NoTable => scheduler.wait_for_table(state, due),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
                     if scheduler.has_waited(state, due, now_ms) {
@@ -141,6 +145,9 @@ impl Tournament {
 }
 
 fn readiness(state: &TournamentState, scheduler: &Scheduler, game: &Game) -> Readiness {
+    if game.physical && !state.has_free_table() {
+        return Readiness::NoTable;
+    }
     let mut out = Vec::new();
     let mut waits = false;
     for &participant in &game.seats {

@@ -19,6 +19,8 @@ pub struct Entrant {
     pub stateless: bool,
     /// Maximum number of games at a time, 1..=64.
     pub max_games: usize,
+    /// Whether it plays at a physical table. Nobody connects for it: it is always present.
+    pub at_table: bool,
 }
 
 /// A step of a tournament. Folding the same changes again restores the tournament.
@@ -137,6 +139,8 @@ pub struct Game {
     pub number: u32,
     /// Participants by seat.
     pub seats: Vec<usize>,
+    /// Whether it needs a physical table: a participant plays at one.
+    pub physical: bool,
     /// Games with the same number have the same deal; `None` is a deal of its own. After an abort
     /// under [`Deals::SameAtAllTables`](super::Deals) a game gets a new deal, because its
     /// participants have seen the old one.

@@ -24,6 +24,9 @@ pub enum JoinProblem {
     /// Deals are rotated, and the entrant did not declare itself stateless.
     #[error("each deal is met several times, so only stateless agents may take part")]
     NotStateless,
+    /// The entrant plays at a physical table, and there is none.
+    #[error("this tournament has no physical tables; create it with `physical_tables`")]
+    NoTables,
     /// The number of games at a time is out of range.
     #[error("games at a time: 1..={MAX_GAMES_AT_A_TIME}")]
     MaxGames,
@@ -63,6 +66,9 @@ impl Tournament {
         }
         if self.is_name_taken(&entrant.name) {
             return Err(JoinProblem::NameTaken);
+        }
+        if entrant.at_table && state.settings.physical_tables == 0 {
+            return Err(JoinProblem::NoTables);
         }
         let forgets = entrant.stateless || entrant.built_in.is_some();
         if state.settings.deals == Deals::Rotated && !forgets {
@@ -130,6 +136,7 @@ impl Tournament {
             filler: true,
             stateless: true,
             max_games: MAX_GAMES_AT_A_TIME,
+            at_table: false,
         }
     }
 

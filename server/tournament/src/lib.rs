@@ -19,12 +19,13 @@
 //!     no_show_ms: 60_000,
 //!     max_calls: 2,
 //!     max_parallel: 64,
+//!     physical_tables: 0,
 //!     draw_seed: [7; 32],
 //!     filler: AgentKind::Random,
 //! })?;
 //! for name in ["Ada", "Bo", "Cem", "Dia", "Eve"] {
 //!     let kind = Some(AgentKind::Greedy);
-//!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1 })?;
+//!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1, at_table: false })?;
 //!     tournament.fold(&joined);
 //! }
 //! for change in tournament.begin()? {
@@ -72,7 +73,7 @@ pub use confidence::{Neighbours, OrderConfidence, SURE, Scored, order_confidence
 pub use entry::{BeginProblem, JoinProblem};
 pub use settings::{
     Deals, Format, MAX_GAMES, MAX_GAMES_AT_A_TIME, MAX_GAMES_PER_PAIRING, MAX_PARTICIPANTS,
-    MAX_ROUNDS, MIN_PARTICIPANTS, Settings, SettingsProblem,
+    MAX_PHYSICAL_TABLES, MAX_ROUNDS, MIN_PARTICIPANTS, Settings, SettingsProblem,
 };
 pub use standings::Standing;
 pub use state::State;

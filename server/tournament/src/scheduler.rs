@@ -23,6 +23,9 @@ pub(super) struct Scheduler {
     /// By participant at its limit of games: the games it blocks. When it can play again, the first
     /// of them is checked; if that one is not called, the next.
     blocked: Vec<BTreeSet<DueGame>>,
+    /// Games that wait for a physical table. When one is free, the first of them is checked; if it is
+    /// not called, the next.
+    without_table: BTreeSet<DueGame>,
     /// Games blocked by absent participants only, with the time since when, in milliseconds.
     waits: BTreeMap<usize, u64>,
     /// The same games by time, except those whose time was up at the last check.
@@ -40,7 +43,9 @@ pub(super) struct Scheduler {
 
 impl Scheduler {
     pub(super) fn is_present(&self, state: &TournamentState, participant: usize) -> bool {
-        state.participants[participant].built_in.is_some()
+        let entrant = &state.participants[participant];
+        entrant.built_in.is_some()
+            || entrant.at_table
             || self.present.get(participant) == Some(&true)
     }
 
@@ -92,7 +97,7 @@ impl Scheduler {
     }
 
     /// Handles a game that was called, queued again or ended: its participants may have gained or
-    /// lost capacity.
+    /// lost capacity, and a physical table may have become free or occupied.
     fn on_game_change(&mut self, state: &TournamentState, index: usize) {
         let Some(game) = state.games.get(index) else {
             return;
@@ -111,13 +116,26 @@ impl Scheduler {
                 self.blocked[who].insert((state.games[waiting].turn, waiting));
             }
         }
+        if game.physical && !state.has_free_table() {
+            let games = &state.games;
+            let waiting = self.waits.keys().copied();
+            let physical: Vec<usize> = waiting.filter(|index| games[*index].physical).collect();
+            for index in physical {
+                self.end_wait(state, index);
+                self.without_table.insert((games[index].turn, index));
+            }
+        }
         self.release(state, game);
     }
 
-    /// Checks the first game blocked by each of these participants that can play again.
+    /// Checks the first game blocked by each of these participants that can play again, and the
+    /// first that waits for this game's table if one is free.
     fn release(&mut self, state: &TournamentState, game: &Game) {
         for &who in game.seats.iter().filter(|who| state.has_capacity(**who)) {
             self.to_check.extend(self.blocked[who].pop_first());
+        }
+        if game.physical && state.has_free_table() {
+            self.to_check.extend(self.without_table.pop_first());
         }
     }
 
@@ -163,6 +181,13 @@ impl Scheduler {
     pub(super) fn block(&mut self, state: &TournamentState, checked: DueGame, by: usize) {
         self.end_wait(state, checked.1);
         self.blocked[by].insert(checked);
+        self.set_aside(state, checked);
+    }
+
+    /// Records that a game waits for a physical table.
+    pub(super) fn wait_for_table(&mut self, state: &TournamentState, checked: DueGame) {
+        self.end_wait(state, checked.1);
+        self.without_table.insert(checked);
         self.set_aside(state, checked);
     }
 

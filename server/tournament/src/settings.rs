@@ -17,6 +17,8 @@ pub const MAX_ROUNDS: u32 = 1000;
 pub const MAX_GAMES_PER_PAIRING: u32 = 1000;
 /// Maximum number of games that a participant may play at a time.
 pub const MAX_GAMES_AT_A_TIME: usize = 64;
+/// Maximum number of physical tables.
+pub const MAX_PHYSICAL_TABLES: usize = 64;
 
 /// Seats of a knockout table, half of which advance.
 pub(super) const KNOCKOUT_SEATS: usize = 4;
@@ -113,6 +115,9 @@ pub struct Settings {
     pub max_calls: u32,
     /// Maximum number of games at a time, 1..=256.
     pub max_parallel: usize,
+    /// Number of physical tables, 0..=64: maximum number of games with real cards at a time. Only
+    /// with independent deals.
+    pub physical_tables: usize,
     /// Seed of all random choices: seats, tables, tie breaks. No deal depends on it.
     pub draw_seed: [u8; 32],
     /// The built-in agent that fills tables up.
@@ -163,6 +168,16 @@ impl Settings {
         within("no_show_time_ms", self.no_show_ms, 1000, 86_400_000)?;
         within("max_calls", self.max_calls, 1, 10)?;
         within("max_parallel_games", self.max_parallel, 1, 256)?;
+        within(
+            "physical_tables",
+            self.physical_tables,
+            0,
+            MAX_PHYSICAL_TABLES,
+        )?;
+        if self.physical_tables > 0 && self.deals != Deals::Independent {
+            let problem = "real cards cannot be dealt again; set `deals` to independent";
+            return refuse("physical_tables", problem.to_owned());
+        }
         let games = self.games_for(most);
         if games > MAX_GAMES {
             let problem = format!(

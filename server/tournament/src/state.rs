@@ -85,6 +85,8 @@ pub(super) struct TournamentState {
     pub(super) playing: BTreeSet<usize>,
     /// By participant: number of games it is playing.
     pub(super) busy: Vec<usize>,
+    /// Number of physical tables at which a game is being played.
+    tables_in_use: usize,
     /// Number of games that are counted or void.
     pub(super) over: usize,
     /// By deal: number of games that are not over.
@@ -106,6 +108,7 @@ impl TournamentState {
             due: BTreeSet::new(),
             playing: BTreeSet::new(),
             busy: Vec::new(),
+            tables_in_use: 0,
             over: 0,
             deals: Vec::new(),
             next_turn: 0,
@@ -121,6 +124,11 @@ impl TournamentState {
     pub(super) fn has_capacity(&self, participant: usize) -> bool {
         let entrant = &self.participants[participant];
         entrant.built_in.is_some() || self.busy[participant] < entrant.max_games
+    }
+
+    /// Whether a physical table is free.
+    pub(super) fn has_free_table(&self) -> bool {
+        self.tables_in_use < self.settings.physical_tables
     }
 
     /// Whether a participant forfeits a due game: it missed the last call and is no longer waited
@@ -208,12 +216,14 @@ impl TournamentState {
             self.deals.resize(self.deals.len().max(deal + 1), 0);
             self.deals[deal] += 1;
         }
+        let physical = seats.iter().any(|who| self.participants[*who].at_table);
         let index = self.games.len();
         self.games.push(Game {
             round,
             table,
             number: game + 1,
             seats,
+            physical,
             deal: deal.map(|deal| deal as u32),
             state: GameState::Due,
             calls: 0,
@@ -246,6 +256,7 @@ impl TournamentState {
         game.forfeited = forfeited.to_vec();
         game.missing.clear();
         self.playing.insert(index);
+        self.tables_in_use += usize::from(game.physical);
         for participant in &game.seats {
             if !game.forfeited.contains(participant) {
                 self.busy[*participant] += 1;
@@ -313,6 +324,7 @@ impl TournamentState {
         let game = &self.games[index];
         self.due.remove(&(game.turn, index));
         if self.playing.remove(&index) {
+            self.tables_in_use -= usize::from(game.physical);
             for participant in &game.seats {
                 if !game.forfeited.contains(participant) {
                     self.busy[*participant] -= 1;

@@ -23,6 +23,7 @@ pub fn settings(format: Format) -> Settings {
         no_show_ms: 1000,
         max_calls: 2,
         max_parallel: 64,
+        physical_tables: 0,
         draw_seed: [7; 32],
         filler: AgentKind::Random,
     }
@@ -37,6 +38,7 @@ pub fn entrant(name: &str) -> Entrant {
         filler: false,
         stateless: true,
         max_games: 1,
+        at_table: false,
     }
 }
 

@@ -19,6 +19,7 @@ mod rooms;
 mod spectators;
 mod stops;
 mod stranger;
+mod table_bridge;
 mod terminal;
 mod tmux;
 mod tournament_agents;

@@ -108,6 +108,36 @@ async fn invalid_requests_are_refused_with_the_field() {
             "SETTINGS_REFUSED",
             "max_calls",
         ),
+        (
+            v1::TournamentSettings {
+                physical_tables: 1,
+                deals: v1::TournamentDeals::SameAtAllTables.into(),
+                ..named(swiss)
+            },
+            "SETTINGS_REFUSED",
+            "physical_tables",
+        ),
+        (
+            v1::TournamentSettings {
+                physical_tables: 1,
+                deal_seed: vec![1; 32],
+                ..named(swiss)
+            },
+            "SETTINGS_REFUSED",
+            "deal_seed",
+        ),
+        (
+            v1::TournamentSettings {
+                physical_tables: 1,
+                rules: Some(v1::RuleSet {
+                    opening: v1::Opening::AnyTopFace.into(),
+                    ..v1::RuleSet::default()
+                }),
+                ..named(swiss)
+            },
+            "RULE_SET_REFUSED",
+            "rules",
+        ),
     ];
     for (settings, reason, field) in cases {
         let request = v1::CreateTournamentRequest {
@@ -200,6 +230,53 @@ async fn invalid_requests_are_refused_with_the_field() {
     ];
     for (request, reason) in joins {
         let refused = service.join_tournament(request).await;
+        let refused = refused.expect_err("a refusal");
+        let info = refused.get_details_error_info().expect("error info");
+        assert_eq!(info.reason, reason);
+    }
+    let at_table =
+        |created: &v1::CreateTournamentResponse, name: &str| v1::AddTableParticipantRequest {
+            tournament_id: id_of(created),
+            owner_token: created.owner_token.clone(),
+            name: name.to_owned(),
+            ..v1::AddTableParticipantRequest::default()
+        };
+    let with_tables = create(
+        &mut service,
+        v1::TournamentSettings {
+            physical_tables: 1,
+            max_participants: 2,
+            ..named(swiss)
+        },
+    )
+    .await;
+    let added = service.add_table_participant(at_table(&with_tables, "Ada"));
+    let added = added.await.expect("added").into_inner();
+    let ada = &added.tournament.expect("a tournament").participants[0];
+    assert!(ada.at_table && ada.connected && ada.kind() == v1::ParticipantKind::Human);
+    let joined = service.join_tournament(v1::JoinTournamentRequest {
+        join_code: with_tables.join_code.clone(),
+        ..ask("Ada")
+    });
+    let refused = joined.await.expect_err("the name of the one at the table");
+    let info = refused.get_details_error_info().expect("error info");
+    assert_eq!(info.reason, "NAME_TAKEN");
+    let strangers = v1::AddTableParticipantRequest {
+        owner_token: "00".repeat(48),
+        ..at_table(&with_tables, "Bo")
+    };
+    let unknown_kind = v1::AddTableParticipantRequest {
+        kind: 77,
+        ..at_table(&with_tables, "Bo")
+    };
+    for (request, reason) in [
+        (at_table(&created, "Bo"), "NO_PHYSICAL_TABLES"),
+        (at_table(&with_tables, "Ada"), "NAME_TAKEN"),
+        (at_table(&with_tables, ""), "NAME_REFUSED"),
+        (unknown_kind, "KIND_REFUSED"),
+        (strangers, "OWNER_TOKEN_WRONG"),
+    ] {
+        let refused = service.add_table_participant(request).await;
         let refused = refused.expect_err("a refusal");
         let info = refused.get_details_error_info().expect("error info");
         assert_eq!(info.reason, reason);

@@ -1,4 +1,5 @@
-// The organiser's part of a tournament's page: inviting, starting, closing.
+// The organiser's part of a tournament's page: inviting, starting, attending to physical games,
+// closing.
 
 import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
@@ -8,13 +9,15 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
+import type { LiveTournament } from "./following";
 import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
+import { PhysicalGames } from "./PhysicalGames";
 import { isEnded } from "./structure";
 import css from "./Tournaments.module.css";
 import { isForAgents, isForPeople } from "./words";
 
 /** The organiser's part; null on other devices, and after the end. */
-export function Organiser({ tournament }: { tournament: Tournament }) {
+export function Organiser({ live: { tournament, games } }: { live: LiveTournament }) {
   const { tournamentId, state } = tournament;
   const hosted = hostedTournament(tournamentId);
   if (!hosted || isEnded(tournament)) return null;
@@ -40,6 +43,7 @@ export function Organiser({ tournament }: { tournament: Tournament }) {
           {isForPeople(tournament) && <StudyLinks address={address} />}
         </>
       )}
+      <PhysicalGames tournament={tournament} games={games} />
       <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
         {open ? words.closeOpen : words.closePlaying}
       </ConfirmButton>

@@ -83,7 +83,7 @@ function Visited({ live }: { live: LiveTournament }) {
     return (
       <Participation held={held} live={live}>
         <Overview live={live} mine={held.participant}>
-          <Organiser tournament={tournament} />
+          <Organiser live={live} />
         </Overview>
       </Participation>
     );
@@ -98,7 +98,7 @@ function Visited({ live }: { live: LiveTournament }) {
   }
   return (
     <Overview live={live} mine={undefined}>
-      <Organiser tournament={tournament} />
+      <Organiser live={live} />
       {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
       {!open && invited && !isEnded(tournament) && (
         <Notice kind="hint">{t().faults.byReason.TOURNAMENT_STARTED}</Notice>

@@ -3,6 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { keepTableTicket } from "../attend/ticket";
 import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
@@ -40,6 +41,16 @@ export async function startTournament(tournamentId: string): Promise<void> {
 /** Closes a tournament that this device created; running games are aborted. */
 export async function closeTournament(tournamentId: string): Promise<void> {
   await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Stores the ticket of the table of a physical game in progress on this device; returns its room. */
+export async function takeTable(tournamentId: string, game: number): Promise<string> {
+  const { roomId, tableTicket } = await tournamentApi.getPhysicalTable(
+    { ...ownership(tournamentId), game },
+    { timeoutMs: CALL_LIMIT_MS },
+  );
+  keepTableTicket(roomId, tableTicket);
+  return roomId;
 }
 
 /** The invitation address of a tournament. */

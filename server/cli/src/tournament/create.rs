@@ -70,6 +70,10 @@ pub(super) struct Create {
     /// Maximum number of games at a time, 1 to 256. Default: 64.
     #[arg(long, value_name = "N")]
     max_parallel_games: Option<u32>,
+    /// Number of physical tables, 1 to 64, where participants play with real cards, one game at a
+    /// time each; `chefshat tournament add` adds these participants. Default: none.
+    #[arg(long, value_name = "N")]
+    physical_tables: Option<u32>,
     /// Seed of pairings and seats, 64 hexadecimal digits, to repeat a draw. The deals do not depend
     /// on it.
     #[arg(long, value_name = "HEX", value_parser = seed)]
@@ -174,6 +178,7 @@ impl Create {
             draw_seed: self.draw_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             deal_seed: self.deal_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             filler: self.filler.clone().unwrap_or_default(),
+            physical_tables: asked("--physical-tables", self.physical_tables)?,
         })
     }
 
@@ -197,7 +202,13 @@ impl Create {
                 format!("start it with: chefshat tournament start {id} --server {server} {owner}")
             }
         };
-        format!("join with: {join}\n{starts}")
+        let at_table = match self.physical_tables {
+            Some(_) => format!(
+                "add those at a physical table with: chefshat tournament add {id} --name NAME --server {server} {owner}\n"
+            ),
+            None => String::new(),
+        };
+        format!("join with: {join}\n{at_table}{starts}")
     }
 }
 
@@ -292,7 +303,7 @@ mod tests {
         let flags = format!(
             "--built-in greedy*2,trained --built-in random --start-when 9 --rounds 5 --games-per-pairing 3 --deals same --kind human \
              --kind robot --max-participants 20 --no-show-time-ms 5000 --max-calls 3 --max-parallel-games 7 --draw-seed {seed} --deal-seed {seed} \
-             --filler greedy --target-shifts 3 --decision-time-ms 700 --clock human:60000"
+             --filler greedy --physical-tables 2 --target-shifts 3 --decision-time-ms 700 --clock human:60000"
         );
         let rules = v1::RuleSet {
             preset: "paper".into(),
@@ -332,6 +343,7 @@ mod tests {
             draw_seed: vec![7; 32],
             deal_seed: vec![7; 32],
             filler: "greedy".into(),
+            physical_tables: 2,
         };
         assert_eq!(settings(&flags).expect("they make sense"), expected);
     }
@@ -341,6 +353,7 @@ mod tests {
         for (flags, words) in [
             ("--faces 3", "--faces: "),
             ("--rounds 0", "--rounds: 0 is too few"),
+            ("--physical-tables 0", "--physical-tables: 0 is too few"),
             ("--built-in greedy*", "after * give a number"),
             ("--built-in greedy*0", "after * give a number"),
             ("--built-in gready", "use one of random"),
@@ -366,6 +379,11 @@ mod tests {
                 "--decision-time-ms: 1",
             ),
             ("policy", "policy: no", "no"),
+            (
+                "physical_tables",
+                "physical_tables: 65",
+                "--physical-tables: 65",
+            ),
         ] {
             assert_eq!(flagged(field, message).to_string(), words);
         }

@@ -182,9 +182,10 @@ fn game_in_a_line(game: &v1::TournamentGame, participants: &[v1::TournamentParti
         v1::TournamentGameState::Counted => "counted",
         v1::TournamentGameState::Void => "void",
     };
+    let cards = if game.physical { "  (real cards)" } else { "" };
     let record = record_of(game).map_or_else(String::new, |record| format!("  {record}"));
     format!(
-        "{:>4}  round {} table {} game {}  {state:<7}  {}{record}",
+        "{:>4}  round {} table {} game {}  {state:<7}  {}{cards}{record}",
         game.game,
         game.round,
         game.table,
@@ -229,9 +230,10 @@ mod tests {
              3rd participant 9 0 (forfeited)  records/5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl"
         );
         game.state = v1::TournamentGameState::Playing.into();
+        game.physical = true;
         assert_eq!(
             game_in_a_line(&game, &participants),
-            "   7  round 2 table 1 game 1  playing  Ada (substituted), Bo[2J, participant 9 (forfeited)"
+            "   7  round 2 table 1 game 1  playing  Ada (substituted), Bo[2J, participant 9 (forfeited)  (real cards)"
         );
     }
 }

@@ -42,6 +42,10 @@ enum TournamentAction {
         after_help = "Example:\n  chefshat tournament start 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
     )]
     Start(owner::Owned),
+    /// Add a participant who plays at a physical table with real cards.
+    Add(owner::Add),
+    /// Show the secrets of the physical table at which a game is being played.
+    Table(owner::Table),
     /// Close a tournament early: games in progress are aborted, counted games keep their results.
     #[command(
         after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
@@ -65,6 +69,8 @@ impl TournamentCommand {
             TournamentAction::Create(command) => command.run().await,
             TournamentAction::Join(command) => command.run().await,
             TournamentAction::Start(owned) => owned.start().await,
+            TournamentAction::Add(command) => command.run().await,
+            TournamentAction::Table(command) => command.run().await,
             TournamentAction::Close(owned) => owned.close().await,
             TournamentAction::Follow(command) => command.run().await,
             TournamentAction::Results(command) => command.run().await,

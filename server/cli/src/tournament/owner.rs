@@ -1,8 +1,10 @@
-//! Commands for the owner of a tournament: `chefshat tournament start` and `close`.
+//! Commands for the owner of a tournament: `chefshat tournament start` and `close`, `add` for a
+//! participant at a physical table, and `table` for the secrets of such a table.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::kind::KindArg;
 use chefshat_client::v1;
 use clap::Args;
 
@@ -29,9 +31,88 @@ pub(super) struct Owned {
     owner_file: Option<PathBuf>,
     #[command(flatten)]
     server: ServerArg,
-    /// Print the tournament as a JSON line.
+    /// Print the result as a JSON line.
     #[arg(long)]
     json: bool,
+}
+
+/// Add a participant who plays at a physical table with real cards.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat tournament add 5f0c6a4de2b14b7f8a3d9c1e7b60425d --name Ada --owner-file ./owner"
+)]
+pub(super) struct Add {
+    #[command(flatten)]
+    owned: Owned,
+    /// Display name, 1 to 64 characters, unique in the tournament.
+    #[arg(long)]
+    name: String,
+    /// Kind of the participant.
+    #[arg(long, value_enum, default_value_t = KindArg::Human)]
+    kind: KindArg,
+}
+
+/// Show the secrets of the physical table at which a game is being played: the attendant's page and
+/// the ticket for a camera.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat tournament table 5f0c6a4de2b14b7f8a3d9c1e7b60425d 3 --owner-file ./owner\n\n\
+                  `chefshat tournament games` shows the numbers of the games."
+)]
+pub(super) struct Table {
+    #[command(flatten)]
+    owned: Owned,
+    /// Number of the game.
+    #[arg(value_name = "GAME")]
+    game: u32,
+}
+
+impl Add {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.owned.token()?, self.owned.server.connect().await?);
+        let request = v1::AddTableParticipantRequest {
+            tournament_id: self.owned.tournament_id.clone(),
+            owner_token: token,
+            name: self.name,
+            kind: v1::ParticipantKind::from(self.kind).into(),
+        };
+        let added = client.add_table_participant(request).await?;
+        if self.owned.json {
+            let (tournament, participant) = (added.tournament, added.participant);
+            say(serde_json::json!({
+                "event": "added", "tournament": tournament, "participant": participant,
+            }))?;
+        } else {
+            say(format_args!("participant {}", added.participant))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Table {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.owned.token()?, self.owned.server.connect().await?);
+        let table = client
+            .physical_table(self.owned.tournament_id.as_str(), token, self.game)
+            .await?;
+        let (room, ticket, owner) = (table.room_id, table.table_ticket, table.owner_token);
+        let page = format!(
+            "{}/rooms/{room}/table#ticket={ticket}",
+            self.owned.server.url()
+        );
+        if self.owned.json {
+            say(serde_json::json!({
+                "event": "table", "game": self.game, "room_id": room, "table_ticket": ticket,
+                "owner_token": owner, "page": page,
+            }))?;
+        } else {
+            say(format_args!("room          {room}"))?;
+            say(format_args!("table ticket  {ticket}"))?;
+            say(format_args!("owner token   {owner}"))?;
+            say(format_args!("the attendant's page: {page}"))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 impl Owned {

@@ -125,6 +125,7 @@ impl Simulate {
             no_show_ms: 60_000,
             max_calls: 1,
             max_parallel: MAX_PARALLEL,
+            physical_tables: 0,
             draw_seed: self.draw_seed(),
             filler: AgentKind::Random,
         };
@@ -163,6 +164,7 @@ impl Simulate {
             filler: false,
             stateless: true,
             max_games: MAX_GAMES_AT_A_TIME,
+            at_table: false,
         });
         Ok(entrants.collect())
     }

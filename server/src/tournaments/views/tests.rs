@@ -50,6 +50,7 @@ impl TournamentHandle {
                 filler: false,
                 stateless: true,
                 max_games: MAX_GAMES_AT_A_TIME,
+                at_table: false,
             }));
         }
         let id = Id::random();
@@ -293,6 +294,7 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         series_id: Id::random().to_string(),
         rated: true,
         shifts: u32::MAX,
+        physical: true,
     };
     let follower_update = v1::FollowTournamentResponse {
         games: vec![game; MAX_GAMES_FOLLOWED],

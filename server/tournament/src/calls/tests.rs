@@ -17,12 +17,20 @@ fn settings() -> Settings {
 }
 
 fn join(tournament: &mut Tournament, max_games: usize, built_in: Option<AgentKind>) {
+    add(
+        tournament,
+        Entrant {
+            built_in,
+            max_games,
+            ..testing::entrant("")
+        },
+    );
+}
+
+/// Adds an entrant, with a name of its own.
+fn add(tournament: &mut Tournament, entrant: Entrant) {
     let name = format!("agent {}", tournament.participants().len());
-    let change = tournament.join(Entrant {
-        built_in,
-        max_games,
-        ..testing::entrant(&name)
-    });
+    let change = tournament.join(Entrant { name, ..entrant });
     tournament.fold(&change.expect("a free place"));
 }
 
@@ -84,7 +92,7 @@ impl Scan {
         for &(_, index) in &state.due {
             let game = &state.games[index];
             match readiness(state, scheduler, game) {
-                Readiness::Busy(_) => drop(self.waits.remove(&index)),
+                Readiness::Busy(_) | Readiness::NoTable => drop(self.waits.remove(&index)),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
                     let since = *self.waits.entry(index).or_insert(now_ms);
@@ -125,6 +133,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
         games_per_pairing: 1 + chance.below(3) as u32,
         max_calls: 1 + chance.below(3) as u32,
         max_parallel: [1, 2, 256][chance.below(3)],
+        physical_tables: 1 + chance.below(2),
         ..settings()
     })
     .expect("valid settings");
@@ -132,6 +141,14 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
     for _ in 0..participants {
         let built_in = (chance.below(8) == 0).then_some(AgentKind::Random);
         join(&mut tournament, 1 + chance.below(2), built_in);
+    }
+    // Of every second tournament all games are virtual.
+    for _ in 0..[0, 1 + chance.below(3)][usize::from(seed % 2)] {
+        let at_table = Entrant {
+            at_table: true,
+            ..testing::entrant("")
+        };
+        add(&mut tournament, at_table);
     }
     draw(&mut tournament, 6, &mut chance);
     let mut scan = Scan::default();
@@ -145,6 +162,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
             asked += 1;
             let Some(change) = next else { break };
             let what = match &change {
+                Change::Called { game, .. } if tournament.games()[*game].physical => "at a table",
                 Change::Called { forfeited, .. } if forfeited.is_empty() => "called",
                 Change::Called { .. } => "forfeited",
                 Change::Rescheduled { .. } => "rescheduled",
@@ -188,14 +206,14 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
 #[test]
 fn changes_equal_those_of_checking_every_game() {
     let mut happened: BTreeMap<&str, usize> = BTreeMap::new();
-    for seed in 0..100 {
+    for seed in 0..200 {
         let (asked, tally) = compare(seed);
         assert!(asked > 10);
         for (what, times) in tally {
             *happened.entry(what).or_default() += times;
         }
     }
-    for what in ["called", "forfeited", "rescheduled", "voided"] {
+    for what in ["called", "forfeited", "at a table", "rescheduled", "voided"] {
         assert!(happened[what] > 50, "{happened:?}");
     }
 }

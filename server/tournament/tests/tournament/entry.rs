@@ -10,7 +10,7 @@ use super::support::{begun, end, entrant, follow, joined, played, settings};
 #[test]
 fn settings_are_refused_by_the_name_of_their_field() {
     type Spoil = fn(&mut Settings);
-    let cases: [(&str, Spoil); 20] = [
+    let cases: [(&str, Spoil); 22] = [
         ("rules", |settings| settings.points = vec![5, 3, 1]),
         ("rules", |settings| settings.points = vec![5, 3, 1, 2]),
         ("rules", |settings| {
@@ -57,6 +57,11 @@ fn settings_are_refused_by_the_name_of_their_field() {
         ("max_calls", |settings| settings.max_calls = 11),
         ("max_parallel_games", |settings| settings.max_parallel = 0),
         ("max_parallel_games", |settings| settings.max_parallel = 257),
+        ("physical_tables", |settings| settings.physical_tables = 65),
+        ("physical_tables", |settings| {
+            settings.physical_tables = 1;
+            settings.deals = Deals::SameAtAllTables;
+        }),
     ];
     for (field, spoil) in cases {
         let mut settings = settings(Format::Swiss);

@@ -22,19 +22,22 @@ struct Plan {
 }
 
 fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
-    let entrant = (1..=3usize, prop::bool::weighted(0.2));
+    // Built-in, at a physical table, or a client.
+    let place = prop::sample::select(vec![0, 1, 2, 2, 2]);
+    let entrant = (1..=3usize, place);
     let sizes = prop_oneof![2..=12usize, 13..=64usize];
     sizes
         .prop_flat_map(move |count| prop::collection::vec(entrant.clone(), count))
         .prop_map(|kinds| {
             let numbered = kinds.into_iter().enumerate();
-            let entrant = |(number, (max_games, is_built_in)): (usize, (usize, bool))| Entrant {
+            let entrant = |(number, (max_games, place)): (usize, (usize, u8))| Entrant {
                 name: format!("entrant {number}"),
                 kind: ParticipantKind::Robot,
-                built_in: is_built_in.then_some(AgentKind::Greedy),
+                built_in: (place == 0).then_some(AgentKind::Greedy),
                 filler: false,
                 stateless: true,
-                max_games,
+                max_games: if place == 1 { 1 } else { max_games },
+                at_table: place == 1,
             };
             numbered.map(entrant).collect()
         })
@@ -48,11 +51,16 @@ fn plans() -> impl Strategy<Value = Plan> {
         1..=3u32,
         1..=5u32,
     );
-    let how = (1..=3u32, 1..=8usize, any::<[u8; 32]>());
+    let how = (1..=3u32, 1..=8usize, 0..=3usize, any::<[u8; 32]>());
     let dice = prop::collection::vec(any::<u8>(), 16..200);
-    (what, how, entrants(), dice).prop_map(|(what, how, entrants, dice)| {
-        let (format, deals, players, games_per_pairing, rounds) = what;
-        let (max_calls, max_parallel, draw_seed) = how;
+    (what, how, entrants(), dice).prop_map(|(what, how, mut entrants, dice)| {
+        let (format, mut deals, players, games_per_pairing, rounds) = what;
+        let (max_calls, max_parallel, physical_tables, draw_seed) = how;
+        if physical_tables == 0 {
+            entrants.iter_mut().for_each(|it| it.at_table = false);
+        } else {
+            deals = Deals::Independent;
+        }
         let is_knockout = format == Format::Knockout;
         let players = if is_knockout { 4 } else { players };
         let settings = Settings {
@@ -63,6 +71,7 @@ fn plans() -> impl Strategy<Value = Plan> {
             deals,
             max_calls,
             max_parallel,
+            physical_tables,
             draw_seed,
             ..settings(format)
         };
@@ -106,7 +115,7 @@ impl Run {
         self.check();
     }
 
-    /// Checks the limits of parallel games, for each participant and in total.
+    /// Checks the limits of parallel games: for each participant, at physical tables and in total.
     fn check(&self) {
         let games = self.tournament.games();
         let mut sits = vec![0; self.tournament.participants().len()];
@@ -118,6 +127,11 @@ impl Run {
         for (entrant, tables) in self.tournament.participants().iter().zip(sits) {
             assert!(entrant.built_in.is_some() || tables <= entrant.max_games);
         }
+        let at_tables = self.tournament.playing().filter(|game| {
+            let mut seats = games[*game].seats.iter();
+            seats.any(|who| self.tournament.participants()[*who].at_table)
+        });
+        assert!(at_tables.count() <= self.tournament.settings().physical_tables);
         let parallel = self.tournament.playing().count();
         assert!(parallel <= self.tournament.settings().max_parallel);
     }
@@ -294,6 +308,7 @@ fn it_resumes_after_any_interruption() {
                     filler: false,
                     stateless: false,
                     max_games: 1,
+                    at_table: false,
                 })
                 .collect(),
             dice: vec![3, 9, 5],

@@ -96,6 +96,10 @@ export const organise = {
         one: `# agent “${filler}” is added to make ${field}.`,
         other: `# agents “${filler}” are added to make ${field}.`,
       }),
+    tables: {
+      title: "Games with real cards",
+      text: "Attend to the table on this device. Its page also has the link for another device.",
+    },
     close: "Close the tournament…",
     closeOpen: "Nobody will be able to join, and no game will be played.",
     closePlaying: "Running games are aborted. Results so far are kept, and the standings are not final.",

@@ -99,6 +99,10 @@ export const organise: Texts["organise"] = {
         one: `Si aggiunge # agente «${filler}» per arrivare a ${field}.`,
         other: `Si aggiungono # agenti «${filler}» per arrivare a ${field}.`,
       }),
+    tables: {
+      title: "Partite con carte vere",
+      text: "Assisti al tavolo da questo dispositivo. La sua pagina ha anche il link per un altro dispositivo.",
+    },
     close: "Chiudi il torneo…",
     closeOpen: "Nessuno potrà più iscriversi e non si giocherà nulla.",
     closePlaying:

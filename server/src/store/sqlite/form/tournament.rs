@@ -72,6 +72,8 @@ struct EntrantForm {
     stateless: bool,
     #[prost(uint64, tag = "6")]
     max_games: u64,
+    #[prost(bool, tag = "7")]
+    at_table: bool,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -312,6 +314,7 @@ fn entrant_to_form(entrant: &Entrant) -> EntrantForm {
         filler: entrant.filler,
         stateless: entrant.stateless,
         max_games: wide(entrant.max_games),
+        at_table: entrant.at_table,
     }
 }
 
@@ -329,6 +332,7 @@ fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
         filler: form.filler,
         stateless: form.stateless,
         max_games: narrow(form.max_games)?,
+        at_table: form.at_table,
     })
 }
 

@@ -33,6 +33,7 @@ fn every_entry() -> Vec<TournamentEntry> {
         filler: false,
         stateless: true,
         max_games: 3,
+        at_table: false,
     };
     let filler = Entrant {
         name: "random 1".into(),
@@ -41,6 +42,16 @@ fn every_entry() -> Vec<TournamentEntry> {
         filler: true,
         stateless: false,
         max_games: 64,
+        at_table: false,
+    };
+    let at_table = Entrant {
+        name: "Ada".into(),
+        kind: ParticipantKind::Human,
+        built_in: None,
+        filler: false,
+        stateless: false,
+        max_games: 1,
+        at_table: true,
     };
     let seat = SeatResult {
         participant: 4,
@@ -104,6 +115,8 @@ fn every_entry() -> Vec<TournamentEntry> {
         change(Change::Voided { game: 2 }),
         change(Change::Finished),
         change(Change::Closed),
+        // Fields that are newer than the entries above.
+        change(Change::Joined(at_table)),
     ]
 }
 

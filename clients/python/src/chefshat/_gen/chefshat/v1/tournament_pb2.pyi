@@ -145,7 +145,9 @@ class _TournamentGameStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_T
     TOURNAMENT_GAME_STATE_UNSPECIFIED: _TournamentGameState.ValueType  # 0
     """Not set."""
     TOURNAMENT_GAME_STATE_DUE: _TournamentGameState.ValueType  # 1
-    """Not yet called: a participant is busy or not connected, or too many games are in progress."""
+    """Not yet called: a participant is busy or not connected, no physical table is free, or too many
+    games are in progress.
+    """
     TOURNAMENT_GAME_STATE_PLAYING: _TournamentGameState.ValueType  # 2
     """Called or in progress."""
     TOURNAMENT_GAME_STATE_COUNTED: _TournamentGameState.ValueType  # 3
@@ -159,7 +161,9 @@ class TournamentGameState(_TournamentGameState, metaclass=_TournamentGameStateEn
 TOURNAMENT_GAME_STATE_UNSPECIFIED: TournamentGameState.ValueType  # 0
 """Not set."""
 TOURNAMENT_GAME_STATE_DUE: TournamentGameState.ValueType  # 1
-"""Not yet called: a participant is busy or not connected, or too many games are in progress."""
+"""Not yet called: a participant is busy or not connected, no physical table is free, or too many
+games are in progress.
+"""
 TOURNAMENT_GAME_STATE_PLAYING: TournamentGameState.ValueType  # 2
 """Called or in progress."""
 TOURNAMENT_GAME_STATE_COUNTED: TournamentGameState.ValueType  # 3
@@ -193,6 +197,7 @@ class TournamentSettings(_message.Message):
     DRAW_SEED_FIELD_NUMBER: _builtins.int
     FILLER_FIELD_NUMBER: _builtins.int
     DEAL_SEED_FIELD_NUMBER: _builtins.int
+    PHYSICAL_TABLES_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Display name, 1..=64 characters."""
     format: Global___TournamentFormat.ValueType
@@ -236,6 +241,12 @@ class TournamentSettings(_message.Message):
     """Seed of all deals, for an experiment: 32 bytes, or empty for secret random deals. Anyone who
     knows it knows the cards. Such games are not rated.
     """
+    physical_tables: _builtins.int
+    """Number of physical tables, 0..=64. Participants who play there with real cards are added by the
+    owner (AddTableParticipant). Every game with one of them is played in a physical room, at most
+    as many at the same time as there are tables. Only with INDEPENDENT deals, without `deal_seed`,
+    and with rules that physical rooms accept.
+    """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set of all games."""
@@ -274,10 +285,11 @@ class TournamentSettings(_message.Message):
         draw_seed: _builtins.bytes = ...,
         filler: _builtins.str = ...,
         deal_seed: _builtins.bytes = ...,
+        physical_tables: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "deal_seed", b"deal_seed", "deals", b"deals", "draw_seed", b"draw_seed", "filler", b"filler", "format", b"format", "games_per_pairing", b"games_per_pairing", "kinds", b"kinds", "max_calls", b"max_calls", "max_parallel_games", b"max_parallel_games", "max_participants", b"max_participants", "name", b"name", "no_show_time_ms", b"no_show_time_ms", "policy", b"policy", "rounds", b"rounds", "rules", b"rules", "start_when_joined", b"start_when_joined"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "deal_seed", b"deal_seed", "deals", b"deals", "draw_seed", b"draw_seed", "filler", b"filler", "format", b"format", "games_per_pairing", b"games_per_pairing", "kinds", b"kinds", "max_calls", b"max_calls", "max_parallel_games", b"max_parallel_games", "max_participants", b"max_participants", "name", b"name", "no_show_time_ms", b"no_show_time_ms", "physical_tables", b"physical_tables", "policy", b"policy", "rounds", b"rounds", "rules", b"rules", "start_when_joined", b"start_when_joined"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -297,6 +309,7 @@ class TournamentParticipant(_message.Message):
     STATELESS_FIELD_NUMBER: _builtins.int
     MAX_GAMES_FIELD_NUMBER: _builtins.int
     CONNECTED_FIELD_NUMBER: _builtins.int
+    AT_TABLE_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
     """Number in the tournament, from 0, in the order of joining."""
     name: _builtins.str
@@ -312,7 +325,9 @@ class TournamentParticipant(_message.Message):
     max_games: _builtins.int
     """Number of games that it can play in parallel."""
     connected: _builtins.bool
-    """Whether it is connected now; a built-in agent always is."""
+    """Whether it is connected now; a built-in agent or a participant at a physical table always is."""
+    at_table: _builtins.bool
+    """Whether it plays at a physical table with real cards. Nobody connects for it."""
     def __init__(
         self,
         *,
@@ -324,10 +339,11 @@ class TournamentParticipant(_message.Message):
         stateless: _builtins.bool = ...,
         max_games: _builtins.int = ...,
         connected: _builtins.bool = ...,
+        at_table: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "kind", b"kind", "max_games", b"max_games", "name", b"name", "participant", b"participant", "stateless", b"stateless"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "kind", b"kind", "max_games", b"max_games", "name", b"name", "participant", b"participant", "stateless", b"stateless"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -419,6 +435,7 @@ class TournamentGame(_message.Message):
     SERIES_ID_FIELD_NUMBER: _builtins.int
     RATED_FIELD_NUMBER: _builtins.int
     SHIFTS_FIELD_NUMBER: _builtins.int
+    PHYSICAL_FIELD_NUMBER: _builtins.int
     game: _builtins.int
     """Number in the tournament, from 0."""
     round: _builtins.int
@@ -443,6 +460,8 @@ class TournamentGame(_message.Message):
     """Whether it counts for ratings: no forfeits, no substitutes, and deals chosen by the server."""
     shifts: _builtins.int
     """Number of Shifts, once it is counted."""
+    physical: _builtins.bool
+    """Whether it is played at a physical table."""
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[Global___TournamentGameSeat]:
         """Its seats. Results are set when the game is counted."""
@@ -462,10 +481,11 @@ class TournamentGame(_message.Message):
         series_id: _builtins.str = ...,
         rated: _builtins.bool = ...,
         shifts: _builtins.int = ...,
+        physical: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["calls", b"calls", "game", b"game", "game_id", b"game_id", "number", b"number", "rated", b"rated", "room_id", b"room_id", "round", b"round", "seats", b"seats", "series_id", b"series_id", "shifts", b"shifts", "state", b"state", "table", b"table"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["calls", b"calls", "game", b"game", "game_id", b"game_id", "number", b"number", "physical", b"physical", "rated", b"rated", "room_id", b"room_id", "round", b"round", "seats", b"seats", "series_id", b"series_id", "shifts", b"shifts", "state", b"state", "table", b"table"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -64,7 +64,9 @@ class CreateTournamentResponse(_message.Message):
     join_code: _builtins.str
     """The join code: what participants need to join."""
     owner_token: _builtins.str
-    """Secret that authorises the owner, for StartTournament and CloseTournament."""
+    """Secret that authorises the owner, for AddTableParticipant, GetPhysicalTable, StartTournament and
+    CloseTournament.
+    """
     @_builtins.property
     def tournament(self) -> _tournament_pb2.Tournament:
         """The tournament."""
@@ -276,6 +278,130 @@ class JoinTournamentResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___JoinTournamentResponse: _TypeAlias = JoinTournamentResponse  # noqa: Y015
+
+@_typing.final
+class AddTableParticipantRequest(_message.Message):
+    """Requests to add a participant at a physical table."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    NAME_FIELD_NUMBER: _builtins.int
+    KIND_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    name: _builtins.str
+    """Display name, 1..=64 characters, unique in the tournament."""
+    kind: _room_pb2.ParticipantKind.ValueType
+    """Kind of the participant; UNSPECIFIED means HUMAN. `kinds` of the settings does not limit it."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        name: _builtins.str = ...,
+        kind: _room_pb2.ParticipantKind.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["kind", b"kind", "name", b"name", "owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___AddTableParticipantRequest: _TypeAlias = AddTableParticipantRequest  # noqa: Y015
+
+@_typing.final
+class AddTableParticipantResponse(_message.Message):
+    """The added participant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    participant: _builtins.int
+    """The participant's number."""
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+        participant: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["participant", b"participant", "tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___AddTableParticipantResponse: _TypeAlias = AddTableParticipantResponse  # noqa: Y015
+
+@_typing.final
+class GetPhysicalTableRequest(_message.Message):
+    """Requests the table of a physical game."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    GAME_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    game: _builtins.int
+    """Number of the game in the tournament."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        game: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game", b"game", "owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetPhysicalTableRequest: _TypeAlias = GetPhysicalTableRequest  # noqa: Y015
+
+@_typing.final
+class GetPhysicalTableResponse(_message.Message):
+    """The table of a physical game."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ROOM_ID_FIELD_NUMBER: _builtins.int
+    TABLE_TICKET_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    room_id: _builtins.str
+    """The game's room."""
+    table_ticket: _builtins.str
+    """Secret that authorises reports about the table and following it (TableService)."""
+    owner_token: _builtins.str
+    """Secret that authorises CloseRoom, for a game that cannot continue. It counts as aborted: it is
+    called again later, or is void after its last call.
+    """
+    def __init__(
+        self,
+        *,
+        room_id: _builtins.str = ...,
+        table_ticket: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "room_id", b"room_id", "table_ticket", b"table_ticket"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetPhysicalTableResponse: _TypeAlias = GetPhysicalTableResponse  # noqa: Y015
 
 @_typing.final
 class StartTournamentRequest(_message.Message):

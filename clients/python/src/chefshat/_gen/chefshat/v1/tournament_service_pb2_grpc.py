@@ -55,6 +55,16 @@ class TournamentServiceStub:
                 request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentResponse.FromString,
                 _registered_method=True)
+        self.AddTableParticipant = channel.unary_unary(
+                '/chefshat.v1.TournamentService/AddTableParticipant',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantResponse.FromString,
+                _registered_method=True)
+        self.GetPhysicalTable = channel.unary_unary(
+                '/chefshat.v1.TournamentService/GetPhysicalTable',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableResponse.FromString,
+                _registered_method=True)
         self.StartTournament = channel.unary_unary(
                 '/chefshat.v1.TournamentService/StartTournament',
                 request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.StartTournamentRequest.SerializeToString,
@@ -124,6 +134,27 @@ class TournamentServiceServicer:
         (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
         TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
         NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def AddTableParticipant(self, request, context):
+        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
+        does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
+        and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
+        FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def GetPhysicalTable(self, request, context):
+        """Returns what the organiser needs for a physical game in progress: the table's ticket for an
+        attendant or a camera. The same at each call, also after a restart of the server, as long as the
+        game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+        (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -203,6 +234,16 @@ def add_TournamentServiceServicer_to_server(servicer, server):
                     servicer.JoinTournament,
                     request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentResponse.SerializeToString,
+            ),
+            'AddTableParticipant': grpc.unary_unary_rpc_method_handler(
+                    servicer.AddTableParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantResponse.SerializeToString,
+            ),
+            'GetPhysicalTable': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetPhysicalTable,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableResponse.SerializeToString,
             ),
             'StartTournament': grpc.unary_unary_rpc_method_handler(
                     servicer.StartTournament,
@@ -344,6 +385,60 @@ class TournamentService:
             '/chefshat.v1.TournamentService/JoinTournament',
             chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentRequest.SerializeToString,
             chefshat_dot_v1_dot_tournament__service__pb2.JoinTournamentResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def AddTableParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/AddTableParticipant',
+            chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.AddTableParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetPhysicalTable(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/GetPhysicalTable',
+            chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.GetPhysicalTableResponse.FromString,
             options,
             channel_credentials,
             insecure,

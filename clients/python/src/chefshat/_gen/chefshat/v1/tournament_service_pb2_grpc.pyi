@@ -55,6 +55,19 @@ class TournamentServiceStub:
     TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
     NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
+    AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
+    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
+    does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
+    and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
+    FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
+    (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    GetPhysicalTable: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]
+    """Returns what the organiser needs for a physical game in progress: the table's ticket for an
+    attendant or a camera. The same at each call, also after a restart of the server, as long as the
+    game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+    (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
+    """
     StartTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]
     """Starts it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
     TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
@@ -110,6 +123,19 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
     TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
     NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
+    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
+    does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
+    and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
+    FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
+    (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    GetPhysicalTable: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]  # type: ignore[assignment]
+    """Returns what the organiser needs for a physical game in progress: the table's ticket for an
+    attendant or a camera. The same at each call, also after a restart of the server, as long as the
+    game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+    (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
     """
     StartTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]  # type: ignore[assignment]
     """Starts it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
@@ -187,6 +213,31 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
         TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
         NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def AddTableParticipant(
+        self,
+        request: _tournament_service_pb2.AddTableParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.AddTableParticipantResponse, _abc.Awaitable[_tournament_service_pb2.AddTableParticipantResponse]]:
+        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
+        does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
+        and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
+        FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def GetPhysicalTable(
+        self,
+        request: _tournament_service_pb2.GetPhysicalTableRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.GetPhysicalTableResponse, _abc.Awaitable[_tournament_service_pb2.GetPhysicalTableResponse]]:
+        """Returns what the organiser needs for a physical game in progress: the table's ticket for an
+        attendant or a camera. The same at each call, also after a restart of the server, as long as the
+        game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+        (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
         """
 
     @_abc_1.abstractmethod
