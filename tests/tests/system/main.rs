@@ -25,6 +25,7 @@ mod tmux;
 mod tournament_agents;
 mod tournament_deals;
 mod tournament_refusals;
+mod tournament_tables;
 mod tournaments;
 mod vector_columns;
 mod vectors;

@@ -92,6 +92,7 @@ async fn persons_at_a_table_play_with_agents_and_the_record_is_their_game() {
     let at_table = BySeat::from_fn(4, |seat| seat == ADA || seat == BO);
     let mut bridge = Bridge::attach(
         &client,
+        &room.room_id,
         created.table_ticket,
         rules,
         Seed([5; 32]),

@@ -1,11 +1,12 @@
 //! A physical table over a real socket: a simulated one plays the truth with the rule engine, and a
 //! bridge reports it.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use chefshat_client::{Client, TableFollower};
-use chefshat_engine::{Action, ActionId, BySeat, Face, RuleSet, Seat, Seed};
-use chefshat_proto::v1::{self, record_line::Line, table_report};
+use chefshat_client::{Client, Error, Spectator, TableFollower};
+use chefshat_engine::{Action, ActionId, BySeat, DecisionKind, Face, RuleSet, Seat, Seed};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, table_report};
 use chefshat_record::convert::{final_table, seat_number};
 use chefshat_record::replay;
 use chefshat_referee::{Report, Stage};
@@ -19,6 +20,11 @@ pub(crate) struct Bridge {
     client: Client,
     pub(crate) ticket: String,
     pub(crate) follower: TableFollower,
+    events: Spectator,
+    /// Turns of remote seats that the truth has not followed yet, with the numbers of their events.
+    turns: VecDeque<(u64, ActionId)>,
+    /// Corrections whose events have not been read.
+    corrections: u32,
     real: RealTable,
     deck: Deck,
     at_table: BySeat<bool>,
@@ -27,10 +33,11 @@ pub(crate) struct Bridge {
 }
 
 impl Bridge {
-    /// Attaches to the table with this ticket, at which these seats play a game dealt from `seed`,
-    /// and waits for its state.
+    /// Attaches to the table of a room with its ticket, at which these seats play a game dealt from
+    /// `seed`, and waits for its state.
     pub(crate) async fn attach(
         client: &Client,
+        room_id: &str,
         ticket: String,
         rules: RuleSet,
         seed: Seed,
@@ -38,6 +45,9 @@ impl Bridge {
     ) -> Self {
         let mut bridge = Self {
             follower: client.follow_table(&ticket),
+            events: client.spectate(room_id, 0),
+            turns: VecDeque::new(),
+            corrections: 0,
             ticket,
             client: client.clone(),
             real: RealTable::new(rules, seed, at_table),
@@ -61,11 +71,15 @@ impl Bridge {
     }
 
     pub(crate) async fn send(&mut self, report: v1::TableReport) -> v1::ReportResponse {
-        let response = self.client.report(&self.ticket, report).await;
-        let response = response.expect("the report is taken");
+        let response = self.try_send(report).await;
+        response.expect("the report is taken")
+    }
+
+    async fn try_send(&mut self, report: v1::TableReport) -> Result<v1::ReportResponse, Error> {
+        let response = self.client.report(&self.ticket, report).await?;
         self.state = response.state.clone().expect("a state");
         self.reports += 1;
-        response
+        Ok(response)
     }
 
     async fn accepted(&mut self, report: Report) {
@@ -112,7 +126,58 @@ impl Bridge {
         }
     }
 
-    /// Lays the cards of remote seats, and lets the truth follow them.
+    /// Whether remote seats have taken turns that the truth has not followed.
+    fn is_behind(&self) -> bool {
+        let Some(open) = self.real.truth.decision() else {
+            return false;
+        };
+        let shift = (self.state.observation.as_ref()).map_or(0, |observation| observation.shift);
+        // A Shift whose hands are reported has no turns yet.
+        let dealt = matches!(self.stage(), Stage::Hand(_)) && self.real.truth.shift() == shift;
+        open.kind == DecisionKind::Turn && !self.at_table[open.seat] && !dealt
+    }
+
+    /// Lets the truth follow the turns of remote seats. Not all of them are laid: passes need not be
+    /// shown once another seat has acted.
+    async fn follow(&mut self) {
+        // First, because it makes some of the turns void.
+        while self.corrections > 0 {
+            self.read_event().await;
+        }
+        while self.is_behind() {
+            match self.turns.pop_front() {
+                Some((_, action)) => self.real.decide(action),
+                None => self.read_event().await,
+            }
+        }
+    }
+
+    async fn read_event(&mut self) {
+        let event = patiently("an event", self.events.next()).await;
+        let event = event.expect("spectators are admitted");
+        let event = event.expect("the game is not over");
+        let actions = self.real.truth.rules().actions();
+        let (seat, action) = match event.kind {
+            Some(Kind::Play(play)) => {
+                let action = ActionId::new(u16::try_from(play.action).expect("an action"));
+                (play.seat, Some(action))
+            }
+            Some(Kind::Pass(pass)) => (pass.seat, actions.encode(Action::Pass)),
+            Some(Kind::Correction(correction)) => {
+                self.corrections -= 1;
+                if correction.first_void > 0 {
+                    (self.turns).retain(|(number, _)| *number < correction.first_void);
+                }
+                return;
+            }
+            _ => return,
+        };
+        if !self.at_table[Seat::new(seat as usize)] {
+            (self.turns).extend(action.map(|action| (event.sequence, action)));
+        }
+    }
+
+    /// Lays the cards of remote seats. The truth follows their gifts.
     async fn lay(&mut self) -> bool {
         let Some(decided) = self.state.to_lay.first().cloned() else {
             return false;
@@ -141,42 +206,30 @@ impl Bridge {
                     cards: seen,
                 })
             }
-            _ if cards.is_empty() => {
-                self.pass_until(seat);
-                self.decide(Action::Pass);
-                table_report::Kind::Pass(v1::PassShown {
-                    seat: Some(decided.seat),
-                })
-            }
-            _ => {
-                self.pass_until(seat);
-                self.decide(play(&cards));
-                table_report::Kind::Laid(v1::CardsLaid {
-                    seat: Some(decided.seat),
-                    cards: seen,
-                })
-            }
+            _ if cards.is_empty() => table_report::Kind::Pass(v1::PassShown {
+                seat: Some(decided.seat),
+            }),
+            _ => table_report::Kind::Laid(v1::CardsLaid {
+                seat: Some(decided.seat),
+                cards: seen,
+            }),
         };
-        let response = self
-            .send(v1::TableReport {
-                kind: Some(kind),
-                ..v1::TableReport::default()
-            })
-            .await;
-        assert_eq!(
-            response.verdict(),
-            v1::ReportVerdict::Accepted,
-            "{}",
-            decided.text
-        );
-        true
-    }
-
-    /// Passes of remote seats need not be shown once another seat has acted.
-    fn pass_until(&mut self, seat: Seat) {
-        while (self.real.truth.decision()).is_some_and(|open| open.seat != seat) {
-            self.decide(Action::Pass);
+        let report = v1::TableReport {
+            kind: Some(kind),
+            ..v1::TableReport::default()
+        };
+        match self.try_send(report).await {
+            Ok(response) => assert_eq!(
+                response.verdict(),
+                v1::ReportVerdict::Accepted,
+                "{}",
+                decided.text
+            ),
+            // Another remote seat has ended the game.
+            Err(error) if error.reason() == Some("GAME_OVER") => self.next_state().await,
+            Err(error) => panic!("{}: {error}", decided.text),
         }
+        true
     }
 
     fn decide(&mut self, action: Action) {
@@ -189,6 +242,7 @@ impl Bridge {
     pub(crate) async fn until(&mut self, mut done: impl FnMut(&Self) -> bool) {
         loop {
             if self.state.stage() == v1::TableStage::Over {
+                self.follow().await;
                 return;
             }
             if self.lay().await {
@@ -201,6 +255,7 @@ impl Bridge {
             if done(self) {
                 return;
             }
+            self.follow().await;
             let report = self.real.next_report(self.stage()).expect("the table acts");
             self.accepted(report).await;
         }
@@ -209,6 +264,7 @@ impl Bridge {
     /// Reports a play with cards of the next lower face, and corrects it. Returns whether the next
     /// report of the table was such a play; it is made in any case.
     pub(crate) async fn misread(&mut self) -> bool {
+        self.follow().await;
         let right = self.real.next_report(self.stage()).expect("the table acts");
         let wrong = match &right {
             Report::Laid { seat, cards } => {
@@ -234,6 +290,7 @@ impl Bridge {
             instead: Some(Box::new(right)),
         };
         self.accepted(correction).await;
+        self.corrections += 1;
         true
     }
 
@@ -275,18 +332,4 @@ fn decisions(lines: &[v1::RecordLine]) -> Vec<(u32, u32)> {
 
 fn face(card: u32) -> Option<Face> {
     Face::new(u8::try_from(card).ok()?).filter(|face| face.get() <= 11)
-}
-
-/// The play that cards on the board are.
-fn play(cards: &[u32]) -> Action {
-    let faces: Vec<Face> = cards.iter().filter_map(|card| face(*card)).collect();
-    let jokers = u8::try_from(cards.len() - faces.len()).expect("few");
-    match faces.first() {
-        Some(face) => Action::Play {
-            face: *face,
-            quantity: u8::try_from(faces.len()).expect("few"),
-            jokers,
-        },
-        None => Action::LoneJoker,
-    }
 }
