@@ -30,6 +30,7 @@ mod rules_args;
 mod secret_file;
 mod serve;
 mod simulate;
+mod table;
 mod threads;
 mod tournament;
 mod tui;
@@ -74,6 +75,8 @@ enum Command {
     Watch(tui::watch::Watch),
     /// Create, list, watch and close rooms of a server.
     Room(room::RoomCommand),
+    /// Attend to a table with real cards: see what it waits for, and report what happens.
+    Table(table::TableCommand),
     /// Create, join and follow tournaments, and show their results.
     Tournament(tournament::TournamentCommand),
     /// Show the ratings of a server's participants.
@@ -113,6 +116,7 @@ fn main() -> ExitCode {
         Command::Watch(command) => in_runtime(command.run()),
         Command::CheckAgent(command) => in_runtime(command.run()),
         Command::Room(command) => in_runtime(command.run()),
+        Command::Table(command) => in_runtime(command.run()),
         Command::Tournament(command) => in_runtime(command.run()),
         Command::Leaderboard(command) => in_runtime(command.run()),
         Command::Records(command) => in_runtime(command.run()),

@@ -1,0 +1,200 @@
+//! `chefshat table`: an attendant in a terminal, or a script. Shows every state of the table, and
+//! reports what is typed.
+
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::process::ExitCode;
+use std::thread;
+
+use chefshat_client::{Client, Error, TableFollower, v1};
+use clap::Args;
+use tokio::sync::mpsc;
+
+use super::super::CommandError;
+use super::args::TableArgs;
+use super::display::Display;
+use super::line::{self, Command};
+
+/// Refusals of a report after which others can be made.
+const PASSING: [&str; 4] = [
+    "REPORT_REFUSED",
+    "GAME_NOT_STARTED",
+    "TOO_MANY_REPORTS",
+    "TOO_MANY_QUESTIONS",
+];
+
+/// Attend to the table.
+#[derive(Debug, Args)]
+pub(super) struct Attend {
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl Attend {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let (client, mut follower) = self.table.connect().await?;
+        let display = Display::new(self.table.json);
+        let first = follower.next().await?;
+        let mut attendant = Attendant {
+            client,
+            ticket: self.table.ticket,
+            state: v1::TableState::default(),
+            display,
+        };
+        attendant.see(first.ok_or("the game is over")?)?;
+        attendant.attend(follower).await?;
+        let room = attendant.state.room.unwrap_or_default();
+        Ok(match room.state() {
+            v1::RoomState::Aborted => ExitCode::FAILURE,
+            _ => ExitCode::SUCCESS,
+        })
+    }
+}
+
+/// An attendant who reports to a table.
+struct Attendant {
+    client: Client,
+    ticket: String,
+    state: v1::TableState,
+    display: Display,
+}
+
+impl Attendant {
+    /// Shows states and reports lines until the game or the input is over.
+    async fn attend(&mut self, mut follower: TableFollower) -> Result<(), CommandError> {
+        let mut lines = typed_lines();
+        let prompts = io::stdin().is_terminal() && io::stdout().is_terminal();
+        let mut waits = false;
+        while self.state.stage() != v1::TableStage::Over {
+            waits &= !needs_a_report(&self.state);
+            if prompts && !waits {
+                prompt()?;
+            }
+            tokio::select! {
+                biased;
+                state = follower.next() => match state? {
+                    Some(state) => self.see(state)?,
+                    None => break,
+                },
+                line = lines.recv(), if !waits => {
+                    let Some(line) = line.transpose()? else { break };
+                    match line::parse(&line, &self.state) {
+                        Ok(Command::Report(kind)) => self.report(&line, kind).await?,
+                        Ok(Command::Help) => self.display.help()?,
+                        Ok(Command::State) => self.display.state_again(&self.state)?,
+                        Ok(Command::Wait) => waits = true,
+                        Ok(Command::Nothing) => {}
+                        Ok(Command::Quit) => break,
+                        Err(problem) => self.display.problem(&line, &problem)?,
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Shows a state, if it is newer than the last one.
+    fn see(&mut self, state: v1::TableState) -> Result<(), CommandError> {
+        if state.version > self.state.version {
+            self.display.state(&state)?;
+            self.state = state;
+        }
+        Ok(())
+    }
+
+    async fn report(
+        &mut self,
+        line: &str,
+        kind: v1::table_report::Kind,
+    ) -> Result<(), CommandError> {
+        let report = line::by_attendant(kind);
+        match self.client.report(&self.ticket, report).await {
+            Ok(response) => {
+                self.display.verdict(line, &response)?;
+                self.see(response.state.unwrap_or_default())
+            }
+            Err(error) if is_passing(&error) => self.display.problem(line, error.message()),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+fn is_passing(error: &Error) -> bool {
+    (error.reason()).is_some_and(|reason| PASSING.contains(&reason))
+}
+
+/// Whether the table waits for a report, not for the decision of a remote seat.
+fn needs_a_report(state: &v1::TableState) -> bool {
+    let at_table = |seat: u32| {
+        let seat = usize::try_from(seat).ok();
+        seat.and_then(|seat| state.seats.get(seat))
+            .is_some_and(|seat| seat.at_table)
+    };
+    match state.stage() {
+        _ if !state.to_lay.is_empty() || !state.questions.is_empty() => true,
+        v1::TableStage::Waiting => false,
+        v1::TableStage::Turn | v1::TableStage::Gift | v1::TableStage::SpecialAction => {
+            state.seat.is_none_or(at_table)
+        }
+        _ => true,
+    }
+}
+
+fn prompt() -> Result<(), CommandError> {
+    let mut out = io::stdout();
+    write!(out, "> ")?;
+    Ok(out.flush()?)
+}
+
+/// The lines of the input. A thread reads them, which does not keep the process from ending.
+fn typed_lines() -> mpsc::Receiver<io::Result<String>> {
+    let (sender, receiver) = mpsc::channel(1);
+    thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            if sender.blocking_send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decisions_of_remote_seats_are_waited_for() {
+        use v1::TableStage::{Gift, Hand, Opening, Over, Question, SpecialAction, Turn, Waiting};
+        let state = |stage: v1::TableStage, seat| v1::TableState {
+            stage: stage.into(),
+            seat,
+            seats: [true, false]
+                .map(|at_table| v1::TableSeat {
+                    at_table,
+                    hand_known: false,
+                })
+                .to_vec(),
+            ..v1::TableState::default()
+        };
+        for (stage, seat, expected) in [
+            (Waiting, None, false),
+            (Hand, Some(1), true),
+            (SpecialAction, None, true),
+            (SpecialAction, Some(1), false),
+            (Gift, Some(0), true),
+            (Gift, Some(1), false),
+            (Opening, None, true),
+            (Turn, Some(0), true),
+            (Turn, Some(1), false),
+            (Question, None, true),
+            (Over, None, true),
+        ] {
+            assert_eq!(needs_a_report(&state(stage, seat)), expected, "{stage:?}");
+        }
+        let decided = v1::TableState {
+            to_lay: vec![v1::CardsToLay::default()],
+            ..state(Turn, Some(1))
+        };
+        assert!(needs_a_report(&decided));
+    }
+}

@@ -1,0 +1,101 @@
+//! What is printed about a physical table: text for people, or JSON lines.
+
+use std::io::Write as _;
+
+use chefshat_client::v1;
+use serde_json::{Value, json};
+
+use super::super::{CommandError, say};
+use super::line;
+use super::words::{state_in_words, verdict_in_words};
+
+/// Prints states, verdicts and problems.
+pub(super) struct Display {
+    json: bool,
+    /// The last text of a state, which is not repeated.
+    shown: String,
+}
+
+impl Display {
+    pub(super) fn new(json: bool) -> Self {
+        Self {
+            json,
+            shown: String::new(),
+        }
+    }
+
+    /// Prints a state, as text only if it differs from the last one.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub(super) fn state(&mut self, state: &v1::TableState) -> Result<(), CommandError> {
+        if self.json {
+            return say(json!({"event": "state", "state": state}));
+        }
+        let text = state_in_words(state);
+        if text == self.shown {
+            return Ok(());
+        }
+        print(&text)?;
+        self.shown = text;
+        Ok(())
+    }
+
+    /// Prints the last state again.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub(super) fn state_again(&mut self, state: &v1::TableState) -> Result<(), CommandError> {
+        self.shown.clear();
+        self.state(state)
+    }
+
+    /// Prints the verdict on what a line reported.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub(super) fn verdict(
+        &self,
+        line: &str,
+        response: &v1::ReportResponse,
+    ) -> Result<(), CommandError> {
+        if !self.json {
+            return print(&verdict_in_words(response));
+        }
+        let mut value = serde_json::to_value(response)?;
+        // The state has a line of its own.
+        if let Value::Object(fields) = &mut value {
+            fields.remove("state");
+        }
+        say(json!({"event": "verdict", "line": line, "response": value}))
+    }
+
+    /// Prints why a line was not reported.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub(super) fn problem(&self, line: &str, problem: &str) -> Result<(), CommandError> {
+        match self.json {
+            true => say(json!({"event": "problem", "line": line, "message": problem})),
+            false => say(problem),
+        }
+    }
+
+    /// Prints what can be typed.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub(super) fn help(&self) -> Result<(), CommandError> {
+        match self.json {
+            true => say(json!({"event": "help", "text": line::HELP})),
+            false => say(line::HELP),
+        }
+    }
+}
+
+/// Prints lines; the stream strips the escape codes if needed.
+fn print(text: &str) -> Result<(), CommandError> {
+    let mut out = anstream::stdout();
+    out.write_all(text.as_bytes())?;
+    Ok(out.flush()?)
+}
