@@ -5,12 +5,12 @@ use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 use std::thread;
 
-use chefshat_client::{Client, Error, TableFollower, v1};
-use clap::Args;
+use chefshat_client::v1::{self, table_report::Kind};
+use chefshat_client::{Error, TableFollower};
 use tokio::sync::mpsc;
 
 use super::super::CommandError;
-use super::args::TableArgs;
+use super::args::{Table, TableArgs};
 use super::display::Display;
 use super::line::{self, Command};
 
@@ -22,38 +22,29 @@ const PASSING: [&str; 4] = [
     "TOO_MANY_QUESTIONS",
 ];
 
-/// Attend to the table.
-#[derive(Debug, Args)]
-pub(super) struct Attend {
-    #[command(flatten)]
-    table: TableArgs,
-}
-
-impl Attend {
-    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (client, mut follower) = self.table.connect().await?;
-        let display = Display::new(self.table.json);
-        let first = follower.next().await?;
-        let mut attendant = Attendant {
-            client,
-            ticket: self.table.ticket,
-            state: v1::TableState::default(),
-            display,
-        };
-        attendant.see(first.ok_or("the game is over")?)?;
-        attendant.attend(follower).await?;
-        let room = attendant.state.room.unwrap_or_default();
-        Ok(match room.state() {
-            v1::RoomState::Aborted => ExitCode::FAILURE,
-            _ => ExitCode::SUCCESS,
-        })
-    }
+/// Attends to a table until the game or the input is over.
+pub(super) async fn attend(arguments: TableArgs) -> Result<ExitCode, CommandError> {
+    let display = Display::new(arguments.json);
+    let table = arguments.connect().await?;
+    let mut follower = table.follow();
+    let mut attendant = Attendant {
+        table,
+        state: v1::TableState::default(),
+        display,
+    };
+    let first = follower.next().await?;
+    attendant.see(first.ok_or("the game is over")?)?;
+    attendant.attend(follower).await?;
+    let room = attendant.state.room.unwrap_or_default();
+    Ok(match room.state() {
+        v1::RoomState::Aborted => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
+    })
 }
 
 /// An attendant who reports to a table.
 struct Attendant {
-    client: Client,
-    ticket: String,
+    table: Table,
     state: v1::TableState,
     display: Display,
 }
@@ -101,13 +92,8 @@ impl Attendant {
         Ok(())
     }
 
-    async fn report(
-        &mut self,
-        line: &str,
-        kind: v1::table_report::Kind,
-    ) -> Result<(), CommandError> {
-        let report = line::by_attendant(kind);
-        match self.client.report(&self.ticket, report).await {
+    async fn report(&mut self, line: &str, kind: Kind) -> Result<(), CommandError> {
+        match self.table.report(kind).await {
             Ok(response) => {
                 self.display.verdict(line, &response)?;
                 self.see(response.state.unwrap_or_default())

@@ -61,15 +61,6 @@ pub(super) fn parse(line: &str, state: &v1::TableState) -> Result<Command, Strin
     })
 }
 
-/// What an attendant reports.
-pub(super) fn by_attendant(kind: Kind) -> v1::TableReport {
-    v1::TableReport {
-        source: v1::ReportSource::Attendant.into(),
-        kind: Some(kind),
-        ..v1::TableReport::default()
-    }
-}
-
 /// The words of one table: its seats and its deck.
 struct Grammar<'a> {
     state: &'a v1::TableState,

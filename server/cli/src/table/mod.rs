@@ -30,7 +30,7 @@ pub(super) struct TableCommand {
     #[command(subcommand)]
     action: Option<TableAction>,
     #[command(flatten)]
-    attend: Option<attend::Attend>,
+    table: args::TableArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -41,10 +41,36 @@ enum TableAction {
 
 impl TableCommand {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        match (self.action, self.attend) {
-            (Some(TableAction::Report(command)), _) => command.run().await,
-            (None, Some(attend)) => attend.run().await,
-            (None, None) => Err("give the table's --ticket".into()),
+        match self.action {
+            Some(TableAction::Report(command)) => command.run().await,
+            None => attend::attend(self.table).await,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        table: TableCommand,
+    }
+
+    #[test]
+    fn the_ticket_stands_with_or_without_a_report() {
+        let parse = |words: &[&str]| {
+            let words = std::iter::once(&"test").chain(words);
+            Only::try_parse_from(words).map(|it| it.table)
+        };
+        let attends = parse(&["--ticket", "T"]).expect("attends");
+        assert_eq!(attends.table.ticket.as_deref(), Some("T"));
+        let reports = parse(&["report", "--ticket", "T", "pass"]).expect("reports");
+        assert!(matches!(reports.action, Some(TableAction::Report(_))));
+        assert!(parse(&[]).is_err());
+        assert!(parse(&["report", "pass"]).is_err());
     }
 }

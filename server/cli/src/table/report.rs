@@ -30,18 +30,18 @@ pub(super) struct Report {
 
 impl Report {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (client, mut follower) = self.table.connect().await?;
-        let state = follower.next().await?.ok_or("the game is over")?;
+        let mut display = Display::new(self.table.json);
+        let json = self.table.json;
+        let table = self.table.connect().await?;
+        let state = table.follow().next().await?.ok_or("the game is over")?;
         let kind = match line::parse(&self.line, &state)? {
             Command::Report(kind) => kind,
             _ => return Err("say what happened, for example 'Ada: 7 7 joker'".into()),
         };
-        let report = line::by_attendant(kind);
-        let response = client.report(&self.table.ticket, report).await?;
-        let mut display = Display::new(self.table.json);
+        let response = table.report(kind).await?;
         display.verdict(&self.line, &response)?;
-        if self.table.json {
-            display.state(&response.state.clone().unwrap_or_default())?;
+        if json && let Some(state) = &response.state {
+            display.state(state)?;
         }
         Ok(match response.verdict() {
             v1::ReportVerdict::Violation => ExitCode::FAILURE,
