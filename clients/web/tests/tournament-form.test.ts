@@ -45,6 +45,14 @@ test("built-in agents are listed as often as they take part", () => {
   expect(settings.startWhenJoined).toBe(5);
 });
 
+test("with physical tables the holder of the Golden card opens", () => {
+  const tables = { physicalTables: "2", opening: "anyTopFace" } as const;
+  expect(asked(tables).physicalTables).toBe(2);
+  expect(problemsOf(form(tables))).toEqual({ opening: "realOpening" });
+  expect(problemsOf(form({ ...tables, opening: "golden" }))).toEqual({});
+  expect(problemsOf(form({ ...tables, physicalTables: "0" }))).toEqual({});
+});
+
 test("kinds, clocks and seeds are sent as picked and typed", () => {
   const settings = asked({
     robots: false,

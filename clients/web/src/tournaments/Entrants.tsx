@@ -28,10 +28,11 @@ export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
   const shown = large ? participants.slice(-ON_WALL) : participants;
   return (
     <ul class={css.entrants} data-part="entrants">
-      {shown.map(({ participant, kind, builtInAgent, connected }) => (
+      {shown.map(({ participant, kind, builtInAgent, connected, atTable }) => (
         <li key={participant} aria-current={participant === mine || undefined}>
           <PersonName name={nameOf(tournament, participant)} builtIn={builtInAgent} linked={!large} />
           <KindBadge kind={kind} builtIn={builtInAgent} />
+          {atTable && <span class="soft small">{t().attend.seats.atTable}</span>}
           {!connected && <span class="soft small">{words.away}</span>}
         </li>
       ))}

@@ -28,7 +28,8 @@ export function NewTournament() {
 }
 
 function problemWords(problem: Problem): string {
-  const own: Partial<Record<string, string>> = t().organise.problems;
+  const { realOpening } = t().lobby.make;
+  const own: Partial<Record<string, string>> = { ...t().organise.problems, realOpening };
   return (typeof problem === "string" && own[problem]) || wordsOfProblem(problem as NumberProblem);
 }
 

@@ -1,5 +1,5 @@
-// The organiser's part of a tournament's page: inviting, starting, attending to physical games,
-// closing.
+// The organiser's part of a tournament's page: inviting, adding those at physical tables, starting,
+// attending to physical games, closing.
 
 import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
@@ -9,6 +9,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
+import { AddAtTable } from "./AddAtTable";
 import type { LiveTournament } from "./following";
 import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
 import { PhysicalGames } from "./PhysicalGames";
@@ -32,6 +33,7 @@ export function Organiser({ live: { tournament, games } }: { live: LiveTournamen
         <p class="soft small">{words.text}</p>
       </header>
       {open && <Begin tournament={tournament} />}
+      {open && tournament.settings?.physicalTables ? <AddAtTable tournamentId={tournamentId} /> : null}
       {open && (
         <>
           <Invite

@@ -122,6 +122,7 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
       </fieldset>
       <div class={formCss.fields}>
         <Typed {...props} name="maxParticipants" label={words.maxParticipants} hint={words.maxParticipantsHint} />
+        <Typed {...props} name="physicalTables" label={words.physicalTables} hint={words.physicalTablesHint} />
       </div>
     </>
   );

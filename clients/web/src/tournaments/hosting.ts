@@ -4,6 +4,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { keepTableTicket } from "../attend/ticket";
+import type { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
@@ -41,6 +42,12 @@ export async function startTournament(tournamentId: string): Promise<void> {
 /** Closes a tournament that this device created; running games are aborted. */
 export async function closeTournament(tournamentId: string): Promise<void> {
   await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Adds a participant at a physical table to a tournament that this device created. */
+export async function addAtTable(tournamentId: string, name: string, kind: ParticipantKind): Promise<void> {
+  const request = { ...ownership(tournamentId), name: name.trim(), kind };
+  await tournamentApi.addTableParticipant(request, { timeoutMs: CALL_LIMIT_MS });
 }
 
 /** Stores the ticket of the table of a physical game in progress on this device; returns its room. */

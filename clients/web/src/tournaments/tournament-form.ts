@@ -32,6 +32,7 @@ export interface TournamentForm extends GameForm {
   agents: boolean;
   robots: boolean;
   maxParticipants: string;
+  physicalTables: string;
   start: "byHand" | "joined";
   startWhen: string;
   noShowSeconds: string;
@@ -52,7 +53,7 @@ export type TournamentField = keyof TournamentForm;
 
 /** Why a field is invalid. */
 export type Problem = NumberProblem | OwnProblem;
-export type OwnProblem = "nameMissing" | "tooMany" | "nobody" | "notASeed";
+export type OwnProblem = "nameMissing" | "tooMany" | "nobody" | "notASeed" | "realOpening";
 
 /** Most participants of a tournament in the protocol. */
 const MAX_PARTICIPANTS = 1024;
@@ -72,6 +73,7 @@ export function newTournament(agents: readonly string[]): TournamentForm {
     agents: true,
     robots: true,
     maxParticipants: "64",
+    physicalTables: "0",
     start: "byHand",
     startWhen: "8",
     noShowSeconds: "60",
@@ -116,6 +118,7 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   const whole: [TournamentField, Bounds][] = [
     ["gamesPerPairing", [1, 1000]],
     ["maxParticipants", [2, MAX_PARTICIPANTS]],
+    ["physicalTables", [0, 64]],
     ["maxCalls", [1, 10]],
     ["maxParallel", [1, 256]],
   ];
@@ -130,6 +133,7 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   else if (builtIns(form) > MAX_PARTICIPANTS) problems.builtIn = "tooMany";
   for (const seed of ["drawSeed", "dealSeed"] as const)
     if (form[seed].trim() !== "" && !/^[0-9a-f]{64}$/i.test(form[seed].trim())) problems[seed] = "notASeed";
+  if (Number(form.physicalTables) > 0 && form.opening !== "golden") problems.opening = "realOpening";
   if (!form.people && !form.agents && !form.robots) problems.people = "nobody";
   if (form.name.trim() === "") problems.name = "nameMissing";
   return problemsAlone(problems);
@@ -171,6 +175,7 @@ export function settingsOf(form: TournamentForm): MessageInitShape<typeof Tourna
     deals: DEALS[form.deals],
     kinds: kindsOf(form),
     maxParticipants: Number(form.maxParticipants),
+    physicalTables: Number(form.physicalTables),
     builtInAgents: Object.entries(form.builtIn).flatMap(([agent, count]) => Array<string>(Number(count)).fill(agent)),
     startWhenJoined: joined,
     noShowTimeMs: milliseconds(form.noShowSeconds),
@@ -193,11 +198,13 @@ export const TOURNAMENT_FIELDS: Record<string, TournamentField> = {
   games_per_pairing: "gamesPerPairing",
   deals: "deals",
   max_participants: "maxParticipants",
+  physical_tables: "physicalTables",
   built_in_agents: "builtIn",
   start_when_joined: "startWhen",
   no_show_time_ms: "noShowSeconds",
   max_calls: "maxCalls",
   max_parallel_games: "maxParallel",
+  deal_seed: "dealSeed",
 };
 
 const FORMATS = {

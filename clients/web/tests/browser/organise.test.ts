@@ -57,6 +57,39 @@ test("a tournament is created, joined from another browser, filled up, started a
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
+test("the organiser adds a person at a physical table, and attends to the game there", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/tournaments/new`);
+  await page.getByLabel("Name of the tournament").fill("Mixed cup");
+  await page.getByRole("radio", { name: "Swiss" }).check();
+  await page.getByLabel("Rounds", { exact: true }).fill("1");
+  await page.getByLabel("greedy", { exact: true }).fill("3");
+  await page.getByLabel("Physical tables").fill("1");
+  await page.getByRole("button", { name: "Create the tournament" }).click();
+  const table = page.locator('[data-part~="add-at-table"]');
+  const entrants = page.locator('[data-part~="entrants"] li');
+  for (const name of ["", "Ada"]) {
+    await table.getByLabel("Name").fill(name);
+    await table.getByRole("button", { name: "Add" }).click();
+    if (name === "") await table.getByText("Enter a name.").waitFor();
+  }
+  await entrants.filter({ hasText: "Ada" }).getByText("at the table").waitFor();
+  // The form is ready for the next one, and says what is wrong with a name.
+  await table.getByLabel("Name").fill("Ada");
+  await table.getByRole("button", { name: "Add" }).click();
+  await table.getByText("Someone else already has this name.").waitFor();
+  await page.getByRole("button", { name: "Start the tournament" }).click();
+
+  const game = page.locator('[data-part~="physical-games"]');
+  await game.getByText("Round 1, Table 1, game 1").waitFor();
+  await game.getByText("Ada").waitFor();
+  await game.getByRole("button", { name: "Attend to the table" }).click();
+  await page.waitForURL(/\/rooms\/\w+\/table$/);
+  await page.getByText("Mixed cup · round 1, table 1, game 1").waitFor();
+  await page.locator('[data-part~="awaited-heading"]').waitFor();
+  expect(faults).toEqual([]);
+});
+
 test("invalid fields are marked, by the page and by the server", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);

@@ -32,6 +32,8 @@ export const organise = {
   kind: { people: "People", agents: "Agents", robots: "Robots" },
   maxParticipants: "Maximum number of participants",
   maxParticipantsHint: "2 to 1024, including built-in agents",
+  physicalTables: "Physical tables",
+  physicalTablesHint: "For those who play with real cards, whom you add before the start; 0 for none",
   filler: "Filler agent",
   fillerHint: "Completes a knockout or a table, and plays for participants who do not show up.",
   when: "When it starts",
@@ -96,6 +98,13 @@ export const organise = {
         one: `# agent “${filler}” is added to make ${field}.`,
         other: `# agents “${filler}” are added to make ${field}.`,
       }),
+    atTable: {
+      title: "Add participants at a table with real cards",
+      text: "Nobody connects for them. The attendant of the table reports what they do.",
+      name: "Name",
+      kind: "Who it is",
+      submit: "Add",
+    },
     tables: {
       title: "Games with real cards",
       text: "Attend to the table on this device. Its page also has the link for another device.",

@@ -34,6 +34,8 @@ export const organise: Texts["organise"] = {
   kind: { people: "Persone", agents: "Agenti", robots: "Robot" },
   maxParticipants: "Numero massimo di partecipanti",
   maxParticipantsHint: "Da 2 a 1024, compresi gli agenti integrati",
+  physicalTables: "Tavoli con carte vere",
+  physicalTablesHint: "Per chi gioca con carte vere: li aggiungi prima dell’inizio; 0 per nessuno",
   filler: "Agente di riserva",
   fillerHint: "Completa il tabellone o un tavolo, e gioca per chi non si presenta.",
   when: "Quando inizia",
@@ -99,6 +101,13 @@ export const organise: Texts["organise"] = {
         one: `Si aggiunge # agente «${filler}» per arrivare a ${field}.`,
         other: `Si aggiungono # agenti «${filler}» per arrivare a ${field}.`,
       }),
+    atTable: {
+      title: "Aggiungi chi gioca a un tavolo con carte vere",
+      text: "Nessuno si connette per loro: chi assiste al tavolo segnala che cosa fanno.",
+      name: "Nome",
+      kind: "Chi è",
+      submit: "Aggiungi",
+    },
     tables: {
       title: "Partite con carte vere",
       text: "Assisti al tavolo da questo dispositivo. La sua pagina ha anche il link per un altro dispositivo.",
