@@ -211,4 +211,8 @@ pub struct ToLay {
     pub cards: Cards,
     /// The receiver of a gift.
     pub receiver: Option<Seat>,
+    /// Number of the Shift, from 1.
+    pub shift: u32,
+    /// Number of the pizza in the Shift, from 1; 0 if it is no turn.
+    pub pizza: u32,
 }

@@ -510,6 +510,8 @@ fn to_lay_to_proto(it: &ToLay, text: String, deck: Deck) -> v1::CardsToLay {
         cards: Some(known_cards(it.cards, deck.faces)),
         text,
         receiver: it.receiver.map(seat_number),
+        shift: it.shift,
+        pizza: it.pizza,
     }
 }
 

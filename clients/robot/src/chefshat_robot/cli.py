@@ -54,6 +54,7 @@ COMMANDS = {
     "markers": Entry("markers", "lsl", "send the events of games as markers of Lab Streaming Layer"),
     "calibrate": Entry("vision.command_calibrate", "vision", "measure the lens of a camera"),
     "perceive": Entry("vision.command_perceive", "vision", "watch the table through a camera and print what happens"),
+    "rehearse": Entry("rehearse", "vision", "play a game at a synthetic table on a real server"),
     "table": Entry("synthetic.command", "vision", "write a video of a synthetic table, with the truth"),
     "print": Entry("printing.command", "print", "write the cards, the playing field and the calibration sheet as a PDF"),
 }

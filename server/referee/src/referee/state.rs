@@ -2,6 +2,7 @@
 
 use chefshat_engine::{
     Action, BySeat, Cards, Decision, DecisionKind, Face, Opening, RuleSet, Seat, SpecialAction,
+    Viewer,
 };
 
 use super::Referee;
@@ -240,6 +241,9 @@ impl Referee {
     }
 
     fn turns_to_lay(&self, shift: usize) -> Vec<ToLay> {
+        let number = shift_number(shift);
+        let now = self.game().observe(Viewer::Spectator);
+        let in_progress = (shift_number(self.shifts.len() - 1), now.pizza);
         let shift = &self.shifts[shift];
         let last_turn =
             (shift.entries.iter()).rposition(|entry| matches!(entry.act, Act::Turn(..)));
@@ -250,8 +254,9 @@ impl Referee {
                 Act::Special(seat, true) => (DecisionKind::SpecialAction, seat, Action::Declare),
                 _ => continue,
             };
-            // A pass needs no card on the table once somebody else has acted.
-            let done = entry.confirmed || (action == Action::Pass && last_turn != Some(index));
+            // A pass needs no card on the table once somebody else has acted or the pizza is over.
+            let shown = last_turn != Some(index) || (number, entry.pizza) != in_progress;
+            let done = entry.confirmed || (action == Action::Pass && shown);
             if self.remote[seat] && !done {
                 let opening = shift.turns().next() == Some((seat, action)) && list.is_empty();
                 list.extend(self.rules.actions().encode(action).map(|action_id| ToLay {
@@ -260,6 +265,11 @@ impl Referee {
                     action: action_id,
                     cards: cards_of_action(&self.rules, action, opening),
                     receiver: None,
+                    shift: number,
+                    pizza: match kind {
+                        DecisionKind::Turn => entry.pizza,
+                        _ => 0,
+                    },
                 }));
             }
         }
@@ -293,10 +303,17 @@ impl Referee {
                     action,
                     cards,
                     receiver: Some(receiver),
+                    shift: shift_number(self.shifts.len() - 1),
+                    pizza: 0,
                 })
             })
             .collect()
     }
+}
+
+/// The number of the Shift at this index.
+fn shift_number(index: usize) -> u32 {
+    u32::try_from(index + 1).unwrap_or(u32::MAX)
 }
 
 /// The rarest cards of a hand, which a forced giver gives (`docs/rules.md` §3.4).

@@ -857,6 +857,8 @@ class CardsToLay(_message.Message):
     CARDS_FIELD_NUMBER: _builtins.int
     TEXT_FIELD_NUMBER: _builtins.int
     RECEIVER_FIELD_NUMBER: _builtins.int
+    SHIFT_FIELD_NUMBER: _builtins.int
+    PIZZA_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
     kind: _decision_pb2.DecisionKind.ValueType
@@ -865,6 +867,12 @@ class CardsToLay(_message.Message):
     """For people: "Lay two 9s for Ada", "Show the pass card of Ada"."""
     receiver: _builtins.int
     """For a gift: the seat that receives it."""
+    shift: _builtins.int
+    """Number of the Shift, from 1."""
+    pizza: _builtins.int
+    """For a turn: number of the pizza in the Shift, from 1. Cards of an earlier pizza are cleared
+    before.
+    """
     @_builtins.property
     def cards(self) -> Global___SeenCards:
         """The cards to lay or to give, ascending; empty for a pass or a special action."""
@@ -877,10 +885,12 @@ class CardsToLay(_message.Message):
         cards: Global___SeenCards | None = ...,
         text: _builtins.str = ...,
         receiver: _builtins.int | None = ...,
+        shift: _builtins.int = ...,
+        pizza: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_receiver", b"_receiver", "cards", b"cards", "receiver", b"receiver"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_receiver", b"_receiver", "cards", b"cards", "kind", b"kind", "receiver", b"receiver", "seat", b"seat", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_receiver", b"_receiver", "cards", b"cards", "kind", b"kind", "pizza", b"pizza", "receiver", b"receiver", "seat", b"seat", "shift", b"shift", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__receiver: _TypeAlias = _typing.Literal["receiver"]  # noqa: Y015
     _WhichOneofArgType__receiver: _TypeAlias = _typing.Literal["_receiver", b"_receiver"]  # noqa: Y015

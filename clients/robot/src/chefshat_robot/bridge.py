@@ -1,0 +1,281 @@
+"""The bridge: reports what perception sees to the table of a physical room, and brings answers back.
+
+Perception is certain about cards and places; what they mean (whose turn, a play or an addition to one) is decided here and by the
+referee in the server. Nothing is guessed: what perception or the bridge cannot decide becomes a question of the table, which an
+attendant answers on the page, in the terminal, or by the robot's voice.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import aclosing
+from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias
+
+import cv2
+from chefshat import pb
+
+from chefshat_robot.deck import FACES, Card
+from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, FieldChanged, FieldState, Frame, Laid, Observed, Picture, TakenBack
+from chefshat_robot.vision import PassShown as PassSeen
+from chefshat_robot.vision import PassWithdrawn as PassGone
+from chefshat_robot.vision.perception import Perception
+
+LOG = logging.getLogger("chefshat_robot")
+MAX_PICTURE_BYTES = 32 * 1024
+"""The largest picture a question may have."""
+FACE_OPTIONS = (*range(1, FACES + 1), FACES + 1)
+"""The faces that a card may have, the joker last."""
+
+OnAnswer: TypeAlias = Callable[[int], Awaitable[None]]
+"""What is done with the index of the right option of a question."""
+
+_COUNTS = (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN, pb.REPORT_VERDICT_HELD)
+
+
+class Table(Protocol):
+    """The calls that a bridge makes, as `chefshat.aio.Client` has them."""
+
+    async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        """Reports something that happened."""
+
+    def watch_table(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
+        """Iterates over the states of the table."""
+
+
+def seen_cards(cards: list[Card]) -> pb.SeenCards:
+    """The cards as a report states them."""
+    return pb.SeenCards(cards=sorted(card.face for card in cards), golden=any(card.is_golden for card in cards))
+
+
+def face_name(face: int) -> str:
+    """How a question names a face: its number, or "Joker"."""
+    return "Joker" if face > FACES else str(face)
+
+
+@dataclass
+class _Play:
+    """The cards laid last, and the report of them: 0 if it does not count."""
+
+    cards: list[Card]
+    report: int
+
+
+@dataclass
+class Bridge:
+    """Joins perception and a physical table.
+
+    Args:
+        table: The connection to the server.
+        ticket: The ticket of the table.
+        perception: What watches the field.
+        on_report: Called with each report and its response, for a display or a log.
+
+    Attributes:
+        state: The newest state of the table; None before the first.
+    """
+
+    table: Table
+    ticket: str
+    perception: Perception
+    on_report: Callable[[pb.TableReport, pb.ReportResponse], None] = lambda _report, _response: None
+    state: pb.TableState | None = None
+    _session: str = field(default_factory=lambda: secrets.token_hex(4))
+    _reports: int = 0
+    _play: _Play | None = None
+    _asked: dict[str, OnAnswer] = field(default_factory=dict)
+
+    async def run(self, frames: Iterator[Frame], after: Callable[[Frame], Awaitable[None]] | None = None) -> None:
+        """Watches until the frames or the game end.
+
+        Args:
+            frames: The frames of the camera.
+            after: Called after each frame has been reported.
+
+        Raises:
+            ChefsHatError: The server refused a report or could not be reached any more.
+        """
+        watching = asyncio.create_task(self._watch())
+        try:
+            while not self._is_over():
+                frame = await asyncio.to_thread(next, frames, None)
+                if frame is None:
+                    return
+                for event in await asyncio.to_thread(self.perception.see, frame):
+                    await self.observed(event)
+                await self._take_answers()
+                if after is not None:
+                    await after(frame)
+                if watching.done():
+                    watching.result()
+        finally:
+            watching.cancel()
+
+    async def observed(self, event: Observed) -> None:
+        """Reports an event of perception."""
+        if self._is_over():
+            return
+        match event:
+            case Laid():
+                await self._laid(list(event.cards))
+            case TakenBack():
+                await self._taken_back(list(event.cards))
+            case Cleared():
+                self._play = None
+                await self._report(pb.TableReport(cleared=pb.BoardCleared()))
+            case PassSeen():
+                # `pass` is a keyword of Python.
+                await self._report(pb.TableReport(**{"pass": pb.PassShown(seat=event.seat)}))
+            case PassGone() if self._has_passed(event.seat):
+                await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
+            case PassGone():
+                pass  # The pizza is over: all take their pass cards back.
+            case Doubt():
+                await self._doubt(event)
+            case DoubtResolved():
+                await self._withdraw(f"doubt-{event.number}")
+            case FieldChanged(state=FieldState.LOST):
+                text = "The camera does not see the four corners of the field. Uncover them, or turn the camera back."
+                await self._ask("field", text, ["Done", "The camera is broken"], self._look_again)
+            case FieldChanged():
+                await self._withdraw("field")
+
+    async def _laid(self, cards: list[Card]) -> None:
+        """Reports cards on the board: a play, or an addition to the last one."""
+        play = self._play
+        if play is None or not _belongs(cards, play.cards):
+            response = await self._report(_laid(cards))
+            self._play = _Play(cards, _number(response))
+        else:
+            play.cards = play.cards + cards
+            await self._replace(play)
+
+    async def _taken_back(self, cards: list[Card]) -> None:
+        """Cards were taken back. A play that counts is taken back only if somebody says so."""
+        play = self._play
+        if play is None or not set(cards) & set(play.cards):
+            return
+        if not play.report:
+            play.cards = [card for card in play.cards if card not in cards]
+            if play.cards:
+                await self._replace(play)
+            else:
+                self._play = None
+            return
+        names = ", ".join(face_name(card.face) for card in cards)
+
+        async def take_back(option: int) -> None:
+            if option == 0 and self._play is play:
+                play.cards = [card for card in play.cards if card not in cards]
+                await self._replace(play)
+
+        await self._ask(
+            "taken-back", f"{names} taken from the board: is it taken back?", ["Yes, it does not count", "No, it stands"], take_back
+        )
+
+    async def _look_again(self, _option: int) -> None:
+        """Perception looks for the field all the time."""
+
+    async def _replace(self, play: _Play) -> None:
+        """Reports that the last play has other cards than reported."""
+        if not play.report:
+            play.report = _number(await self._report(_laid(play.cards)))
+            return
+        instead = _laid(play.cards) if play.cards else None
+        response = await self._report(pb.TableReport(correction=pb.ReportCorrection(report=play.report, instead=instead)))
+        if not play.cards:
+            self._play = None
+        elif response.verdict not in _COUNTS:
+            LOG.warning("the table refused a correction: %s", response.detail)
+
+    async def _doubt(self, doubt: Doubt) -> None:
+        """Asks what lies at a place."""
+        readings: list[Card | bool]
+        if doubt.place.startswith("pass "):
+            readings, names = [True, False], ["Yes", "No"]
+            text = f"Does the pass card of {self._name(int(doubt.place.removeprefix('pass ')))} lie at its place?"
+        else:
+            cards = list(doubt.options) if len(doubt.options) > 1 else [self.perception.card_of_face(face) for face in FACE_OPTIONS]
+            readings, names = [*cards], [face_name(card.face) for card in cards]
+            text = f"{' or '.join(names) if len(names) <= 3 else 'Which card lies'} at place {doubt.place}?"
+
+        async def answer(option: int) -> None:
+            for event in self.perception.answer(doubt.number, readings[option]):
+                await self.observed(event)
+
+        await self._ask(f"doubt-{doubt.number}", text, names, answer, doubt.picture)
+
+    async def _ask(self, name: str, text: str, options: list[str], on_answer: OnAnswer, picture: Picture | None = None) -> None:
+        """Asks the people at the table."""
+        question = pb.TableQuestion(question_id=f"{self._session}-{name}", text=text, options=options, picture=_encoded(picture))
+        self._asked[question.question_id] = on_answer
+        await self._report(pb.TableReport(question=question))
+
+    async def _withdraw(self, name: str) -> None:
+        """Withdraws a question that needs no answer any more."""
+        question = f"{self._session}-{name}"
+        if self._asked.pop(question, None) is not None:
+            await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question)))
+
+    async def _take_answers(self) -> None:
+        """Gives the answers that arrived to perception."""
+        for answer in self.state.answers if self.state is not None else ():
+            on_answer = self._asked.pop(answer.question_id, None)
+            if on_answer is not None and answer.HasField("option"):
+                await on_answer(answer.option)
+
+    async def _report(self, report: pb.TableReport) -> pb.ReportResponse:
+        report.source = pb.REPORT_SOURCE_CAMERA
+        self._reports += 1
+        response = await self.table.report(self.ticket, report, report_id=f"{self._session}-{self._reports}")
+        self._newer(response.state)
+        self.on_report(report, response)
+        return response
+
+    async def _watch(self) -> None:
+        async with aclosing(self.table.watch_table(self.ticket)) as states:  # type: ignore[type-var]
+            async for state in states:
+                self._newer(state)
+
+    def _newer(self, state: pb.TableState) -> None:
+        if self.state is None or state.version >= self.state.version:
+            self.state = state
+
+    def _is_over(self) -> bool:
+        return self.state is not None and self.state.stage == pb.TABLE_STAGE_OVER
+
+    def _has_passed(self, seat: int) -> bool:
+        """Whether a seat is out of the pizza in progress."""
+        return self.state is not None and seat < len(self.state.observation.passed) and self.state.observation.passed[seat] == 1
+
+    def _name(self, seat: int) -> str:
+        seats = self.state.room.seats if self.state is not None else ()
+        return seats[seat].name if seat < len(seats) else f"seat {seat}"
+
+
+def _laid(cards: list[Card]) -> pb.TableReport:
+    return pb.TableReport(laid=pb.CardsLaid(cards=seen_cards(cards)))
+
+
+def _belongs(cards: list[Card], to: list[Card]) -> bool:
+    """Whether cards can only be an addition to a play: of its face, or jokers. A new play has a lower face."""
+    faces = {card.face for card in to if not card.is_joker}
+    return bool(faces) and all(card.is_joker or card.face in faces for card in cards)
+
+
+def _number(response: pb.ReportResponse) -> int:
+    return response.report if response.verdict in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_HELD) else 0
+
+
+def _encoded(picture: Picture | None) -> bytes:
+    """The picture as JPEG within the limit; empty if there is none."""
+    if picture is None:
+        return b""
+    for quality in (85, 60, 30):
+        done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+        if done and data.nbytes <= MAX_PICTURE_BYTES:
+            return data.tobytes()
+    return b""
