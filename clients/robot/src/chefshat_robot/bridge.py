@@ -58,10 +58,19 @@ def face_name(face: int) -> str:
 
 @dataclass
 class _Play:
-    """The cards laid last, and the report of them: 0 if it does not count."""
+    """The cards laid last.
+
+    Attributes:
+        cards: The cards.
+        places: Where they lie, 1..11.
+        report: The number of the report; 0 if it does not count.
+        complete: Whether they are what a remote seat decided: nothing can be added.
+    """
 
     cards: list[Card]
+    places: set[int]
     report: int
+    complete: bool
 
 
 @dataclass
@@ -120,15 +129,17 @@ class Bridge:
             return
         match event:
             case Laid():
-                await self._laid(list(event.cards))
+                await self._laid(list(event.cards), set(event.places))
             case TakenBack():
                 await self._taken_back(list(event.cards))
             case Cleared():
                 self._play = None
                 await self._report(pb.TableReport(cleared=pb.BoardCleared()))
             case PassSeen():
+                report = pb.TableReport()
                 # `pass` is a keyword of Python.
-                await self._report(pb.TableReport(**{"pass": pb.PassShown(seat=event.seat)}))
+                getattr(report, "pass").CopyFrom(pb.PassShown(seat=event.seat))
+                await self._report(report)
             case PassGone() if self._has_passed(event.seat):
                 await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
             case PassGone():
@@ -143,38 +154,49 @@ class Bridge:
             case FieldChanged():
                 await self._withdraw("field")
 
-    async def _laid(self, cards: list[Card]) -> None:
-        """Reports cards on the board: a play, or an addition to the last one."""
+    async def _laid(self, cards: list[Card], places: set[int]) -> None:
+        """Reports cards on the board: a play, or perhaps an addition to the last one."""
         play = self._play
-        if play is None or not _belongs(cards, play.cards):
-            response = await self._report(_laid(cards))
-            self._play = _Play(cards, _number(response))
-        else:
-            play.cards = play.cards + cards
-            await self._replace(play)
+        if play is None or play.complete or play.places & places or not _may_belong(cards, play.cards):
+            await self._new_play(cards, places)
+            return
+
+        async def add(option: int) -> None:
+            if option == 1:
+                await self._new_play(cards, places)
+            elif self._play is play:
+                play.cards, play.places = play.cards + cards, play.places | places
+                await self._replace(play)
+
+        if not play.report:
+            await add(0)
+            return
+        text = f"{_names(cards)} laid beside {_names(play.cards)}: do they belong to this play?"
+        await self._ask("added", text, ["Yes, it is one play", "No, somebody else laid them"], add)
+
+    async def _new_play(self, cards: list[Card], places: set[int]) -> None:
+        seen = seen_cards(cards)
+        decided = [wanted.cards.cards for wanted in self.state.to_lay if wanted.pizza] if self.state is not None else []
+        response = await self._report(pb.TableReport(laid=pb.CardsLaid(cards=seen)))
+        number = response.report if response.verdict in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_HELD) else 0
+        self._play = _Play(cards, places, number, complete=list(seen.cards) in [list(faces) for faces in decided])
 
     async def _taken_back(self, cards: list[Card]) -> None:
         """Cards were taken back. A play that counts is taken back only if somebody says so."""
         play = self._play
-        if play is None or not set(cards) & set(play.cards):
+        if play is None or play.complete or not set(cards) & set(play.cards):
             return
-        if not play.report:
-            play.cards = [card for card in play.cards if card not in cards]
-            if play.cards:
-                await self._replace(play)
-            else:
-                self._play = None
-            return
-        names = ", ".join(face_name(card.face) for card in cards)
 
         async def take_back(option: int) -> None:
             if option == 0 and self._play is play:
                 play.cards = [card for card in play.cards if card not in cards]
                 await self._replace(play)
 
-        await self._ask(
-            "taken-back", f"{names} taken from the board: is it taken back?", ["Yes, it does not count", "No, it stands"], take_back
-        )
+        if not play.report:
+            await take_back(0)
+            return
+        text = f"{_names(cards)} taken from the board: is it taken back?"
+        await self._ask("taken-back", text, ["Yes, it does not count", "No, it stands"], take_back)
 
     async def _look_again(self, _option: int) -> None:
         """Perception looks for the field all the time."""
@@ -182,9 +204,11 @@ class Bridge:
     async def _replace(self, play: _Play) -> None:
         """Reports that the last play has other cards than reported."""
         if not play.report:
-            play.report = _number(await self._report(_laid(play.cards)))
+            self._play = None
+            if play.cards:
+                await self._new_play(play.cards, play.places)
             return
-        instead = _laid(play.cards) if play.cards else None
+        instead = pb.TableReport(laid=pb.CardsLaid(cards=seen_cards(play.cards))) if play.cards else None
         response = await self._report(pb.TableReport(correction=pb.ReportCorrection(report=play.report, instead=instead)))
         if not play.cards:
             self._play = None
@@ -256,18 +280,15 @@ class Bridge:
         return seats[seat].name if seat < len(seats) else f"seat {seat}"
 
 
-def _laid(cards: list[Card]) -> pb.TableReport:
-    return pb.TableReport(laid=pb.CardsLaid(cards=seen_cards(cards)))
-
-
-def _belongs(cards: list[Card], to: list[Card]) -> bool:
-    """Whether cards can only be an addition to a play: of its face, or jokers. A new play has a lower face."""
+def _may_belong(cards: list[Card], to: list[Card]) -> bool:
+    """Whether cards may be an addition to a play: they have its face, or are jokers. A new play must have a lower face."""
     faces = {card.face for card in to if not card.is_joker}
     return bool(faces) and all(card.is_joker or card.face in faces for card in cards)
 
 
-def _number(response: pb.ReportResponse) -> int:
-    return response.report if response.verdict in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_HELD) else 0
+def _names(cards: list[Card]) -> str:
+    """The faces of cards, for a question."""
+    return ", ".join(face_name(card.face) for card in cards)
 
 
 def _encoded(picture: Picture | None) -> bytes:

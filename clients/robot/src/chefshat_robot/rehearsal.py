@@ -134,7 +134,7 @@ class Rehearsal:
             # It was not noticed as a violation: the cards stay where they are.
             self._play(act.seat, list(act.cards))
         if self.answers and state.questions:
-            await self._answer(state.questions[0])
+            await self._answer(state, state.questions[0])
             return None
         wanted = next(iter(state.to_lay), None)
         if wanted is not None and wanted.pizza:
@@ -256,19 +256,24 @@ class Rehearsal:
             self.hands[forced] = sorted([card for card in self.hands[forced] if card not in rarest] + given)
         self._exchanged = True
 
-    async def _answer(self, question: pb.TableQuestion) -> None:
+    async def _answer(self, state: pb.TableState, question: pb.TableQuestion) -> None:
         """The attendant, who sees everything, answers a question."""
-        option = self._right_option(question)
+        option = self._right_option(state, question)
         await self._report(answer=pb.QuestionAnswered(question_id=question.question_id, option=option))
 
-    def _right_option(self, question: pb.TableQuestion) -> int | None:
-        """The right answer: what truly lies at the place in question, or the first answer."""
+    def _right_option(self, state: pb.TableState, question: pb.TableQuestion) -> int | None:
+        """The right answer: what truly lies at the place in question, who truly opened, or the first answer."""
+        options = list(question.options)
         place = question.text.rpartition("at place ")[2].rstrip("?")
-        if not place.isdigit():
-            return 0
-        there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
-        names = list(question.options)
-        return names.index(face_name(there[-1].face)) if there and face_name(there[-1].face) in names else None
+        if place.isdigit():
+            there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
+            return options.index(face_name(there[-1].face)) if there and face_name(there[-1].face) in options else None
+        if question.text.startswith("Who opened"):
+            return options.index(state.room.seats[self._lying[0].seat].name)
+        if question.text.startswith("Did ") and question.text.endswith(" pass?"):
+            asked = [seat for seat, taken in enumerate(state.room.seats) if taken.name in question.text]
+            return 0 if self._shown.issuperset(asked) else 1
+        return 0
 
     async def _report(self, **kind: object) -> None:
         report = pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, **kind)  # type: ignore[arg-type]

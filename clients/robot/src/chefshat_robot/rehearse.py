@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from chefshat import aio, pb
 
@@ -101,12 +101,12 @@ def _printer(as_json: bool) -> Callable[[pb.TableReport, pb.ReportResponse], Non
         kind = report.WhichOneof("kind") or ""
         verdict = pb.ReportVerdict.Name(response.verdict).removeprefix("REPORT_VERDICT_").lower()
         values = {"report": response.report, "kind": kind, "verdict": verdict, "detail": response.detail}
-        cards = f" {list(report.laid.cards.cards)}" if kind == "laid" else ""
+        cards = f" {list(report.laid.cards.cards)}" if kind == "laid" else f" {report.question.text}" if kind == "question" else ""
         detail = f": {response.detail}" if response.detail else ""
         _say(as_json, values, f"{kind}{cards} {verdict}{detail} — {response.state.waiting_for}")
 
     return print_report
 
 
-def _say(as_json: bool, values: dict[str, object], text: str) -> None:
+def _say(as_json: bool, values: Mapping[str, object], text: str) -> None:
     print(json.dumps(values) if as_json else text, flush=True, file=sys.stdout)

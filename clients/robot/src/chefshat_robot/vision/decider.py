@@ -9,7 +9,8 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
 - A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone;
-  if others stay for `TAKEN_SECONDS`, the cards were taken back.
+  if others stay for `TAKEN_SECONDS`, the cards were taken back. Cards on others were taken back when both tags of one beneath them
+  are read again and none of theirs.
 """
 
 from __future__ import annotations
@@ -198,6 +199,7 @@ class Decider:
             self._follow_tags(sighting.tags)
             self._settle(events)
             self._explain(passed)
+            self._notice_uncovered(events)
             self._notice_gone(events)
             self._raise_doubts(events)
         self._flush(events)
@@ -242,6 +244,11 @@ class Decider:
                         if not play.cards and not play.doubts:
                             self._queue.remove(play)
                         return
+        lower, above = self._uncovered(doubt.spot)
+        if above and lower is not None and lower.piece.card is not None and lower.piece.card.face == card.face:
+            # The answer is the card beneath, whose other tag cannot be read.
+            self._queue.insert(self._queue.index(doubt.play), _Gone(self._forget(above)))
+            return
         doubt.play.cards[card] = doubt.spot
         later = self._queue[self._queue.index(doubt.play) + 1 :]
         if not any(isinstance(entry, _Gone) and entry.cards is None for entry in later):
@@ -429,6 +436,22 @@ class Decider:
 
     # Cards that are gone.
 
+    def _notice_uncovered(self, events: list[Observed]) -> None:
+        """Notices cards that were taken from the top of others."""
+        for number in CARD_SPOTS:
+            lower, above = self._uncovered(number)
+            if above and lower is not None and len(lower.ends) == 2 and self._spots[number].frames >= SETTLE_READS:
+                self._explained(number, events)
+                self._queue.append(_Gone(self._forget(above)))
+
+    def _uncovered(self, number: int) -> tuple[_Track | None, list[Piece]]:
+        """The highest card of a place that is read now, and those that lay on top of it."""
+        pile = [piece for piece, known in self._known.items() if known.spot == number]
+        read = [place for place, piece in enumerate(pile) if piece in self._tracks]
+        if not read or self._tracks[pile[read[-1]]].trusted < SETTLE_READS:
+            return None, []
+        return self._tracks[pile[read[-1]]], pile[read[-1] + 1 :]
+
     def _notice_gone(self, events: list[Observed]) -> None:
         """Notices pieces that are no longer where they lay."""
         for piece, known in list(self._known.items()):
@@ -455,15 +478,20 @@ class Decider:
 
     def _remove(self, spots: list[int], events: list[Observed]) -> dict[Card, int]:
         """Forgets the cards of some places and returns them."""
-        removed = {
-            card: known.spot for piece, known in self._known.items() if known.spot in spots and (card := piece.card) is not None
-        }
-        for card in removed:
-            del self._known[_piece(card)]
-            self._tracks.pop(_piece(card), None)
+        removed = self._forget([piece for piece, known in self._known.items() if known.spot in spots])
         for spot in spots:
             self._spots[spot].gone_since = None
             self._explained(spot, events)
+        return removed
+
+    def _forget(self, pieces: Iterable[Piece]) -> dict[Card, int]:
+        """Forgets cards that are gone and returns them."""
+        removed: dict[Card, int] = {}
+        for piece in pieces:
+            known = self._known.pop(piece)
+            self._tracks.pop(piece, None)
+            if piece.card is not None:
+                removed[piece.card] = known.spot
         return removed
 
     def _is_empty(self, spot: int) -> bool:
