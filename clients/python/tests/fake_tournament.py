@@ -80,6 +80,14 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
             number, entrant = found[0].join(request)
             return pb.JoinTournamentResponse(tournament=found[0].shown, participant=number, ticket=entrant.ticket)
 
+    def AddTableParticipant(self, request: pb.AddTableParticipantRequest, context: Context) -> pb.AddTableParticipantResponse:
+        self._own(request.tournament_id, request.owner_token, context)
+        refuse(context, grpc.StatusCode.FAILED_PRECONDITION, "NO_PHYSICAL_TABLES", "this tournament has no physical tables")
+
+    def GetPhysicalTable(self, request: pb.GetPhysicalTableRequest, context: Context) -> pb.GetPhysicalTableResponse:
+        self._own(request.tournament_id, request.owner_token, context)
+        refuse(context, grpc.StatusCode.FAILED_PRECONDITION, "GAME_NOT_PHYSICAL", "nobody plays this game at a physical table")
+
     def StartTournament(self, request: pb.StartTournamentRequest, context: Context) -> pb.StartTournamentResponse:
         tournament = self._own(request.tournament_id, request.owner_token, context)
         with self._lock:

@@ -225,6 +225,34 @@ def test_closing_a_tournament_ends_it_for_its_participants(address: str, play: P
         assert play(address, ticket, Checking) == []
 
 
+@pytest.mark.server
+def test_the_organiser_has_the_ticket_of_a_physical_table(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        wanted = settings("random", "random", "random", start_when_joined=0)
+        wanted.physical_tables = 1
+        made = client.create_tournament(wanted)
+        tournament_id, owner = made.tournament.tournament_id, made.owner_token
+        added = client.add_table_participant(tournament_id, owner, "Pepper", kind=pb.PARTICIPANT_KIND_ROBOT)
+        robot = added.tournament.participants[added.participant]
+        assert (robot.name, robot.kind, robot.at_table) == ("Pepper", pb.PARTICIPANT_KIND_ROBOT, True)
+        client.start_tournament(tournament_id, owner)
+        for _ in client.follow_tournament(tournament_id):
+            try:
+                table = client.physical_table(tournament_id, owner, 0)
+                break
+            except ChefsHatError as refused:
+                # Another report follows when the game has a room.
+                if refused.reason != "GAME_NOT_STARTED":
+                    raise
+        state = next(iter(client.watch_table(table.table_ticket)))
+        assert state.room.room_id == table.room_id
+        assert "Pepper" in [seat.name for seat in state.room.seats]
+        with pytest.raises(ChefsHatError, match="OWNER_TOKEN_WRONG"):
+            client.physical_table(tournament_id, "not it", 0)
+        client.close_room(table.room_id, table.owner_token)
+        client.close_tournament(tournament_id, owner)
+
+
 def test_an_unknown_ticket_is_refused(address: str, play: Player) -> None:
     with pytest.raises(ChefsHatError, match="TICKET_UNKNOWN"):
         play(address, "nobody's", Checking)
@@ -258,6 +286,8 @@ def test_the_calls_of_the_blocking_client(fake: FakeServer) -> None:
             list(client.follow_tournament("nowhere"))
         with pytest.raises(ValueError, match="max_games"):
             client.join_tournament("CUP2", "Ada", max_games=0)
+        with pytest.raises(ChefsHatError, match="NO_PHYSICAL_TABLES"):
+            client.add_table_participant(made[0], "owner", "Ada")
 
 
 def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
@@ -285,6 +315,8 @@ def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
             assert (await client.get_tournament(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
             with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
                 await listed(client.follow_tournament("nowhere"))
+            with pytest.raises(ChefsHatError, match="GAME_NOT_PHYSICAL"):
+                await client.physical_table(ids[0], "owner", 0)
 
     asyncio.run(run())
 

@@ -254,6 +254,42 @@ class AsyncCalls(ABC):
         request = requests.join_tournament(join_code, name, tournament_id, kind, max_games, stateless)
         return await awaited(self._tournaments.JoinTournament, request)
 
+    async def add_table_participant(
+        self,
+        tournament_id: str,
+        owner_token: str,
+        name: str,
+        *,
+        kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_HUMAN,
+    ) -> pb.AddTableParticipantResponse:
+        """Adds a participant who plays at a physical table with real cards. Nobody connects for it.
+
+        Args:
+            tournament_id: a tournament with physical tables that has not started.
+            owner_token: its creator's token.
+            name: display name, 1..=64 characters, unique among the participants.
+            kind: kind of the participant.
+
+        Returns:
+            The tournament, and the participant's number in it.
+        """
+        request = pb.AddTableParticipantRequest(tournament_id=tournament_id, owner_token=owner_token, name=name, kind=kind)
+        return await awaited(self._tournaments.AddTableParticipant, request)
+
+    async def physical_table(self, tournament_id: str, owner_token: str, game: int) -> pb.GetPhysicalTableResponse:
+        """Returns the secrets of the physical table at which a game is being played.
+
+        Args:
+            tournament_id: the tournament.
+            owner_token: its creator's token.
+            game: number of the game in the tournament.
+
+        Returns:
+            The room, the ticket for :meth:`report` and :meth:`watch_table`, and the token that closes the room.
+        """
+        request = pb.GetPhysicalTableRequest(tournament_id=tournament_id, owner_token=owner_token, game=game)
+        return await awaited(self._tournaments.GetPhysicalTable, request)
+
     async def start_tournament(self, tournament_id: str, owner_token: str) -> pb.Tournament:
         """Starts a tournament with its creator's token."""
         request = pb.StartTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
