@@ -93,6 +93,14 @@ impl Chain {
         if open { "\n" } else { "" }
     }
 
+    /// Ends an open line whose last items are void; the next item begins another.
+    pub(super) fn restart(&mut self) -> &'static str {
+        let (side, has_header) = (self.side, self.has_header);
+        let end = self.break_off();
+        (self.side, self.has_header) = (side, has_header);
+        end
+    }
+
     /// Ends an open line.
     pub(super) fn close(&mut self, view: &GameView) -> String {
         let mut out = String::new();

@@ -41,6 +41,14 @@ pub(super) struct Narrator {
 }
 
 impl Narrator {
+    /// Narrates the game of a room.
+    pub(super) fn of_room(room: &v1::Room) -> Self {
+        Self {
+            view: GameView::of_room(room),
+            ..Self::default()
+        }
+    }
+
     /// Sets a label for what plays each seat, if the caller knows more than the server publishes.
     #[must_use]
     pub(super) fn with_labels(mut self, labels: impl IntoIterator<Item = String>) -> Self {
@@ -65,7 +73,10 @@ impl Narrator {
             | Kind::Returned(_)
             | Kind::ServerRestarted(_)
             | Kind::Substituted(_)
-            | Kind::ExpressionShown(_) => self.remarks(&lines, DIM),
+            | Kind::ExpressionShown(_)
+            | Kind::HandReported(_)
+            | Kind::TablePaused(_) => self.remarks(&lines, DIM),
+            Kind::Violation(_) | Kind::Correction(_) => self.remarks(&lines, BOLD),
             _ => String::new(),
         };
         before + &after
@@ -103,6 +114,11 @@ impl Narrator {
             Kind::PizzaDone(done) => self.chain.done(done, &self.view),
             Kind::ShiftStarted(_) => self.chain.close(&self.view),
             Kind::ShiftEnded(end) => self.shift_ended(end),
+            // What was written of the pizza is void.
+            Kind::Correction(correction) if correction.first_void > 0 => {
+                self.exchanges.clear();
+                self.chain.restart().to_owned()
+            }
             Kind::GameEnded(end) => self.game_ended(end),
             Kind::GameAborted(end) => {
                 let words = Piece::new(BOLD, &aborted(end.reason()));

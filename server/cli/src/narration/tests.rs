@@ -12,8 +12,9 @@ use super::text::{WIDTH, columns};
 /// The text of events without colours.
 fn text_of(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> String {
     let mut out = String::new();
-    for kind in events {
+    for (sequence, kind) in (1..).zip(events) {
         out.push_str(&narrator.narrate(&v1::GameEvent {
+            sequence,
             kind: Some(kind),
             ..v1::GameEvent::default()
         }));
@@ -347,6 +348,63 @@ fn names_are_safe_and_unique() {
         table,
         "   at the table  bot#0 agent · bot#1 agent · [2Jwipe agent · seat 3 agent"
     );
+}
+
+#[test]
+fn a_correction_at_a_physical_table_takes_back_what_is_void() {
+    use v1::DecisionSource::Table;
+    let mut narrator = Narrator::of_room(&v1::Room {
+        origin: v1::GameOrigin::Physical.into(),
+        ..v1::Room::default()
+    });
+    let events = [
+        game_started(&standard(), &["Ada", "Bo", "Greta", "Cy"]),
+        shift_started(1),
+        Kind::HandReported(Box::new(v1::HandReported {
+            hand: Some(v1::SeatCards {
+                seat: 2,
+                cards: vec![8, 8, 12],
+                golden: false,
+            }),
+            dealt: true,
+        })),
+        play(0, (1, 11, 0), 16),
+        pass(1, Table),
+        play(2, (2, 8, 0), 1),
+        Kind::Violation(Box::new(v1::Violation {
+            text: "It is Cy's turn.".into(),
+            ..v1::Violation::default()
+        })),
+        Kind::Correction(Box::new(v1::Correction {
+            first_void: 5,
+            text: "Bo laid two 9s, not a pass".into(),
+            report: 3,
+        })),
+        play(1, (2, 9, 0), 15),
+        Kind::TablePaused(v1::TablePaused { paused: true }),
+    ];
+    let text = text_of(&mut narrator, events);
+    let last: Vec<&str> = text.lines().rev().take(8).map(str::trim_end).collect();
+    assert_eq!(
+        last.into_iter().rev().collect::<Vec<_>>(),
+        [
+            "   Greta has a known hand",
+            "",
+            "pizza                                                                     Ada     Bo  Greta     Cy",
+            "    1  Ada 1×11★ › (Bo) › Greta 2×8",
+            "   ⚠ It is Cy's turn.",
+            "   corrected: Bo laid two 9s, not a pass",
+            "    1  Bo 2×9",
+            "   the game is paused",
+        ],
+        "{text}"
+    );
+    let [_, bo, greta, _] = narrator.view.seats.as_slice() else {
+        panic!("four seats");
+    };
+    assert_eq!((bo.passed, bo.cards, greta.cards), (false, 15, 17));
+    let hand = greta.hand.as_ref().map(|hand| hand.counts[7]);
+    assert_eq!((hand, narrator.view.turns), (Some(2), 2));
 }
 
 /// Plays a game of the engine; the text a spectator reads.

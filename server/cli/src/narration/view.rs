@@ -75,6 +75,15 @@ pub(crate) struct GameView {
     /// Seats in the order in which they finished the last Shift.
     pub(crate) last_order: Vec<u32>,
     pub(crate) end: Option<End>,
+    /// At a physical table: what a correction rebuilds the view from.
+    pub(crate) history: Option<Box<History>>,
+}
+
+/// The events of a physical table that are not void, and the view before them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct History {
+    start: GameView,
+    events: Vec<v1::GameEvent>,
 }
 
 impl GameView {
@@ -87,6 +96,12 @@ impl GameView {
             ..Self::default()
         };
         view.seat_all(&room.seats);
+        if room.origin() == v1::GameOrigin::Physical {
+            view.history = Some(Box::new(History {
+                start: view.clone(),
+                events: Vec::new(),
+            }));
+        }
         view
     }
 
@@ -120,6 +135,22 @@ impl GameView {
 
     /// Applies an event.
     pub(crate) fn apply(&mut self, event: &v1::GameEvent) {
+        let Some(mut history) = self.history.take() else {
+            return self.step(event);
+        };
+        history.events.push(event.clone());
+        match first_void(event) {
+            None => self.step(event),
+            Some(first) => {
+                (history.events).retain(|past| past.sequence < first || is_of_room(past));
+                self.clone_from(&history.start);
+                history.events.iter().for_each(|past| self.step(past));
+            }
+        }
+        self.history = Some(history);
+    }
+
+    fn step(&mut self, event: &v1::GameEvent) {
         let Some(kind) = &event.kind else {
             return;
         };
@@ -193,10 +224,10 @@ impl GameView {
                 self.turn = None;
                 self.end = Some(End::Aborted(end.reason()));
             }
+            Kind::HandReported(reported) => self.hand_reported(reported),
             Kind::SpecialActionDeclared(_)
             | Kind::ExpressionShown(_)
             | Kind::ServerRestarted(_)
-            | Kind::HandReported(_)
             | Kind::Violation(_)
             | Kind::Correction(_)
             | Kind::TablePaused(_) => {}
@@ -257,6 +288,15 @@ impl GameView {
         }
         let faces = usize::try_from(self.faces()).unwrap_or(0);
         for hand in &start.hands {
+            let known = Hand::of(faces, &hand.cards, hand.golden);
+            self.with(hand.seat, |place| place.hand = Some(known));
+        }
+    }
+
+    /// Without cards, the viewer may not see them.
+    fn hand_reported(&mut self, reported: &v1::HandReported) {
+        let faces = usize::try_from(self.faces()).unwrap_or(0);
+        if let Some(hand) = reported.hand.as_ref().filter(|it| !it.cards.is_empty()) {
             let known = Hand::of(faces, &hand.cards, hand.golden);
             self.with(hand.seat, |place| place.hand = Some(known));
         }
@@ -336,6 +376,34 @@ impl GameView {
                     .is_some_and(|place| place.cards > 0 && !place.passed)
             })
     }
+}
+
+/// The first event that a correction makes void.
+fn first_void(event: &v1::GameEvent) -> Option<u64> {
+    match &event.kind {
+        Some(Kind::Correction(correction)) => Some(correction.first_void).filter(|it| *it > 0),
+        _ => None,
+    }
+}
+
+/// Whether an event stays when a correction makes the events of the game before it void.
+fn is_of_room(event: &v1::GameEvent) -> bool {
+    matches!(
+        event.kind,
+        Some(
+            Kind::Seated(_)
+                | Kind::Vacated(_)
+                | Kind::Disconnected(_)
+                | Kind::Returned(_)
+                | Kind::Substituted(_)
+                | Kind::ExpressionShown(_)
+                | Kind::ServerRestarted(_)
+                | Kind::HandReported(_)
+                | Kind::Violation(_)
+                | Kind::Correction(_)
+                | Kind::TablePaused(_)
+        )
+    )
 }
 
 /// Display names: short, safe and unique.

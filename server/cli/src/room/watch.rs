@@ -48,7 +48,7 @@ impl Watch {
                 writeln!(out, "   begins {words}")?;
             }
         }
-        let mut narrator = Narrator::default();
+        let mut narrator = Narrator::of_room(&room);
         let mut spectator = client.spectate(self.room_id, 1).with_backoff(Backoff {
             give_up_after: PATIENCE,
             ..Backoff::default()

@@ -14,6 +14,8 @@ pub(super) struct Display {
     json: bool,
     /// The last text of a state, which is not repeated.
     shown: String,
+    /// The report with the last verdict. Its violation is not repeated.
+    judged: Option<u64>,
 }
 
 impl Display {
@@ -21,6 +23,7 @@ impl Display {
         Self {
             json,
             shown: String::new(),
+            judged: None,
         }
     }
 
@@ -32,7 +35,11 @@ impl Display {
         if self.json {
             return say(json!({"event": "state", "state": state}));
         }
-        let text = state_in_words(state);
+        let violation = state.violation.clone();
+        let text = state_in_words(&v1::TableState {
+            violation: violation.filter(|it| Some(it.report) != self.judged),
+            ..state.clone()
+        });
         if text == self.shown {
             return Ok(());
         }
@@ -47,6 +54,7 @@ impl Display {
     /// The output cannot be written.
     pub(super) fn state_again(&mut self, state: &v1::TableState) -> Result<(), CommandError> {
         self.shown.clear();
+        self.judged = None;
         self.state(state)
     }
 
@@ -55,10 +63,11 @@ impl Display {
     /// # Errors
     /// The output cannot be written.
     pub(super) fn verdict(
-        &self,
+        &mut self,
         line: &str,
         response: &v1::ReportResponse,
     ) -> Result<(), CommandError> {
+        self.judged = Some(response.report);
         if !self.json {
             return print(&verdict_in_words(response));
         }
