@@ -75,6 +75,8 @@ pub(crate) struct GameView {
     /// Seats in the order in which they finished the last Shift.
     pub(crate) last_order: Vec<u32>,
     pub(crate) end: Option<End>,
+    /// At a physical table: the game is paused, and the clocks stand still.
+    pub(crate) paused: bool,
     /// At a physical table: what a correction rebuilds the view from.
     pub(crate) history: Option<Box<History>>,
 }
@@ -125,6 +127,12 @@ impl GameView {
             Some(place) if !place.name.is_empty() => place.name.clone(),
             _ => format!("seat {seat}"),
         }
+    }
+
+    /// Whether the cards are real and those of a seat are not yet known to the server.
+    pub(crate) fn awaits_hand(&self, seat: u32) -> bool {
+        let unknown = |it: &SeatView| it.hand.is_none() && it.cards > 0;
+        self.history.is_some() && self.seat(seat).is_some_and(unknown)
     }
 
     /// Number of free seats.
@@ -229,8 +237,8 @@ impl GameView {
             | Kind::ExpressionShown(_)
             | Kind::ServerRestarted(_)
             | Kind::Violation(_)
-            | Kind::Correction(_)
-            | Kind::TablePaused(_) => {}
+            | Kind::Correction(_) => {}
+            Kind::TablePaused(table) => self.paused = table.paused,
         }
     }
 

@@ -24,6 +24,7 @@ const PASSING: [&str; 4] = [
 
 /// Attends to a table until the game or the input is over.
 pub(super) async fn attend(arguments: TableArgs) -> Result<ExitCode, CommandError> {
+    let prompts = !arguments.json && io::stdin().is_terminal() && io::stdout().is_terminal();
     let display = Display::new(arguments.json);
     let table = arguments.connect().await?;
     let mut follower = table.follow();
@@ -34,7 +35,7 @@ pub(super) async fn attend(arguments: TableArgs) -> Result<ExitCode, CommandErro
     };
     let first = follower.next().await?;
     attendant.see(first.ok_or("the game is over")?)?;
-    attendant.attend(follower).await?;
+    attendant.attend(follower, prompts).await?;
     let room = attendant.state.room.unwrap_or_default();
     Ok(match room.state() {
         v1::RoomState::Aborted => ExitCode::FAILURE,
@@ -51,23 +52,28 @@ struct Attendant {
 
 impl Attendant {
     /// Shows states and reports lines until the game or the input is over.
-    async fn attend(&mut self, mut follower: TableFollower) -> Result<(), CommandError> {
+    async fn attend(
+        &mut self,
+        mut follower: TableFollower,
+        prompts: bool,
+    ) -> Result<(), CommandError> {
         let mut lines = typed_lines();
-        let prompts = io::stdin().is_terminal() && io::stdout().is_terminal();
-        let mut waits = false;
+        let (mut prompted, mut waits) = (false, false);
         while self.state.stage() != v1::TableStage::Over {
             waits &= !needs_a_report(&self.state);
-            if prompts && !waits {
+            if prompts && !prompted && !waits {
                 prompt()?;
+                prompted = true;
             }
             tokio::select! {
                 biased;
                 state = follower.next() => match state? {
-                    Some(state) => self.see(state)?,
+                    Some(state) => prompted &= !self.see(state)?,
                     None => break,
                 },
                 line = lines.recv(), if !waits => {
                     let Some(line) = line.transpose()? else { break };
+                    prompted = false;
                     match line::parse(&line, &self.state) {
                         Ok(Command::Report(kind)) => self.report(&line, kind).await?,
                         Ok(Command::Help) => self.display.help()?,
@@ -83,20 +89,21 @@ impl Attendant {
         Ok(())
     }
 
-    /// Shows a state, if it is newer than the last one.
-    fn see(&mut self, state: v1::TableState) -> Result<(), CommandError> {
-        if state.version > self.state.version {
-            self.display.state(&state)?;
-            self.state = state;
+    /// Shows a state, if it is newer than the last one. Returns whether something was printed.
+    fn see(&mut self, state: v1::TableState) -> Result<bool, CommandError> {
+        if state.version <= self.state.version {
+            return Ok(false);
         }
-        Ok(())
+        let printed = self.display.state(&state)?;
+        self.state = state;
+        Ok(printed)
     }
 
     async fn report(&mut self, line: &str, kind: Kind) -> Result<(), CommandError> {
         match self.table.report(kind).await {
             Ok(response) => {
                 self.display.verdict(line, &response)?;
-                self.see(response.state.unwrap_or_default())
+                self.see(response.state.unwrap_or_default()).map(|_| ())
             }
             Err(error) if is_passing(&error) => self.display.problem(line, error.message()),
             Err(error) => Err(error.into()),

@@ -27,13 +27,14 @@ impl Display {
         }
     }
 
-    /// Prints a state, as text only if it differs from the last one.
+    /// Prints a state, as text only if it differs from the last one. Returns whether it did.
     ///
     /// # Errors
     /// The output cannot be written.
-    pub(super) fn state(&mut self, state: &v1::TableState) -> Result<(), CommandError> {
+    pub(super) fn state(&mut self, state: &v1::TableState) -> Result<bool, CommandError> {
         if self.json {
-            return say(json!({"event": "state", "state": state}));
+            say(json!({"event": "state", "state": state}))?;
+            return Ok(true);
         }
         let violation = state.violation.clone();
         let text = state_in_words(&v1::TableState {
@@ -41,11 +42,11 @@ impl Display {
             ..state.clone()
         });
         if text == self.shown {
-            return Ok(());
+            return Ok(false);
         }
         print(&text)?;
         self.shown = text;
-        Ok(())
+        Ok(true)
     }
 
     /// Prints the last state again.
@@ -55,7 +56,7 @@ impl Display {
     pub(super) fn state_again(&mut self, state: &v1::TableState) -> Result<(), CommandError> {
         self.shown.clear();
         self.judged = None;
-        self.state(state)
+        self.state(state).map(|_| ())
     }
 
     /// Prints the verdict on what a line reported.

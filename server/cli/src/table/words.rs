@@ -111,6 +111,8 @@ fn requirement(required: &v1::PlayRequirement) -> String {
         (false, 2.., _) => format!("{highest}s"),
         (false, _, 0) => "nothing beats the board".to_owned(),
         (false, ..) if required.lone_joker => "any face, or a joker alone".to_owned(),
+        (false, _, 1) if fewest == 1 => "the 1".to_owned(),
+        (false, ..) if fewest == 1 => format!("{highest} or lower"),
         (false, _, 1) => format!("the 1, {} or more", counted(fewest, "card")),
         (false, ..) => format!("{highest} or lower, {} or more", counted(fewest, "card")),
     };
@@ -294,7 +296,7 @@ mod tests {
             ),
             (of(11, 11, 1), "11s; or a pass"),
             (leading, "any face, or a joker alone; or a pass"),
-            (of(1, 5, 1), "5 or lower, 1 card or more; or a pass"),
+            (of(1, 5, 1), "5 or lower; or a pass"),
             (of(1, 1, 2), "the 1, 2 cards or more; or a pass"),
             (of(1, 0, 2), "nothing beats the board; or a pass"),
         ];

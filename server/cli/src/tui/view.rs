@@ -136,6 +136,9 @@ fn draw_header(frame: &mut Frame<'_>, theme: Theme, table: &GameView, status: &s
     if let Some(rules) = &table.rules {
         progress.push_str(&format!(" · {}", stop_in_words(rules.stop())));
     }
+    if table.paused {
+        progress.push_str(" · paused");
+    }
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
     let space = width.saturating_sub(columns(&progress) + 2);
     let room = &table.room_name;

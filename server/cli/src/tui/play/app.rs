@@ -151,7 +151,7 @@ impl App {
 
     /// Milliseconds left for the open decision, and then in the time bank.
     pub(super) fn clock(&self, now_ms: u64) -> Option<(u64, u64)> {
-        let open = self.open.as_ref()?;
+        let open = self.open.as_ref().filter(|_| !self.table.paused)?;
         let gone = now_ms.saturating_sub(open.since_ms);
         let request = &open.decision.request;
         let (time, bank) = (
@@ -191,6 +191,7 @@ impl App {
                 for event in &batch.events {
                     self.log.follow(&mut self.table, event);
                     self.close_by(event);
+                    self.restart_clock_by(event, now_ms);
                 }
             }
             Update::Decision(request) => return self.asked(request, now_ms),
@@ -203,9 +204,25 @@ impl App {
         None
     }
 
-    /// Closes the open decision after an event that shows it was decided: by a timeout or a
-    /// substitute.
+    /// After a pause at a physical table, a decision has its full time again.
+    fn restart_clock_by(&mut self, event: &v1::GameEvent, now_ms: u64) {
+        if let (Some(Kind::TablePaused(table)), Some(open)) = (&event.kind, &mut self.open)
+            && !table.paused
+        {
+            open.since_ms = now_ms;
+        }
+    }
+
+    /// Closes the open decision after an event that shows it was decided, by a timeout or a
+    /// substitute, or that makes it void.
     fn close_by(&mut self, event: &v1::GameEvent) {
+        if let Some(Kind::Correction(correction)) = &event.kind
+            && correction.first_void > 0
+        {
+            // A decision that is still open is asked again.
+            self.open = None;
+            self.unacknowledged = None;
+        }
         let moved = matches!(
             event.kind,
             Some(

@@ -1,6 +1,6 @@
 //! Games played by keys, and the contents of the screen.
 
-use chefshat_client::v1::{self, seat_command::Command, seat_update::Update};
+use chefshat_client::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
 use ratatui::crossterm::event::KeyCode;
 
@@ -101,6 +101,55 @@ pub(super) fn shifts(shifts: u32) -> RuleSetSpec {
         stop: Stop::Shifts(shifts),
         ..RuleSetSpec::default()
     }
+}
+
+#[test]
+fn a_pause_or_correction_at_a_physical_table_renews_the_decision() {
+    let mut session = GameSession::new(&shifts(1), 1);
+    session.app.table.history = Some(Box::default());
+    assert!(session.until_asked());
+    let happens = |session: &mut GameSession, kind| {
+        let event = v1::GameEvent {
+            kind: Some(kind),
+            ..v1::GameEvent::default()
+        };
+        let events = vec![event];
+        session.receive(Update::Events(v1::EventBatch { events }));
+    };
+    let full = session.app.clock(0);
+    session.now_ms = 1;
+    assert_ne!(session.app.clock(1), full);
+    happens(
+        &mut session,
+        Kind::TablePaused(v1::TablePaused { paused: true }),
+    );
+    assert_eq!(session.app.clock(1), None);
+    assert!(session.screen().contains("· paused"));
+    session.now_ms = 5000;
+    happens(
+        &mut session,
+        Kind::TablePaused(v1::TablePaused { paused: false }),
+    );
+    assert_eq!(session.app.clock(5000), full);
+    happens(
+        &mut session,
+        Kind::Correction(Box::new(v1::Correction {
+            first_void: u64::MAX,
+            ..v1::Correction::default()
+        })),
+    );
+    assert!(session.app.open.is_none() && session.app.notice.is_empty());
+}
+
+#[test]
+fn cards_at_a_physical_table_are_awaited() {
+    let mut session = GameSession::new(&shifts(1), 1);
+    assert!(!session.screen().contains("Your cards are on their way"));
+    session.app.table.history = Some(Box::default());
+    session.app.table.seats[0].hand = None;
+    let screen = session.screen();
+    assert!(screen.contains("Your cards are on their way"), "{screen}");
+    assert!(screen.contains("has shown them."), "{screen}");
 }
 
 /// Every legal action can be selected by keys, and a selection has an objection exactly if it is

@@ -131,6 +131,9 @@ fn draw_hand(frame: &mut Frame<'_>, theme: Theme, app: &App, area: Rect) {
     if shown.is_empty() {
         let words = match place.and_then(|place| place.finished) {
             Some(_) => "You are out of cards.",
+            None if awaits_hand(app) => {
+                "They appear here when somebody at the table has shown them."
+            }
             None => "No cards yet.",
         };
         let lines = vec![Line::default(), Line::from(format!("  {words}"))];
@@ -233,6 +236,7 @@ fn waiting(app: &App) -> String {
     match table.turn {
         _ if table.end.is_some() => String::new(),
         _ if !table.started => "The game has not started.".to_owned(),
+        _ if awaits_hand(app) => "Your cards are on their way.".to_owned(),
         Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", table.name(seat)),
         None if first && table.last_order.is_empty() => {
             "Another player opens the Shift.".to_owned()
@@ -240,6 +244,11 @@ fn waiting(app: &App) -> String {
         None if first => "The others decide: special action, exchange, the first turn.".to_owned(),
         _ => "The others decide.".to_owned(),
     }
+}
+
+/// Whether the person's cards are on a physical table and not yet known.
+fn awaits_hand(app: &App) -> bool {
+    app.me.is_some_and(|me| app.table.awaits_hand(me))
 }
 
 /// What Enter does.
