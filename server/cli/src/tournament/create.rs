@@ -266,10 +266,10 @@ fn flagged(field: &str, message: &str) -> CommandError {
     let said = format!("{field}: ");
     let message = message.strip_prefix(&said).unwrap_or(message);
     match field {
-        // The inner field is a flag.
+        // The inner field is a flag, if there is one.
         "rules" | "policy" => match message.split_once(": ") {
-            Some((inner, rest)) => by_flag(inner, rest),
-            None => message.to_owned(),
+            Some((inner, rest)) if !inner.contains(' ') => by_flag(inner, rest),
+            _ => message.to_owned(),
         },
         "start_when_joined" => by_flag("start_when", message),
         "built_in_agents" => by_flag("built_in", message),
@@ -379,6 +379,7 @@ mod tests {
                 "--decision-time-ms: 1",
             ),
             ("policy", "policy: no", "no"),
+            ("rules", "rules: no such game: why", "no such game: why"),
             (
                 "physical_tables",
                 "physical_tables: 65",

@@ -169,6 +169,8 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     made.assert_says(&[&format!("--owner-file {owner}")]);
     let first = made.stdout.lines().next().unwrap();
     let id = first.strip_prefix("tournament   ").unwrap();
+    let add = format!("tournament add {id} --name Ada --owner-file {owner}");
+    run(&url, &add).assert_failed("NO_PHYSICAL_TABLES");
     let results = format!("tournament results {id}");
     let before = run(&url, &results);
     before.assert_says(&["nothing has been played yet", "Participants"]);
@@ -177,6 +179,8 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     run(&url, &format!("{start} --owner-token nonsense")).assert_failed("OWNER_TOKEN_WRONG");
     let begun = run(&url, &format!("{start} --owner-file {owner}")).json();
     assert_eq!(begun["tournament"]["state"], "TOURNAMENT_STATE_PLAYING");
+    let table = format!("tournament table {id} 0 --owner-file {owner}");
+    run(&url, &table).assert_failed("GAME_NOT_PHYSICAL");
     let mut join = Running::start(&url, "tournament join --agent random --code BCDF2345");
     let mut late = String::new();
     let stderr = join.0.stderr.as_mut().unwrap();
@@ -211,6 +215,12 @@ fn invalid_tournament_options_are_reported_by_flag() {
         ("--clock human:1", "--clock: "),
         ("--faces 3", "--faces: "),
         ("--target-shifts 1000000", "--target-shifts: "),
+        ("--physical-tables 65", "--physical-tables: "),
+        ("--physical-tables 1 --deals same", "--physical-tables: "),
+        (
+            "--physical-tables 1 --opening any_top_face",
+            "a physical table needs the opening with the Golden card",
+        ),
         (&format!("--code-file {nowhere}"), "--code-file: "),
     ] {
         let create = format!("tournament create --name x --format swiss {flags}");
