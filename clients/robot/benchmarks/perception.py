@@ -5,20 +5,25 @@
 
 Every happening (cards laid, field cleared, pass card shown or withdrawn) is one of:
 
-- *first*: reported exactly, and without a doubt;
+- *first*: reported exactly, and without a doubt about it;
 - *asked*: reported exactly, after a doubt about it was answered with the truth;
-- *wrong*: missing, or reported otherwise than it was.
+- *wrong*: missing, out of order, or reported otherwise than it was.
 
-A *false* event is one that was reported without a doubt and did not happen like this. *Needless* doubts are about places where
-nothing new lies. The latency is the time from the last card at rest to the event, in the frames' own time. Frames per second count
-processor time for reading and deciding, on one thread and without painting the frames. *Naive* is how often a reader that believes
-each single frame (OpenCV's detector, on frames without a hand over the table) finds a tag of every piece that lies on top.
+Some of the first are *held*: they wait for the answer about another happening, because events keep their order. A *false* event is
+one that was reported without a doubt about it and did not happen like this. *Needless* doubts are about places where nothing new
+lies. An *unreadable* happening is one with a piece both of whose tags are stained: only asking can get it right. The latency is the
+time from the last card at rest to the event, in the frames' own time, of the first that were not held. Frames per second count
+processor time for reading and deciding, on one thread and without painting the frames.
+
+The naive reader believes each single frame: OpenCV's detector, on one frame in 15, and only on those without a hand over the table.
+*Naive* is how often it finds a tag of every piece that lies on top.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from collections import Counter
@@ -29,7 +34,16 @@ import cv2
 import numpy as np
 
 from chefshat_robot.deck import Card
-from chefshat_robot.synthetic import DIFFICULTIES, Difficulty, FrameTruth, Happening, SyntheticTable, acts_of_steps, random_shift
+from chefshat_robot.synthetic import (
+    DIFFICULTIES,
+    Difficulty,
+    FrameTruth,
+    Happening,
+    Lying,
+    SyntheticTable,
+    acts_of_steps,
+    random_shift,
+)
 from chefshat_robot.vision import (
     Doubt,
     DoubtResolved,
@@ -45,6 +59,8 @@ from chefshat_robot.vision.frames import Frame
 
 ANSWER_SECONDS = 0.5
 """A doubt is answered so long after it was asked, in s: the synthetic players do not wait for a slow answer."""
+LATE_SECONDS = 0.7
+"""Events that come later than this after their happening are listed."""
 NAIVE_EVERY = 15
 """The naive reader looks at one frame of so many."""
 
@@ -55,7 +71,9 @@ class Result:
 
     happenings: int = 0
     first: int = 0
+    held: int = 0
     asked: int = 0
+    unreadable: int = 0
     wrong: int = 0
     false: int = 0
     doubts: int = 0
@@ -83,6 +101,8 @@ class Result:
         return {
             "happenings": self.happenings,
             "first_percent": round(100 * self.first / count, 2),
+            "held_percent": round(100 * self.held / count, 2),
+            "unreadable_percent": round(100 * self.unreadable / count, 2),
             "after_asking_percent": round(100 * (self.first + self.asked) / count, 2),
             "wrong": self.wrong,
             "false": self.false,
@@ -103,6 +123,19 @@ class Result:
         }
 
 
+@dataclass
+class Report:
+    """An event, and what was asked about it.
+
+    Attributes:
+        event: The event.
+        asked: Whether it was completed by the answer to a doubt about it.
+    """
+
+    event: Observed
+    asked: bool
+
+
 def key(event: Observed | Happening) -> tuple[Any, ...]:
     """What an event or a happening says, comparably."""
     if isinstance(event, Happening):
@@ -116,88 +149,127 @@ def key(event: Observed | Happening) -> tuple[Any, ...]:
     return ("cleared", None, ())
 
 
-def answer(doubt: Doubt, asked: FrameTruth, known: dict[Card, int]) -> Card | bool:
-    """The true answer to a doubt: the card on top that perception does not know yet."""
+def there(place: str, truth: FrameTruth) -> list[Lying]:
+    """What lies at a place, the lowest first."""
+    return [lying for lying in truth.lying if place == (f"pass {lying.place}" if lying.piece.card is None else str(lying.place))]
+
+
+def answer(doubt: Doubt, truth: FrameTruth, known: dict[Card, int]) -> Card | bool:
+    """The true answer to a doubt: whether a pass card lies there, or the card on top if perception does not know it yet."""
+    pieces = there(doubt.place, truth)
+    card = pieces[-1].piece.card if pieces else None
     if doubt.place.startswith("pass"):
-        seat = int(doubt.place.split()[1])
-        return any(lying.piece.card is None and lying.place == seat for lying in asked.lying)
-    there = [card for lying in asked.lying if (card := lying.piece.card) is not None and lying.place == int(doubt.place)]
-    return there[-1] if there and there[-1] not in known else False
+        return bool(pieces)
+    return card if card is not None and card not in known else False
 
 
-def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: float, max_frames: int | None = None) -> Result:
+def is_about(event: Observed, doubt: Doubt, reading: Card | bool) -> bool:
+    """Whether an event says what the answer to a doubt said."""
+    if isinstance(event, Laid):
+        return reading in event.cards
+    if isinstance(event, PassShown | PassWithdrawn):
+        return doubt.place == f"pass {event.seat}" and isinstance(event, PassShown) == reading
+    return False
+
+
+def is_unreadable(happening: Happening, truth: FrameTruth) -> bool:
+    """Whether a happening shows a piece without a tag that can be read; `truth` is that of the first frame after it."""
+    if happening.kind == "pass_shown":
+        return any(all(lying.smudged) for lying in there(f"pass {happening.seat}", truth))
+    return happening.kind == "laid" and any(all(lying.smudged) for lying in truth.lying if lying.piece.card in happening.cards)
+
+
+def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: float) -> Result:
     """Plays and watches one Shift."""
     acts = acts_of_steps(random_shift(seed), seed, difficulty.pause, difficulty.hovers)
     table = SyntheticTable(acts, difficulty, seed=seed, size=size, fps=fps)
     perception = Perception(table.camera)
     naive = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
     result = Result()
-    events: list[tuple[Observed, bool]] = []
-    """Each event with whether an answer made it certain."""
-    open_doubts: list[tuple[float, Doubt]] = []
+    reports: list[Report] = []
+    asking: list[tuple[float, Doubt]] = []
+    """The open doubts, and when they are answered."""
+    answered: list[tuple[Doubt, Card | bool]] = []
+    spans: list[tuple[float, float]] = []
+    """From when to when happenings had to wait for a doubt."""
     truths: list[FrameTruth] = []
-    last = 0.0
+
+    def begin(doubt: Doubt) -> float:
+        return max((lying.since for lying in there(doubt.place, truths[round(doubt.seen * fps)])), default=doubt.seen)
+
+    def take(events: list[Observed]) -> None:
+        for event in events:
+            if isinstance(event, Doubt):
+                result.doubts += 1
+                asking.append((event.time + ANSWER_SECONDS, event))
+            elif isinstance(event, DoubtResolved):
+                spans.extend((begin(doubt), event.time) for _, doubt in asking if doubt.number == event.number)
+                asking[:] = [(due, doubt) for due, doubt in asking if doubt.number != event.number]
+            elif not isinstance(event, FieldChanged):
+                reports.append(Report(event, any(is_about(event, *entry) for entry in answered)))
+                answered[:] = [entry for entry in answered if not is_about(event, *entry)]
+
     for frame, truth in table.frames():
-        if max_frames is not None and frame.index >= max_frames:
-            break
         started = time.process_time()
         seen = perception.see(frame)
         took = time.process_time() - started
         result.frames += 1
         result.seconds += took
         result.slowest = max(result.slowest, took if frame.index else 0.0)
-        last = truth.time
         truths.append(truth)
-        for event in seen:
-            if isinstance(event, Doubt):
-                result.doubts += 1
-                open_doubts.append((frame.time + ANSWER_SECONDS, event))
-            elif isinstance(event, DoubtResolved):
-                open_doubts = [entry for entry in open_doubts if entry[1].number != event.number]
-            else:
-                events.append((event, False))
-        while open_doubts and open_doubts[0][0] <= frame.time:
-            _, doubt = open_doubts.pop(0)
+        take(seen)
+        while asking and asking[0][0] <= frame.time:
+            doubt = asking[0][1]
             reading = answer(doubt, truths[round(doubt.seen * fps)], perception.on_table)
             result.needless += reading is False
-            events += [(event, True) for event in perception.answer(doubt.number, reading) if not isinstance(event, DoubtResolved)]
+            answered.append((doubt, reading))
+            take(perception.answer(doubt.number, reading))
         if frame.index % NAIVE_EVERY == 0 and truth.lying and not truth.hands:
             result.naive_frames += 1
             result.naive_right += naive_is_right(naive, frame, truth)
-    judge(result, [happening for happening in table.happenings if happening.time < last - 1.0], events, seed)
+    result.unreadable = sum(is_unreadable(happening, truths[math.ceil(happening.time * fps)]) for happening in table.happenings)
+    judge(result, table.happenings, reports, spans, seed)
     return result
 
 
 def naive_is_right(detector: cv2.aruco.ArucoDetector, frame: Frame, truth: FrameTruth) -> bool:
     """Whether a tag of every piece on top is read in this frame."""
     _, numbers, _ = detector.detectMarkers(frame.image)
-    read = Counter([] if numbers is None else np.asarray(numbers).ravel().tolist())
+    read = set() if numbers is None else set(np.asarray(numbers).ravel().tolist())
     top = {(lying.piece.kind, lying.place): lying.piece.tag for lying in truth.lying}
-    return all(read[tag] >= 1 for tag in top.values())
+    return read.issuperset(top.values())
 
 
-def judge(result: Result, happenings: list[Happening], events: list[tuple[Observed, bool]], seed: int) -> None:
-    """Compares events with what happened."""
-    rest = [(event, asked) for event, asked in events if not isinstance(event, FieldChanged)]
+def judge(result: Result, happenings: list[Happening], reports: list[Report], spans: list[tuple[float, float]], seed: int) -> None:
+    """Compares events with what happened; `spans` says from when to when happenings had to wait for a doubt."""
+    rest = list(reports)
+    latest: Counter[str] = Counter()
     for happening in happenings:
         result.happenings += 1
-        found = next((entry for entry in rest if key(entry[0]) == key(happening) and entry[0].time > happening.time - 1.0), None)
-        if found is None:
+        exact = [report for report in rest if key(report.event) == key(happening) and report.event.time > happening.time - 1.0]
+        # Pass cards are taken back while the field is being cleared, in any order.
+        orders = [] if happening.kind == "pass_withdrawn" else ["play"]
+        orders += [f"seat {happening.seat}"] if happening.kind.startswith("pass") else []
+        if not exact or any(reports.index(exact[0]) < latest[order] for order in orders):
             result.wrong += 1
             result.mistakes.append(f"Shift {seed}, {happening.time:.1f} s: missed {happening}")
             continue
-        rest.remove(found)
-        event, asked = found
-        if asked:
+        latest.update({order: reports.index(exact[0]) - latest[order] for order in orders})
+        rest.remove(exact[0])
+        event = exact[0].event
+        if exact[0].asked:
             result.asked += 1
+            continue
+        result.first += 1
+        if any(begin < event.time and happening.time < end for begin, end in spans):
+            result.held += 1
         else:
-            result.first += 1
             result.latencies.append(event.time - happening.time)
-    late = happenings[-1].time + 0.5 if happenings else 0.0
-    for event, asked in rest:
-        if event.time <= late:
-            result.false += not asked
-            result.mistakes.append(f"Shift {seed}, {event.time:.1f} s: false {event}")
+            if event.time - happening.time > LATE_SECONDS:
+                result.mistakes.append(f"Shift {seed}, {happening.time:.1f} s: {event.time - happening.time:.2f} s late {event}")
+    for report in rest:
+        result.false += not report.asked
+        result.mistakes.append(f"Shift {seed}, {report.event.time:.1f} s: false {report.event}")
 
 
 def main() -> int:

@@ -147,6 +147,7 @@ def _paint_back(card: Picture) -> None:
         cv2.line(card, (start + height, 0), (start, height), (220, 220, 235), 2, cv2.LINE_AA)
 
 
+@lru_cache(maxsize=2)
 def table_picture(seed: int) -> Picture:
     """The empty table with the field sheet and things beside it: `TABLE_SCALE` pixels per mm, `TABLE_MARGIN` around the field."""
     rng = np.random.default_rng(seed)

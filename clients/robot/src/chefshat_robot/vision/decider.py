@@ -2,15 +2,15 @@
 
 The decider sees no pictures, so that a recording of sightings gives the same events as the camera did. Its rule:
 
-- A card **settles** when its tag was read `SETTLE_READS` times within `STILL_MM` while nothing moved around its place.
+- A card **settles** when its tag was read in `SETTLE_READS` frames within `STILL_MM` while nothing moved around its place.
 - Cards that settled are reported together as soon as nothing moves at any place for cards (`QUIET_FRAMES`) and every place is
   **explained**: its look is the one it had before, it is empty, or the card on top of it was read since then.
 - A place that stays unexplained for `DOUBT_SECONDS` while no arm reaches over the edge of the field becomes a doubt, and so does
   one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
-- A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone;
-  if others stay for `TAKEN_SECONDS`, the cards were taken back. Cards on others were taken back when both tags of one beneath them
-  are read again and none of theirs.
+- A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone, or if
+  only some are, when none of the others can be read as new cards come. If others stay for `TAKEN_SECONDS`, cards were taken back.
+  Cards on others were taken back when both tags of one beneath them are read again and none of theirs.
 """
 
 from __future__ import annotations
@@ -38,10 +38,12 @@ DOUBT_SECONDS = 1.2
 """A place that cannot be explained for this long becomes a doubt, in s."""
 TAKEN_SECONDS = 1.2
 """Cards that are gone for this long while others stay were taken back, in s."""
+TOGETHER_SECONDS = 0.8
+"""What begins no more than this before the first card of a play, or before clearing, is of the same movement of a hand, in s."""
 REACH = 45.0
 """A card belongs to the nearest place, if its centre is no further from it than this, in mm."""
 TRUSTED_HAMMING = 1
-"""Tags with more corrected bits are only options of a doubt."""
+"""Readings of tags with more corrected bits count half."""
 SAME_CARD_MM = 12.0
 """The two tags of a card give its centre within this distance; else there are two cards with one code, in mm."""
 
@@ -60,8 +62,8 @@ class _Track:
     x: float
     y: float
     angle: float
-    trusted: int = 0
-    """Readings that are trusted."""
+    readings: float = 0.0
+    """Frames in which it was read."""
     ends: set[bool] = dataclass_field(default_factory=set)
     """Which of its two tags were read."""
 
@@ -73,6 +75,23 @@ class _Known:
     spot: int
     told: bool = False
     """Whether it is the answer to a doubt, and was never read."""
+
+
+@dataclass(frozen=True)
+class _Riddle:
+    """A look of a place that is not explained.
+
+    Attributes:
+        look: The look.
+        since: When it was first seen, in s.
+        seen: When it was last seen, in s.
+        options: The cards it may show, the likeliest first.
+    """
+
+    look: int
+    since: float
+    seen: float
+    options: tuple[Card, ...]
 
 
 @dataclass
@@ -87,20 +106,27 @@ class _Spot:
     """For how long it has been unexplained while no arm reached over the field, in s."""
     frames: int = 0
     """For how many such frames."""
+    since: float = 0.0
+    """When it was first seen so, in s."""
     seen: float = 0.0
     """When it was last seen so, in s."""
-    suspect: int | None = None
-    """An unexplained look that was covered before it could be explained."""
+    covered: _Riddle | None = None
+    """A look that was covered before it could be explained."""
     doubt: int | None = None
     """The open doubt about its present look."""
     gone_since: float | None = None
-    """Since when the card on top of it is not there, in s."""
+    """Since when it looks empty although cards lay there, in s."""
 
 
 @dataclass
 class _Play:
-    """Cards that were laid together."""
+    """Cards that were laid together.
 
+    Attributes:
+        since: When the first of them was noticed, in s.
+    """
+
+    since: float
     cards: dict[Card, int] = dataclass_field(default_factory=dict)
     """The cards and their spots."""
     doubts: set[int] = dataclass_field(default_factory=set)
@@ -113,6 +139,7 @@ class _Play:
 class _Gone:
     """Cards were taken away: some (`TakenBack`), or all (`Cleared`)."""
 
+    since: float
     cards: dict[Card, int] | None = None
 
 
@@ -120,6 +147,7 @@ class _Gone:
 class _PassMoved:
     """The pass card of a seat was shown or withdrawn."""
 
+    since: float
     seat: int
     shown: bool
 
@@ -132,7 +160,6 @@ class _OpenDoubt:
     look: int
     play: _Play
     """Where the card belongs. For a pass card: a play without cards that keeps the order."""
-    options: tuple[Card, ...]
 
 
 class Decider:
@@ -181,6 +208,11 @@ class Decider:
             if card.face == face and card not in self.on_table:
                 return card
         raise ValueError(f"no card of face {face} is left: faces are 1..12, and those on the field cannot be laid again")
+
+    def look_of_doubt(self, number: int) -> tuple[int, int] | None:
+        """The place that an open doubt is about, as an index of `SPOTS`, and its look; None if the doubt is not open."""
+        doubt = self._doubts.get(number)
+        return None if doubt is None else (doubt.spot, doubt.look)
 
     # Sightings.
 
@@ -247,7 +279,7 @@ class Decider:
         lower, above = self._uncovered(doubt.spot)
         if above and lower is not None and lower.piece.card is not None and lower.piece.card.face == card.face:
             # The answer is the card beneath, whose other tag cannot be read.
-            self._queue.insert(self._queue.index(doubt.play), _Gone(self._forget(above)))
+            self._queue.insert(self._queue.index(doubt.play), _Gone(doubt.play.since, self._forget(above)))
             return
         doubt.play.cards[card] = doubt.spot
         later = self._queue[self._queue.index(doubt.play) + 1 :]
@@ -261,7 +293,7 @@ class Decider:
         piece = next((piece for piece, known in self._known.items() if known.spot == doubt.spot), None)
         if shown == (piece is not None):
             return
-        self._queue.insert(self._queue.index(doubt.play), _PassMoved(seat, shown))
+        self._queue.insert(self._queue.index(doubt.play), _PassMoved(doubt.play.since, seat, shown))
         if piece is not None:
             del self._known[piece]
         else:
@@ -282,12 +314,12 @@ class Decider:
 
     def _forget_moved(self) -> None:
         """Forgets the readings at places where something moves."""
-        self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
-        for spot, seen in zip(self._spots, self._places, strict=True):
+        for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
             if seen.still == 0:
-                if spot.frames >= SETTLE_READS and spot.suspect is None and spot.doubt is None:
-                    spot.suspect = seen.look
-                spot.unexplained, spot.waited, spot.frames, spot.gone_since = False, 0.0, 0, None
+                if spot.frames >= SETTLE_READS and spot.covered is None and spot.doubt is None:
+                    spot.covered = self._riddle(number)
+                spot.unexplained, spot.waited, spot.frames = False, 0.0, 0
+        self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
 
     def _follow_tags(self, tags: Iterable[SeenTag]) -> None:
         """Counts the readings of each piece."""
@@ -312,29 +344,31 @@ class Decider:
                     continue
                 track.ends.add(flipped)
             track = self._tracks.get(piece)
-            if track is not None and min(tag.hamming for tag in readings) <= TRUSTED_HAMMING:
-                track.trusted += 1
+            if track is not None:
+                track.readings += 1.0 if min(tag.hamming for tag in readings) <= TRUSTED_HAMMING else 0.5
 
     def _settle(self, events: list[Observed]) -> None:
         """Takes note of the pieces that settled."""
-        for track in self._tracks.values():
-            if track.trusted < SETTLE_READS:
+        for track in list(self._tracks.values()):
+            if track.readings < SETTLE_READS or track.piece not in self._tracks:
                 continue
             known = self._known.get(track.piece)
             if known is not None:
                 known.spot, known.told = track.spot, False
+                self._spots[track.spot].gone_since = None
                 top = self._top(track.spot)
                 if top == track.piece and len(track.ends) == 2:
                     self._explained(track.spot, events)
             elif track.piece.card is None:
                 self._known[track.piece] = _Known(track.spot)
-                self._queue.append(_PassMoved(track.piece.number, True))
+                self._queue.append(_PassMoved(self._time, track.piece.number, True))
                 self._explained(track.spot, events)
             else:
                 self._settle_card(track, track.piece.card, events)
 
     def _settle_card(self, track: _Track, card: Card, events: list[Observed]) -> None:
         """Takes note of a card that was not on the field before."""
+        self._settle_gone(events)
         spot = self._spots[track.spot]
         top = self._top(track.spot)
         if top is not None and self._known[top].told and top.card is not None and top.card.face == card.face:
@@ -353,11 +387,13 @@ class Decider:
             self._explained(track.spot, events)
             return
         play = self._open_play()
-        if spot.suspect is not None or (play is not None and track.spot in play.cards.values()):
+        if spot.covered is not None and play is not None and spot.covered.since < play.since - TOGETHER_SECONDS:
+            self._raise_doubt(track.spot, spot.covered, events, play)
+        elif spot.covered is not None or (play is not None and track.spot in play.cards.values()):
             self._close_play(events)
             play = None
         if play is None:
-            play = _Play()
+            play = _Play(self._time)
             self._queue.append(play)
         play.cards[card] = track.spot
         self._explained(track.spot, events)
@@ -372,8 +408,8 @@ class Decider:
         play = self._open_play()
         for number in CARD_SPOTS:
             spot = self._spots[number]
-            if spot.suspect is not None:
-                self._raise_doubt(number, spot.suspect, events, play)
+            if spot.covered is not None:
+                self._raise_doubt(number, spot.covered, events, play)
         if play is not None:
             play.closed = True
 
@@ -387,7 +423,7 @@ class Decider:
         """A place's present look is explained, and with it a doubt about this look."""
         spot = self._spots[number]
         spot.explained = self._places[number].look
-        spot.unexplained, spot.waited, spot.frames, spot.suspect = False, 0.0, 0, None
+        spot.unexplained, spot.waited, spot.frames, spot.covered = False, 0.0, 0, None
         if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
             self._close_doubt(spot.doubt, events)
 
@@ -399,7 +435,11 @@ class Decider:
             occupied = self._top(number) is not None
             if not occupied and seen.empty is not False:
                 spot.explained = seen.look
-            spot.unexplained = seen.look != spot.explained and not seen.empty
+            was_unexplained, spot.unexplained = spot.unexplained, seen.look != spot.explained and not seen.empty
+            if occupied and seen.look == spot.explained:
+                spot.covered = None
+            if not was_unexplained:
+                spot.since = self._time
             if not spot.unexplained:
                 spot.waited, spot.frames = 0.0, 0
             elif not self._reaching:
@@ -410,28 +450,32 @@ class Decider:
     def _raise_doubts(self, events: list[Observed]) -> None:
         """Asks about places that stay unexplained."""
         for number, spot in enumerate(self._spots):
-            seen = self._places[number]
             open_play = self._open_play() if number in CARD_SPOTS else None
-            if spot.suspect is not None and self._top(number) is None and self._is_empty(number):
-                self._raise_doubt(number, spot.suspect, events, open_play)
+            if spot.covered is not None and self._top(number) is None and self._is_empty(number):
+                self._raise_doubt(number, spot.covered, events, open_play)
             elif spot.doubt is None and spot.waited >= DOUBT_SECONDS:
-                self._raise_doubt(number, seen.look, events, open_play)
+                self._raise_doubt(number, self._riddle(number), events, open_play)
 
-    def _raise_doubt(self, number: int, look: int, events: list[Observed], play: _Play | None) -> None:
-        """Asks about a look of a place, whose card belongs to a play; None: to one of its own."""
+    def _riddle(self, number: int) -> _Riddle:
+        """The present look of a place, as a riddle."""
+        tracks = sorted((track for track in self._tracks.values() if track.spot == number), key=lambda track: -track.readings)
+        options = tuple(card for track in tracks if track.piece not in self._known and (card := track.piece.card) is not None)
         spot = self._spots[number]
-        spot.suspect = None
-        if play is None or number in play.cards.values():
-            play = _Play()
-            self._queue.append(play)
-        candidates = sorted((track for track in self._tracks.values() if track.spot == number), key=lambda track: -track.trusted)
-        options = tuple(card for track in candidates if track.piece not in self._known and (card := track.piece.card) is not None)
+        return _Riddle(self._places[number].look, spot.since, spot.seen, options)
+
+    def _raise_doubt(self, number: int, riddle: _Riddle, events: list[Observed], play: _Play | None) -> None:
+        """Asks about a look of a place, whose card belongs to a play; or to one of its own, in the order of the times."""
+        spot = self._spots[number]
+        spot.covered = None
+        if play is None or riddle.since < play.since - TOGETHER_SECONDS or number in play.cards.values():
+            play = _Play(riddle.since)
+            self._queue.insert(sum(entry.since <= riddle.since for entry in self._queue), play)
         play.doubts.add(self._next_doubt)
         play.closed = True
-        if look == self._places[number].look:
+        if riddle.look == self._places[number].look:
             spot.doubt = self._next_doubt
-        self._doubts[self._next_doubt] = _OpenDoubt(number, look, play, options)
-        events.append(Doubt(self._frame, self._time, self._next_doubt, SPOTS[number].name, spot.seen, options))
+        self._doubts[self._next_doubt] = _OpenDoubt(number, riddle.look, play)
+        events.append(Doubt(self._frame, self._time, self._next_doubt, SPOTS[number].name, riddle.seen, riddle.options))
         self._next_doubt += 1
 
     # Cards that are gone.
@@ -442,13 +486,13 @@ class Decider:
             lower, above = self._uncovered(number)
             if above and lower is not None and len(lower.ends) == 2 and self._spots[number].frames >= SETTLE_READS:
                 self._explained(number, events)
-                self._queue.append(_Gone(self._forget(above)))
+                self._queue.append(_Gone(self._time, self._forget(above)))
 
     def _uncovered(self, number: int) -> tuple[_Track | None, list[Piece]]:
         """The highest card of a place that is read now, and those that lay on top of it."""
         pile = [piece for piece, known in self._known.items() if known.spot == number]
         read = [place for place, piece in enumerate(pile) if piece in self._tracks]
-        if not read or self._tracks[pile[read[-1]]].trusted < SETTLE_READS:
+        if not read or self._tracks[pile[read[-1]]].readings < SETTLE_READS:
             return None, []
         return self._tracks[pile[read[-1]]], pile[read[-1] + 1 :]
 
@@ -457,31 +501,56 @@ class Decider:
         for piece, known in list(self._known.items()):
             if piece.kind is PieceKind.PASS and self._is_empty(known.spot):
                 del self._known[piece]
-                self._queue.append(_PassMoved(piece.number, False))
+                self._queue.append(_PassMoved(self._time, piece.number, False))
                 self._explained(known.spot, events)
-        occupied = sorted({known.spot for piece, known in self._known.items() if piece.kind is PieceKind.CARD})
-        empty = [spot for spot in occupied if self._is_empty(spot)]
-        if not empty:
-            return
-        if len(empty) == len(occupied):
-            self._close_play(events)
-            self._remove(empty, events)
-            self._queue.append(_Gone())
-            return
-        for spot in empty:
-            if self._spots[spot].gone_since is None:
+        occupied = {known.spot for piece, known in self._known.items() if piece.kind is PieceKind.CARD}
+        for spot in occupied:
+            if self._spots[spot].gone_since is None and self._is_empty(spot):
                 self._spots[spot].gone_since = self._time
         quiet = all(self._places[spot].still >= QUIET_FRAMES for spot in CARD_SPOTS)
-        gone = [spot for spot in empty if self._time - (self._spots[spot].gone_since or self._time) >= TAKEN_SECONDS]
-        if quiet and gone:
-            self._queue.append(_Gone(self._remove(gone, events)))
+        gone = self._gone_for(0.0)
+        if gone and len(gone) == len(occupied):
+            self._clear(events)
+        elif quiet and (gone := self._gone_for(TAKEN_SECONDS)):
+            self._queue.append(_Gone(self._time, self._remove(gone, events)))
+
+    def _gone_for(self, seconds: float) -> list[int]:
+        """The places whose cards have been gone for some time, in s."""
+        return [
+            number
+            for number in CARD_SPOTS
+            if (since := self._spots[number].gone_since) is not None and self._time - since >= seconds
+        ]
+
+    def _settle_gone(self, events: list[Observed]) -> None:
+        """As new cards lie there, decides whether all cards are gone, or those that stayed can still be read."""
+        gone = self._gone_for(0.0)
+        if not gone:
+            return
+        rest = {known.spot for piece, known in self._known.items() if known.spot in CARD_SPOTS} - set(gone)
+        stayed = {known.spot for piece, known in self._known.items() if piece in self._tracks or known.told} & rest
+        if stayed:
+            self._queue.append(_Gone(self._time, self._remove(gone, events)))
+        else:
+            self._clear(events)
+
+    def _clear(self, events: list[Observed]) -> None:
+        """Takes note that all cards are gone. Looks that began with the clearing are not of cards: light moved, or a hand."""
+        began = min(since for spot in self._spots if (since := spot.gone_since) is not None) - TOGETHER_SECONDS
+        for spot in self._spots[:_FIRST_PASS]:
+            if spot.covered is not None and spot.covered.since > began:
+                spot.covered = None
+        self._close_play(events)
+        self._remove([known.spot for piece, known in self._known.items() if piece.kind is PieceKind.CARD], events)
+        self._queue.append(_Gone(self._time))
 
     def _remove(self, spots: list[int], events: list[Observed]) -> dict[Card, int]:
         """Forgets the cards of some places and returns them."""
         removed = self._forget([piece for piece, known in self._known.items() if known.spot in spots])
         for spot in spots:
             self._spots[spot].gone_since = None
-            self._explained(spot, events)
+            if self._is_empty(spot):
+                self._explained(spot, events)
         return removed
 
     def _forget(self, pieces: Iterable[Piece]) -> dict[Card, int]:
@@ -505,6 +574,8 @@ class Decider:
         """Reports what need not wait any more, in order."""
         while self._queue:
             entry = self._queue[0]
+            if any(since < entry.since for since in self._waiting()):
+                return
             if isinstance(entry, _Play):
                 if entry.doubts or not (entry.closed or self._is_quiet()):
                     return
@@ -518,6 +589,11 @@ class Decider:
             else:
                 events.append(TakenBack(self._frame, self._time, *_in_order(entry.cards)))
             self._queue.pop(0)
+
+    def _waiting(self) -> list[float]:
+        """Since when there are looks that are neither explained nor asked about, in s."""
+        covered = [spot.covered.since for spot in self._spots if spot.covered is not None]
+        return covered + [spot.since for spot in self._spots if spot.unexplained and spot.doubt is None]
 
     def _is_quiet(self) -> bool:
         """Whether nothing moves at the places for cards, and all of them are explained."""

@@ -11,8 +11,11 @@ from .camera import Camera
 from .decider import SETTLE_READS, Decider
 from .events import Doubt, Observed, Picture
 from .frames import Frame
-from .reader import SPOTS, Reader, Sighting
+from .reader import Reader, Sighting
 from .recording import Recorder
+
+KEPT_LOOKS = 5
+"""A picture for a doubt is kept until its place has changed so many times."""
 
 
 class Perception:
@@ -34,7 +37,8 @@ class Perception:
         self._reader = Reader(camera)
         self._decider = Decider(deck)
         self._recorder = recorder
-        self._pictures: dict[int, Picture] = {}
+        self._pictures: dict[tuple[int, int], Picture] = {}
+        """Pictures for doubts, by place and look."""
 
     def see(self, frame: Frame) -> list[Observed]:
         """Takes in the next frame and returns what is now certain, in order.
@@ -45,8 +49,12 @@ class Perception:
         self.sighting = self._reader.read(frame, attention=self._decider.unexplained)
         events = self._decider.see(self.sighting)
         for spot in self._decider.unexplained:
-            if self.sighting.places[spot].still == SETTLE_READS:
-                self._pictures[spot] = self._reader.cut_out(frame.image, spot)
+            place = self.sighting.places[spot]
+            if place.still == SETTLE_READS:
+                old = [key for key in self._pictures if key[0] == spot and key[1] <= place.look - KEPT_LOOKS]
+                for key in old:
+                    del self._pictures[key]
+                self._pictures[spot, place.look] = self._reader.cut_out(frame.image, spot)
         if self._recorder is not None:
             self._recorder.saw(frame, self.sighting)
         return self._reported([self._with_picture(event) if isinstance(event, Doubt) else event for event in events])
@@ -80,5 +88,5 @@ class Perception:
         return events
 
     def _with_picture(self, doubt: Doubt) -> Doubt:
-        spot = next(number for number, place in enumerate(SPOTS) if place.name == doubt.place)
-        return replace(doubt, picture=self._pictures.get(spot))
+        about = self._decider.look_of_doubt(doubt.number)
+        return doubt if about is None else replace(doubt, picture=self._pictures.get(about))

@@ -3,13 +3,15 @@
 The reader knows nothing about cards or the game. It spends little: a map of the field at 1 mm tells where something changes, and
 tags are only read where nothing moves any more, for a few frames after each change and then in turn.
 
-A **look** is the number of a place's appearance: it grows when, after a movement, the place looks otherwise than before.
+A **look** is the number of a place's appearance. After a movement a place gets a new one, unless it looks as it did shortly before.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from dataclasses import field as dataclass_field
 from typing import Any
 
 import cv2
@@ -36,7 +38,7 @@ BLOCK = 4
 MOVEMENT = 0.07
 """A block moves if its brightness, relative to its surroundings, changes by more than this from one frame to the next..."""
 MOVEMENT_SIGMAS = 7.0
-"""...and by more than so many standard deviations of the noise."""
+"""...and by more than so many standard deviations of the noise, which counts for more in the dark."""
 MOVING_BLOCKS = 3
 """A place moves if so many of its blocks do."""
 NEAR = 8.0
@@ -48,10 +50,14 @@ CORE = (15.0, 15.0)
 reach it."""
 DIFFERENT = 0.085
 """Mean difference of two looks, relative to the local brightness, from which on they are different."""
+LOOKS = 3
+"""So many looks of a place are remembered: a hand that rests over a card is a look too, and then the card's look returns."""
 EMPTY = 0.06
 """Mean difference from the empty place up to which a place is empty."""
 EMPTY_FRAMES = 4
 """Frames for which a place must be still and without tags to be remembered as empty, at first."""
+AVERAGE_FRAMES = 4
+"""The appearance of a still place is averaged over so many frames, against noise."""
 ADAPT = 0.03
 """How quickly the memory of a look follows the light: the weight of each new frame."""
 EDGE = 2
@@ -172,14 +178,26 @@ class _Spot:
 
     still: int = 0
     look: int = 0
-    remembered: NDArray[np.float32] | None = None
-    """The present look."""
-    gathered: NDArray[np.float32] | None = None
-    """Sum of what was seen since it became still, until the look is decided."""
+    looks: dict[int, NDArray[np.float32]] = dataclass_field(default_factory=dict)
+    """The latest looks by their numbers, the present one last."""
+    new_look: int = 1
+    """The number of the next new look."""
+    average: NDArray[np.float32] | None = None
+    """Its appearance since it became still, averaged; None while something moves."""
     empty: NDArray[np.float32] | None = None
     """The look of the empty place."""
     bare: int = 0
     """Frames read in a row without a tag, while the empty place is not known."""
+
+    def recognize(self, appearance: NDArray[np.float32]) -> None:
+        """Finds the look of an appearance, or makes a new one."""
+        differences = {look: difference(appearance, remembered) for look, remembered in self.looks.items()}
+        self.look = min(differences, key=lambda look: differences[look], default=0)
+        if differences.get(self.look, math.inf) > DIFFERENT:
+            self.look, self.new_look = self.new_look, self.new_look + 1
+        self.looks[self.look] = self.looks.pop(self.look, appearance.copy())
+        if len(self.looks) > LOOKS:
+            del self.looks[next(iter(self.looks))]
 
 
 class Reader:
@@ -214,15 +232,15 @@ class Reader:
         if changed is not None:
             self._tags = TagReader(self.view.scale * field.CARD_TAG_SIZE)
             self._before = self._edge = None
-        relative = _relative(self.view.rectified(grey))
+        relative, around = _relative(self.view.rectified(grey))
         blocks = _shrunk(relative, BLOCK)
-        moving = self._movement(blocks)
+        moving = self._movement(blocks, _shrunk(around, BLOCK))
         cells = _shrunk(relative, CELL)
         to_read = [number for number in range(len(SPOTS)) if self._follow(number, moving, cells, frame.index)]
         closely = [number for number in attention if self._spots[number].still]
         to_read += [number for number in closely if number not in to_read]
         tags = self._read_tags(grey, [number for number in to_read if number not in closely], closely)
-        places = tuple(self._seen(number, cells, number in to_read, tags) for number in range(len(SPOTS)))
+        places = tuple(self._seen(number, number in to_read, tags) for number in range(len(SPOTS)))
         return Sighting(frame.index, frame.time, changed, tuple(tags), self._is_reaching(blocks), places)
 
     def cut_out(self, image: Picture, spot: int) -> Picture:
@@ -244,32 +262,31 @@ class Reader:
         noise = float(np.median(change)) / 0.6745
         return int(np.count_nonzero(change > max(EDGE_CHANGE, MOVEMENT_SIGMAS * noise))) >= EDGE_BLOCKS
 
-    def _movement(self, blocks: NDArray[np.float32]) -> NDArray[np.bool_] | None:
-        """Which blocks of the map moved since the last frame; None if all must count as moved."""
+    def _movement(self, blocks: NDArray[np.float32], around: NDArray[np.float32]) -> NDArray[np.bool_] | None:
+        """Which blocks of the map, with the brightness of their surroundings, moved since the last frame; None: all of them."""
         before, self._before = self._before, blocks
         if before is None:
             return None
         change = cv2.absdiff(blocks, before)
-        noise = float(np.median(change)) / 0.6745
-        return np.asarray(change > max(MOVEMENT, MOVEMENT_SIGMAS * noise))
+        noise = float(np.median(change * around)) / 0.6745
+        return np.asarray(change > np.maximum(MOVEMENT, MOVEMENT_SIGMAS * noise / around))
 
     def _follow(self, number: int, moving: NDArray[np.bool_] | None, cells: NDArray[np.float32], frame: int) -> bool:
         """Follows a place through the frame, and returns whether its tags should be read."""
         spot = self._spots[number]
         if moving is None or np.count_nonzero(moving[_OUTER[number]]) >= MOVING_BLOCKS:
-            spot.still, spot.gathered, spot.bare = 0, None, 0
+            spot.still, spot.average, spot.bare = 0, None, 0
             return False
         spot.still += 1
         seen = cells[_CORE[number]]
-        if spot.still <= STILL_FRAMES:
-            spot.gathered = seen.copy() if spot.gathered is None else spot.gathered + seen
-            if spot.still == STILL_FRAMES:
-                look = np.asarray(spot.gathered / STILL_FRAMES, dtype=np.float32)
-                if spot.remembered is None or difference(look, spot.remembered) > DIFFERENT:
-                    spot.look += 1
-                    spot.remembered = look
-        elif spot.remembered is not None:
-            spot.remembered += ADAPT * (seen - spot.remembered)
+        if spot.average is None:
+            spot.average = seen.copy()
+        else:
+            spot.average += (seen - spot.average) / min(spot.still, AVERAGE_FRAMES)
+        if spot.still == STILL_FRAMES:
+            spot.recognize(spot.average)
+        elif spot.still > STILL_FRAMES:
+            spot.looks[spot.look] += ADAPT * (seen - spot.looks[spot.look])
         return spot.still <= READ_FRAMES or frame % REFRESH_FRAMES == number
 
     def _read_tags(self, grey: Picture, spots: list[int], closely: list[int]) -> list[SeenTag]:
@@ -301,22 +318,21 @@ class Reader:
         angle = float(np.degrees(np.arctan2(across[1], across[0])))
         return SeenTag(tag.number, round(float(x), 2), round(float(y), 2), round(angle, 1), tag.hamming, round(tag.margin, 1))
 
-    def _seen(self, number: int, cells: NDArray[np.float32], read: bool, tags: list[SeenTag]) -> SeenPlace:
+    def _seen(self, number: int, read: bool, tags: list[SeenTag]) -> SeenPlace:
         """What a place shows in this frame."""
         spot = self._spots[number]
-        if spot.still < STILL_FRAMES:
+        if spot.average is None or spot.still < STILL_FRAMES:
             return SeenPlace(spot.still, spot.look, None, read)
-        seen = cells[_CORE[number]]
         if spot.empty is None:
             left, top, right, bottom = _AREA[number]
             has_tag = any(left < tag.x < right and top < tag.y < bottom for tag in tags)
             spot.bare = 0 if has_tag else spot.bare + read
             if spot.bare >= EMPTY_FRAMES:
-                spot.empty = seen.copy()
+                spot.empty = spot.average.copy()
             return SeenPlace(spot.still, spot.look, None, read)
-        empty = difference(seen, spot.empty) <= EMPTY
+        empty = difference(spot.average, spot.empty) <= EMPTY
         if empty:
-            spot.empty += ADAPT * (seen - spot.empty)
+            spot.empty += ADAPT * (spot.average - spot.empty)
         return SeenPlace(spot.still, spot.look, empty, read)
 
 
@@ -325,11 +341,11 @@ def difference(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
     return float(cv2.norm(one, other, cv2.NORM_L1)) / one.size
 
 
-def _relative(grey: Picture) -> NDArray[np.float32]:
-    """The map relative to the brightness of its surroundings: about 1, without shadows and changes of light."""
+def _relative(grey: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The map relative to the brightness of its surroundings (about 1: without shadows and changes of light), and the latter."""
     values = grey.astype(np.float32)
-    around = np.asarray(cv2.blur(values, (SURROUNDINGS, SURROUNDINGS)), dtype=np.float32)
-    return np.asarray(cv2.divide(values, around + np.float32(8.0)), dtype=np.float32)
+    around = np.asarray(cv2.blur(values, (SURROUNDINGS, SURROUNDINGS)), dtype=np.float32) + np.float32(8.0)
+    return np.asarray(cv2.divide(values, around), dtype=np.float32), around
 
 
 def _shrunk(relative: NDArray[np.float32], step: int) -> NDArray[np.float32]:

@@ -1,0 +1,196 @@
+"""What is decided from sightings, without pictures: what is hidden or unreadable at the wrong moment never changes the events."""
+
+from __future__ import annotations
+
+from chefshat_robot import field
+from chefshat_robot.deck import Card, Piece, PieceKind
+from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, Laid, Observed, PassShown, TakenBack
+from chefshat_robot.vision.decider import DOUBT_SECONDS, TAKEN_SECONDS, Decider
+from chefshat_robot.vision.reader import SPOTS, STILL_FRAMES, SeenPlace, SeenTag, Sighting
+
+FPS = 15
+DOUBTED = round(DOUBT_SECONDS * FPS) + 3
+"""Frames after which a place that cannot be read is asked about."""
+PASS_1 = 12
+"""The pass place of seat 1, as an index of `SPOTS`."""
+PASS_3 = 14
+UNREADABLE = None
+
+
+class Table:
+    """A table whose places are set one by one, and what a decider says about it."""
+
+    def __init__(self) -> None:
+        self.decider = Decider()
+        self.events: list[Observed] = []
+        self._frame = 0
+        self._still = [9] * len(SPOTS)
+        self._looks = [1] * len(SPOTS)
+        self._before = [1] * len(SPOTS)
+        self._empty = [True] * len(SPOTS)
+        self._tops: list[Piece | None] = [None] * len(SPOTS)
+
+    def wait(self, frames: int = 8) -> None:
+        """Shows the table for some frames."""
+        for _ in range(frames):
+            places = tuple(
+                SeenPlace(still, look if still >= STILL_FRAMES else before, empty if still >= STILL_FRAMES else None, True)
+                for still, look, before, empty in zip(self._still, self._looks, self._before, self._empty, strict=True)
+            )
+            tags = tuple(tag for spot, piece in enumerate(self._tops) if piece for tag in tags_of(piece, spot))
+            self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, False, places))
+            self._frame += 1
+            self._still = [still + 1 for still in self._still]
+
+    def put(self, *spots: int, cards: tuple[Card, ...] | None = None, look: int | None = None) -> None:
+        """Lays cards at places, or something without a tag that can be read."""
+        for number, spot in enumerate(spots):
+            card = cards[number] if cards else None
+            piece = Piece(PieceKind.CARD, card.deck, card.index) if card else None
+            self.change(spot, piece, look=look)
+
+    def change(self, spot: int, piece: Piece | None, empty: bool = False, look: int | None = None) -> None:
+        """Something moves at a place, and then it has another look."""
+        self._still[spot], self._before[spot] = 0, self._looks[spot]
+        self._looks[spot] = look if look is not None else self._looks[spot] + 1
+        self._empty[spot], self._tops[spot] = empty, piece
+
+    def sweep(self, *spots: int) -> None:
+        """Empties places."""
+        for spot in spots:
+            self.change(spot, None, empty=True)
+
+    def said(self) -> list[Observed]:
+        """The new events."""
+        events, self.events = self.events, []
+        return events
+
+
+def tags_of(piece: Piece, spot: int) -> list[SeenTag]:
+    """The two tags of a piece that lies exactly at a place, upright."""
+    right, down = field.CARD_WIDTH / 2 - field.CARD_TAG_CENTRE[0], field.CARD_HEIGHT / 2 - field.CARD_TAG_CENTRE[1]
+    place = SPOTS[spot]
+    return [
+        SeenTag(piece.tag, place.x - right, place.y - down, 0.0, 0, 60.0),
+        SeenTag(piece.tag, place.x + right, place.y + down, 180.0, 0, 60.0),
+    ]
+
+
+def kinds(events: list[Observed]) -> list[type[Observed]]:
+    return [type(event) for event in events]
+
+
+NINES = (Card(0, 36), Card(0, 37), Card(0, 38))
+FOURS = (Card(0, 6), Card(0, 7), Card(0, 8))
+
+
+def laid(table: Table, *cards: Card) -> None:
+    """Lays cards on the first places and checks that this is said."""
+    table.put(*range(len(cards)), cards=cards)
+    table.wait()
+    (event,) = table.said()
+    assert isinstance(event, Laid)
+    assert event.cards == cards
+
+
+def test_a_place_that_never_looks_empty_does_not_turn_clearing_into_taking_back() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.sweep(0, 1)
+    table.change(2, None)
+    table.wait(6)
+    assert table.said() == []
+    table.put(0, 1, 2, cards=FOURS)
+    table.wait()
+    assert kinds(table.said()) == [Cleared, Laid]
+    assert table.decider.on_table == {card: place for place, card in enumerate(FOURS, start=1)}
+
+
+def test_a_place_that_looked_empty_for_a_moment_is_cleared_with_the_others() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.sweep(0, 1)
+    table.change(2, None)
+    table.wait(6)
+    table.change(0, None)
+    table.sweep(2)
+    table.wait(4)
+    table.put(0, cards=(FOURS[0],))
+    table.wait()
+    assert kinds(table.said()) == [Cleared, Laid]
+
+
+def test_cards_that_are_still_read_stay_as_new_ones_come() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.sweep(2)
+    table.wait(6)
+    table.put(2, cards=(FOURS[0],))
+    table.wait()
+    assert kinds(table.said()) == [TakenBack, Laid]
+    assert table.decider.on_table == {NINES[0]: 1, NINES[1]: 2, FOURS[0]: 3}
+
+
+def test_cards_gone_for_long_were_taken_back() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.sweep(1)
+    table.wait(round(TAKEN_SECONDS * FPS) + 5)
+    (event,) = table.said()
+    assert isinstance(event, TakenBack)
+    assert (event.cards, event.places) == ((NINES[1],), (2,))
+
+
+def test_a_pass_is_not_told_before_an_earlier_one_that_is_being_asked_about() -> None:
+    table = Table()
+    table.change(PASS_1, UNREADABLE)
+    table.wait(8)
+    table.change(PASS_3, Piece(PieceKind.PASS, 0, 3))
+    table.wait(8)
+    assert table.said() == []
+    table.wait(DOUBTED)
+    (doubt,) = table.said()
+    assert isinstance(doubt, Doubt)
+    assert doubt.place == "pass 1"
+    events = table.decider.answer(doubt.number, True)
+    assert kinds(events) == [DoubtResolved, PassShown, PassShown]
+    assert [event.seat for event in events if isinstance(event, PassShown)] == [1, 3]
+
+
+def test_a_card_covered_before_it_was_read_is_asked_about_as_it_was() -> None:
+    table = Table()
+    table.put(0, 1, cards=(NINES[0], NINES[1]))
+    table.put(2)
+    table.wait(10)
+    table.put(0, 1, 2, cards=FOURS)
+    table.wait()
+    (doubt,) = table.said()
+    assert isinstance(doubt, Doubt)
+    assert (doubt.place, round(doubt.seen * FPS)) == ("3", 9)
+    events = table.decider.answer(doubt.number, NINES[2])
+    assert [event.cards for event in events if isinstance(event, Laid)] == [NINES, FOURS]
+
+
+def test_a_hand_that_rests_over_a_card_is_nothing() -> None:
+    table = Table()
+    laid(table, NINES[0])
+    table.change(0, None, look=7)
+    table.wait(8)
+    table.change(0, None, look=2)
+    table.wait(40)
+    assert table.said() == []
+
+
+def test_cards_laid_after_something_rested_over_a_place_are_one_play() -> None:
+    table = Table()
+    laid(table, NINES[0], NINES[1])
+    table.change(1, None)
+    table.wait(15)
+    table.put(0, 2, cards=(FOURS[0], FOURS[2]))
+    table.wait(4)
+    table.put(1, cards=(FOURS[1],))
+    table.wait(12)
+    (doubt,) = table.said()
+    assert isinstance(doubt, Doubt)
+    events = table.decider.answer(doubt.number, False)
+    assert [event.cards for event in events if isinstance(event, Laid)] == [FOURS]
