@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from chefshat_robot import cli
 from chefshat_robot.deck import Card
 from chefshat_robot.synthetic import (
     DIFFICULTIES,
@@ -45,7 +47,9 @@ from chefshat_robot.vision import (
     PassWithdrawn,
     Perception,
     Recorder,
+    SourceError,
     TakenBack,
+    from_json,
     open_source,
     replay,
     to_json,
@@ -284,8 +288,6 @@ def test_a_damaged_recording_is_refused(tmp_path: Path) -> None:
 
 
 def test_events_survive_json() -> None:
-    from chefshat_robot.vision import from_json
-
     events: list[Observed] = [
         Laid(1, 0.1, (Card(0, 3), Card(0, 4)), (1, 2)),
         TakenBack(2, 0.2, (Card(0, 3),), (1,)),
@@ -302,8 +304,6 @@ def test_events_survive_json() -> None:
 
 
 def test_sources_that_cannot_be_used(tmp_path: Path) -> None:
-    from chefshat_robot.vision import SourceError
-
     with pytest.raises(SourceError, match="no pictures"):
         open_source(str(tmp_path))
     with pytest.raises(SourceError, match="no file or folder"):
@@ -323,3 +323,17 @@ def test_a_video_is_read(tmp_path: Path) -> None:
     assert [frame.index for frame in frames] == [0, 1, 2]
     assert [round(frame.time, 3) for frame in frames] == [0.0, 0.1, 0.2]
     assert abs(int(frames[2].image.mean()) - 200) < 8
+
+
+def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    evening, recording = tmp_path / "evening", tmp_path / "recording"
+    assert cli.main(["table", str(evening), "--difficulty", "easy", "--seed", "2", "--seconds", "4"]) == 0
+    camera = ["--camera", str(evening / "camera.json")]
+    assert cli.main(["perceive", str(evening / "video.mp4"), *camera, "--record", str(recording), "--json"]) == 0
+    seen = capsys.readouterr().out
+    assert cli.main(["perceive", "--replay", str(recording), "--json"]) == 0
+    assert capsys.readouterr().out == seen
+    events = happened([from_json(json.loads(line)) for line in seen.splitlines()])
+    truth = [json.loads(line) for line in (evening / "happenings.jsonl").read_text().splitlines()]
+    assert events
+    assert [event[0] for event in events] == [happening["kind"] for happening in truth][: len(events)]

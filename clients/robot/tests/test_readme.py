@@ -57,8 +57,8 @@ def test_the_sample_of_a_robots_program_works() -> None:
             process.kill()
 
 
-def test_every_command_with_robots_and_every_driver_is_described() -> None:
-    for name in ("robot", "wizard", "affect", "markers"):
+def test_every_command_and_every_driver_is_described() -> None:
+    for name in ("calibrate", "perceive", "table", "robot", "wizard", "affect", "markers"):
         assert f"chefshat-robot {name}" in README
     for name in drivers.DRIVERS:
         assert f"| `{name}` |" in README
