@@ -91,10 +91,15 @@ fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
             let seat = reported.hand.as_ref().map_or(0, |hand| hand.seat);
             about(seat, "has a known hand".into())
         }
-        Kind::Violation(violation) => plain(format!("⚠ {}", clean(&violation.text, MAX_TEXT))),
-        Kind::Correction(correction) => {
-            plain(format!("corrected: {}", clean(&correction.text, MAX_TEXT)))
+        Kind::Violation(violation) => {
+            let name = violation.seat.map(|seat| view.name(seat) + ": ");
+            let text = clean(&violation.text, MAX_TEXT);
+            plain(format!("⚠ {}{text}", name.unwrap_or_default()))
         }
+        Kind::Correction(correction) if correction.text.is_empty() => {
+            plain("earlier decisions no longer count".into())
+        }
+        Kind::Correction(correction) => plain(clean(&correction.text, MAX_TEXT)),
         Kind::TablePaused(table) if table.paused => heading("the game is paused".into()),
         Kind::TablePaused(_) => heading("the game is resumed".into()),
     };

@@ -372,12 +372,13 @@ fn a_correction_at_a_physical_table_takes_back_what_is_void() {
         pass(1, Table),
         play(2, (2, 8, 0), 1),
         Kind::Violation(Box::new(v1::Violation {
+            seat: Some(2),
             text: "It is Cy's turn.".into(),
             ..v1::Violation::default()
         })),
         Kind::Correction(Box::new(v1::Correction {
             first_void: 5,
-            text: "Bo laid two 9s, not a pass".into(),
+            text: "Corrected: Bo laid two 9s. (Before: Bo passed.)".into(),
             report: 3,
         })),
         play(1, (2, 9, 0), 15),
@@ -392,8 +393,8 @@ fn a_correction_at_a_physical_table_takes_back_what_is_void() {
             "",
             "pizza                                                                     Ada     Bo  Greta     Cy",
             "    1  Ada 1×11★ › (Bo) › Greta 2×8",
-            "   ⚠ It is Cy's turn.",
-            "   corrected: Bo laid two 9s, not a pass",
+            "   ⚠ Greta: It is Cy's turn.",
+            "   Corrected: Bo laid two 9s. (Before: Bo passed.)",
             "    1  Bo 2×9",
             "   the game is paused",
         ],
