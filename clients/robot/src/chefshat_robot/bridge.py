@@ -22,13 +22,12 @@ from chefshat_robot.deck import FACES, Card
 from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, FieldChanged, FieldState, Frame, Laid, Observed, Picture, TakenBack
 from chefshat_robot.vision import PassShown as PassSeen
 from chefshat_robot.vision import PassWithdrawn as PassGone
+from chefshat_robot.vision.hand import HandReader
 from chefshat_robot.vision.perception import Perception
 
 LOG = logging.getLogger("chefshat_robot")
 MAX_PICTURE_BYTES = 32 * 1024
 """The largest picture a question may have."""
-FACE_OPTIONS = (*range(1, FACES + 1), FACES + 1)
-"""The faces that a card may have, the joker last."""
 
 OnAnswer: TypeAlias = Callable[[int], Awaitable[None]]
 """What is done with the index of the right option of a question."""
@@ -122,6 +121,32 @@ class Bridge:
                     watching.result()
         finally:
             watching.cancel()
+
+    async def watch_hand(self, seat: int, reader: HandReader, frames: Iterator[Frame]) -> None:
+        """Watches the hand of a seat and reports it whenever the table waits for it.
+
+        Args:
+            seat: The seat, from 0.
+            reader: Reads the frames.
+            frames: The frames of the camera at the hand strip.
+
+        Raises:
+            ChefsHatError: The server refused a report or could not be reached any more.
+        """
+        hand: list[Card] = []
+        while not self._is_over() and (frame := await asyncio.to_thread(next, frames, None)) is not None:
+            seen = await asyncio.to_thread(reader.see, frame)
+            if seen is not None:
+                hand = list(seen.cards)
+            if self._awaits_hand(seat, len(hand)):
+                await self._report(pb.TableReport(hand=pb.HandSeen(seat=seat, cards=seen_cards(hand))))
+
+    def _awaits_hand(self, seat: int, size: int) -> bool:
+        """Whether the table waits for the hand of a seat, and as many cards are seen as it has."""
+        state = self.state
+        if state is None or state.stage != pb.TABLE_STAGE_HAND or state.seat != seat:
+            return False
+        return state.observation.cards_left[seat] == size
 
     async def observed(self, event: Observed) -> None:
         """Reports an event of perception."""
@@ -222,7 +247,7 @@ class Bridge:
             readings, names = [True, False], ["Yes", "No"]
             text = f"Does the pass card of {self._name(int(doubt.place.removeprefix('pass ')))} lie at its place?"
         else:
-            cards = list(doubt.options) if len(doubt.options) > 1 else [self.perception.card_of_face(face) for face in FACE_OPTIONS]
+            cards = list(doubt.options) if len(doubt.options) > 1 else self.perception.answers(int(doubt.place))
             readings, names = [*cards], [face_name(card.face) for card in cards]
             text = f"{' or '.join(names) if len(names) <= 3 else 'Which card lies'} at place {doubt.place}?"
 

@@ -53,6 +53,7 @@ class Rehearsal:
 
     Attributes:
         hands: The cards of each seat.
+        plays: What was truly played, in order: the seat and its cards.
         violations: How many plays were against the rules on purpose.
     """
 
@@ -66,6 +67,7 @@ class Rehearsal:
     face_down: float = 0.0
     answers: bool = True
     hands: list[list[Card]] = field(default_factory=list)
+    plays: list[tuple[int, list[Card]]] = field(default_factory=list)
     violations: int = 0
     _dealt: int = 0
     _gifts: dict[int, list[Card]] = field(default_factory=dict)
@@ -126,16 +128,16 @@ class Rehearsal:
     async def _next(self, state: pb.TableState, time: float) -> list[Act] | None:
         """What happens next: acts of hands, or None if somebody else's turn has come or something was reported."""
         start = time + 0.05
-        if self._mistake is not None:
+        if self.answers and state.questions:
+            await self._answer(state, state.questions[0])
+            return None
+        if self._mistake is not None and not state.questions:
             act, self._mistake = self._mistake, None
             if state.HasField("violation"):
                 self._lying.remove(act)
                 return [TakeBack(start, act.seat, act.places)]
             # It was not noticed as a violation: the cards stay where they are.
             self._play(act.seat, list(act.cards))
-        if self.answers and state.questions:
-            await self._answer(state, state.questions[0])
-            return None
         wanted = next(iter(state.to_lay), None)
         if wanted is not None and wanted.pizza:
             pizza = (wanted.shift, wanted.pizza)
@@ -187,6 +189,7 @@ class Rehearsal:
         return [ShowPass(start, seat)]
 
     def _play(self, seat: int, cards: Sequence[Card]) -> None:
+        self.plays.append((seat, list(cards)))
         self.hands[seat] = [card for card in self.hands[seat] if card not in cards]
 
     def _lay(self, start: float, seat: int, cards: Sequence[Card], face_down: bool | None = None) -> LayCards:
@@ -258,16 +261,18 @@ class Rehearsal:
 
     async def _answer(self, state: pb.TableState, question: pb.TableQuestion) -> None:
         """The attendant, who sees everything, answers a question."""
-        option = self._right_option(state, question)
+        option = self.right_option(state, question)
         await self._report(answer=pb.QuestionAnswered(question_id=question.question_id, option=option))
 
-    def _right_option(self, state: pb.TableState, question: pb.TableQuestion) -> int | None:
-        """The right answer: what truly lies at the place in question, who truly opened, or the first answer."""
+    def right_option(self, state: pb.TableState, question: pb.TableQuestion) -> int | None:
+        """The right answer to a question, as somebody knows who sees everything; None if no option is right."""
         options = list(question.options)
         place = question.text.rpartition("at place ")[2].rstrip("?")
         if place.isdigit():
             there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
             return options.index(face_name(there[-1].face)) if there and face_name(there[-1].face) in options else None
+        if question.text.endswith("belong to this play?"):
+            return 0 if self._mistake is None else 1
         if question.text.startswith("Who opened"):
             return options.index(state.room.seats[self._lying[0].seat].name)
         if question.text.startswith("Did ") and question.text.endswith(" pass?"):

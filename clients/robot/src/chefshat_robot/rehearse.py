@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
-from collections.abc import Callable, Mapping
 
 from chefshat import aio, pb
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.cli import CommandError
+from chefshat_robot.command_bridge import report_printer, say
 from chefshat_robot.rehearsal import Rehearsal
 from chefshat_robot.running import run_command
 from chefshat_robot.synthetic import DIFFICULTIES, SyntheticTable
@@ -65,14 +63,14 @@ def run(arguments: argparse.Namespace) -> int:
                 face_down=arguments.face_down,
                 answers=not arguments.no_answers,
             )
-            bridge = Bridge(client, ticket, Perception(table.camera, deck=0), on_report=_printer(arguments.json))
+            bridge = Bridge(client, ticket, Perception(table.camera, deck=0), on_report=report_printer(arguments.json))
 
             async def after(frame: Frame) -> None:
                 if bridge.state is not None:
                     await rehearsal.step(bridge.state, frame.time)
 
             await bridge.run(rehearsal.frames(), after)
-            _say(arguments.json, {"over": True, "violations": rehearsal.violations}, "The game is over.")
+            say(arguments.json, {"over": True, "violations": rehearsal.violations}, "The game is over.")
             return 0
 
     return run_command(play)
@@ -90,23 +88,5 @@ async def _create(client: aio.Client, arguments: argparse.Namespace) -> str:
     )
     room = {"room": created.room.room_id, "join_code": created.join_code, "table_ticket": created.table_ticket}
     lines = [f"Room {room['room']}", f"Join code {created.join_code}", f"Ticket of the table {created.table_ticket}"]
-    _say(arguments.json, room, "\n".join(lines))
+    say(arguments.json, room, "\n".join(lines))
     return created.table_ticket
-
-
-def _printer(as_json: bool) -> Callable[[pb.TableReport, pb.ReportResponse], None]:
-    """Prints each report and what the table says to it."""
-
-    def print_report(report: pb.TableReport, response: pb.ReportResponse) -> None:
-        kind = report.WhichOneof("kind") or ""
-        verdict = pb.ReportVerdict.Name(response.verdict).removeprefix("REPORT_VERDICT_").lower()
-        values = {"report": response.report, "kind": kind, "verdict": verdict, "detail": response.detail}
-        cards = f" {list(report.laid.cards.cards)}" if kind == "laid" else f" {report.question.text}" if kind == "question" else ""
-        detail = f": {response.detail}" if response.detail else ""
-        _say(as_json, values, f"{kind}{cards} {verdict}{detail} — {response.state.waiting_for}")
-
-    return print_report
-
-
-def _say(as_json: bool, values: Mapping[str, object], text: str) -> None:
-    print(json.dumps(values) if as_json else text, flush=True, file=sys.stdout)

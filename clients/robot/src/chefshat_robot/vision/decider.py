@@ -194,20 +194,19 @@ class Decider:
         """The cards that lie on the field and the place of each, 1..11; the lowest first."""
         return {card: known.spot + 1 for piece, known in self._known.items() if (card := piece.card) is not None}
 
-    def card_of_face(self, face: int) -> Card:
-        """A card of a face that does not lie on the field: for a person who answers a doubt and knows only the face.
+    def answers(self, place: int) -> list[Card]:
+        """The cards that may lie on top of a place, one of each face: for a person who answers a doubt and knows only the face.
+
+        Of a face that lies beneath the top there, it is that card; otherwise one that does not lie on the field.
 
         Args:
-            face: 1..11, or 12 for a joker.
-
-        Raises:
-            ValueError: All cards of the face lie on the field, or there is no such face.
+            place: 1..11.
         """
         number = self._deck if self._deck is not None else next((card.deck for card in self.on_table), 0)
-        for card in deck(number):
-            if card.face == face and card not in self.on_table:
-                return card
-        raise ValueError(f"no card of face {face} is left: faces are 1..12, and those on the field cannot be laid again")
+        beneath = [card for card, at in self.on_table.items() if at == place][:-1]
+        left = [card for card in deck(number) if card not in self.on_table]
+        of_face = {card.face: card for card in reversed(left)} | {card.face: card for card in beneath}
+        return [of_face[face] for face in sorted(of_face)]
 
     def look_of_doubt(self, number: int) -> tuple[int, int] | None:
         """The place that an open doubt is about, as an index of `SPOTS`, and its look; None if the doubt is not open."""
@@ -276,9 +275,10 @@ class Decider:
                         if not play.cards and not play.doubts:
                             self._queue.remove(play)
                         return
-        lower, above = self._uncovered(doubt.spot)
-        if above and lower is not None and lower.piece.card is not None and lower.piece.card.face == card.face:
-            # The answer is the card beneath, whose other tag cannot be read.
+        pile = self._pile(doubt.spot)
+        if _piece(card) in pile[:-1]:
+            # The cards on top of it were taken back.
+            above = pile[pile.index(_piece(card)) + 1 :]
             self._queue.insert(self._queue.index(doubt.play), _Gone(doubt.play.since, self._forget(above)))
             return
         doubt.play.cards[card] = doubt.spot
@@ -413,9 +413,13 @@ class Decider:
         if play is not None:
             play.closed = True
 
+    def _pile(self, spot: int) -> list[Piece]:
+        """The pieces at a place, the lowest first."""
+        return [piece for piece, known in self._known.items() if known.spot == spot]
+
     def _top(self, spot: int) -> Piece | None:
         """The piece on top of a place."""
-        return next((piece for piece in reversed(self._known) if self._known[piece].spot == spot), None)
+        return next(reversed(self._pile(spot)), None)
 
     # Explaining looks.
 
@@ -490,7 +494,7 @@ class Decider:
 
     def _uncovered(self, number: int) -> tuple[_Track | None, list[Piece]]:
         """The highest card of a place that is read now, and those that lay on top of it."""
-        pile = [piece for piece, known in self._known.items() if known.spot == number]
+        pile = self._pile(number)
         read = [place for place, piece in enumerate(pile) if piece in self._tracks]
         if not read or self._tracks[pile[read[-1]]].readings < SETTLE_READS:
             return None, []

@@ -71,9 +71,9 @@ class Perception:
             self._recorder.answered(number, reading)
         return self._reported(events)
 
-    def card_of_face(self, face: int) -> Card:
-        """A card of a face that does not lie on the field; see `Decider.card_of_face`."""
-        return self._decider.card_of_face(face)
+    def answers(self, place: int) -> list[Card]:
+        """The cards that may lie on top of a place, one of each face; see `Decider.answers`."""
+        return self._decider.answers(place)
 
     @property
     def on_table(self) -> dict[Card, int]:

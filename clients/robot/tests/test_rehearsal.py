@@ -1,0 +1,88 @@
+"""The whole chain: rendered frames of a table, perception, the bridge, and a physical room of the real server."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from chefshat import RandomAgent, aio, pb
+from chefshat.files import write_record
+from chefshat.local_server import BINARY
+
+from chefshat_robot.bridge import Bridge
+from chefshat_robot.deck import FACES
+from chefshat_robot.drivers.driver import Say
+from chefshat_robot.rehearsal import Rehearsal
+from chefshat_robot.robot import play_seat
+from chefshat_robot.synthetic import DIFFICULTIES, SyntheticTable
+from chefshat_robot.vision import Frame, Perception
+from chefshat_robot.words import Words
+from tests.robots import ScriptedRobot
+
+PEOPLE = ("Ada", "Bo")
+ROBOT, REMOTE = 2, 3
+LIMIT_S = 900.0
+
+
+async def _page(client: aio.Client, ticket: str, answered: list[str], rehearsal: Rehearsal) -> None:
+    """Somebody on the page who sees the table and answers its questions."""
+    async for state in client.watch_table(ticket):
+        for question in state.questions:
+            if question.question_id not in answered:
+                answered.append(question.question_id)
+                option = rehearsal.right_option(state, question)
+                answer = pb.QuestionAnswered(question_id=question.question_id, option=option)
+                await client.report(ticket, pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, answer=answer))
+
+
+@pytest.mark.server
+def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(server_address: str, tmp_path: Path) -> None:
+    robot = ScriptedRobot()
+    answered: list[str] = []
+
+    async def test() -> tuple[Rehearsal, list[pb.RecordLine]]:
+        async with aio.Client(server_address) as client:
+            people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE]
+            made = await client.create_room("whole", seats=[*people, None, None], rules=pb.RuleSet(target_shifts=1), physical=True)
+            ticket = made.table_ticket
+            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+            other = await client.join_room(made.join_code, "remote", seat=REMOTE)
+            table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
+            rehearsal = Rehearsal(table, client, ticket, seed=2, mistakes=0.25, face_down=0.5, answers=False)
+            bridge = Bridge(client, ticket, Perception(table.camera, deck=0))
+
+            async def after(frame: Frame) -> None:
+                if bridge.state is not None:
+                    await rehearsal.step(bridge.state, frame.time)
+
+            page = asyncio.create_task(_page(client, ticket, answered, rehearsal))
+            remote = asyncio.create_task(client.play(RandomAgent(5), other.ticket))
+            playing = asyncio.create_task(play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), referee=True))
+            async with asyncio.timeout(LIMIT_S):
+                await bridge.run(rehearsal.frames(), after)
+                result = await playing
+                await remote
+            page.cancel()
+            assert result.finished
+            return rehearsal, [line async for line in client.record(result.game_id)]
+
+    rehearsal, record = asyncio.run(test())
+    events = [line.event for line in record if line.HasField("event")]
+    plays = [event.play for event in events if event.HasField("play")]
+    recorded = [(play.seat, Counter({play.face: play.quantity}) + Counter({FACES + 1: play.jokers})) for play in plays]
+    assert recorded == [(player, Counter(card.face for card in cards)) for player, cards in rehearsal.plays]
+    violations = [event.violation.text for event in events if event.HasField("violation")]
+    assert rehearsal.violations > 0
+    assert violations
+    assert answered
+    assert set(violations) <= {act.text for act in robot.acts if isinstance(act, Say)}
+
+    file = tmp_path / "game.jsonl"
+    write_record(file, record)
+    work = [["verify"], ["export", "--out", str(tmp_path / "dataset")], ["render", "--out", str(tmp_path / "game.svg")]]
+    for arguments in work:
+        subprocess.run([os.environ[BINARY], *arguments, str(file)], check=True)
