@@ -74,7 +74,10 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
     events = [line.event for line in record if line.HasField("event")]
     plays = [event.play for event in events if event.HasField("play")]
     recorded = [(play.seat, Counter({play.face: play.quantity}) + Counter({FACES + 1: play.jokers})) for play in plays]
-    assert recorded == [(player, Counter(card.face for card in cards)) for player, cards in rehearsal.plays]
+    laid = [(player, Counter(card.face for card in cards)) for player, cards in rehearsal.plays]
+    assert recorded[: len(laid)] == laid
+    # The last decisions of the remote seats end the game before their cards are laid.
+    assert all(player in (ROBOT, REMOTE) for player, _ in recorded[len(laid) :])
     violations = [event.violation.text for event in events if event.HasField("violation")]
     assert rehearsal.violations > 0
     assert violations

@@ -74,6 +74,7 @@ class Rehearsal:
     _exchanged: bool = True
     _expected: tuple[int, float] | None = None
     _mistake: LayCards | None = None
+    _carried_out: pb.CardsToLay | None = None
     _lying: list[LayCards] = field(default_factory=list)
     _shown: set[int] = field(default_factory=set)
     _pizza: tuple[int, int] = (0, 0)
@@ -128,10 +129,11 @@ class Rehearsal:
     async def _next(self, state: pb.TableState, time: float) -> list[Act] | None:
         """What happens next: acts of hands, or None if somebody else's turn has come or something was reported."""
         start = time + 0.05
-        if self.answers and state.questions:
-            await self._answer(state, state.questions[0])
+        if state.questions:
+            if self.answers:
+                await self._answer(state, state.questions[0])
             return None
-        if self._mistake is not None and not state.questions:
+        if self._mistake is not None:
             act, self._mistake = self._mistake, None
             if state.HasField("violation"):
                 self._lying.remove(act)
@@ -217,6 +219,9 @@ class Rehearsal:
             self._gifts[seat] = self._take(seat, wanted.cards)
             await self._report(gift=pb.GiftSeen(seat=seat, cards=wanted.cards))
         elif wanted.cards.cards:
+            if wanted == self._carried_out:
+                return None  # The cards lie there; the camera has not reported them yet.
+            self._carried_out = wanted
             cards = self._take(seat, wanted.cards)
             self._play(seat, cards)
             return [self._lay(start, seat, cards)]
