@@ -194,3 +194,29 @@ def test_cards_laid_after_something_rested_over_a_place_are_one_play() -> None:
     assert isinstance(doubt, Doubt)
     events = table.decider.answer(doubt.number, False)
     assert [event.cards for event in events if isinstance(event, Laid)] == [FOURS]
+
+
+def test_each_of_two_cards_that_cannot_be_read_is_asked_about() -> None:
+    table = Table()
+    table.put(0)
+    table.wait(10)
+    table.put(0)
+    table.wait(DOUBTED)
+    below, above = table.said()
+    assert isinstance(below, Doubt)
+    assert isinstance(above, Doubt)
+    assert below.place == above.place == "1"
+    assert below.seen < above.seen
+    answers = table.decider.answer(above.number, FOURS[0]) + table.decider.answer(below.number, NINES[0])
+    assert [event.cards for event in answers if isinstance(event, Laid)] == [(NINES[0],), (FOURS[0],)]
+    assert list(table.decider.on_table) == [NINES[0], FOURS[0]]
+
+
+def test_a_card_that_was_covered_for_a_moment_is_asked_about_once() -> None:
+    table = Table()
+    table.put(0)
+    table.wait(10)
+    table.put(0, look=2)
+    table.wait(DOUBTED)
+    (doubt,) = table.said()
+    assert isinstance(doubt, Doubt)

@@ -444,6 +444,8 @@ class Decider:
                 spot.covered = None
             if not was_unexplained:
                 spot.since = self._time
+            if spot.covered is not None and spot.covered.look == seen.look:
+                spot.since, spot.covered = spot.covered.since, None
             if not spot.unexplained:
                 spot.waited, spot.frames = 0.0, 0
             elif not self._reaching:
@@ -458,6 +460,9 @@ class Decider:
             if spot.covered is not None and self._top(number) is None and self._is_empty(number):
                 self._raise_doubt(number, spot.covered, events, open_play)
             elif spot.doubt is None and spot.waited >= DOUBT_SECONDS:
+                if spot.covered is not None:
+                    self._raise_doubt(number, spot.covered, events, open_play)
+                    open_play = None
                 self._raise_doubt(number, self._riddle(number), events, open_play)
 
     def _riddle(self, number: int) -> _Riddle:
