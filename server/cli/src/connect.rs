@@ -165,3 +165,9 @@ pub(super) fn free_seats(room: &v1::Room) -> usize {
     let free = |seat: &&v1::Participant| seat.name.is_empty();
     room.seats.iter().filter(free).count()
 }
+
+/// The address of the attendant's view. Browsers send what follows the # to no server.
+pub(super) fn attendant_link(server: &str, room_id: &str, ticket: &str) -> String {
+    let server = server.trim_end_matches('/');
+    format!("{server}/rooms/{room_id}/table#ticket={ticket}")
+}

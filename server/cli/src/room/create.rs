@@ -10,7 +10,7 @@ use chefshat_engine::RuleSet;
 use chefshat_record::convert::kind_from_name;
 use clap::Args;
 
-use super::super::connect::{ServerArg, free_seats};
+use super::super::connect::{ServerArg, attendant_link, free_seats};
 use super::super::policy_args::PolicyArgs;
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::secret_file::SecretFile;
@@ -92,7 +92,7 @@ impl Create {
         let written = code_file.map_or(Ok(()), |file| file.write(&created.join_code));
         let (code, owner) = (created.join_code, created.owner_token);
         let table = self.physical.then(|| Table {
-            link: attendant_link(self.server.url(), &room, &created.table_ticket),
+            link: attendant_link(self.server.url(), &room.room_id, &created.table_ticket),
             ticket: created.table_ticket,
         });
         if self.json {
@@ -181,12 +181,6 @@ impl Create {
 struct Table {
     ticket: String,
     link: String,
-}
-
-/// The address of the attendant's view. Browsers send what follows the # to no server.
-fn attendant_link(server: &str, room: &v1::Room, ticket: &str) -> String {
-    let server = server.trim_end_matches('/');
-    format!("{server}/rooms/{}/table#ticket={ticket}", room.room_id)
 }
 
 fn seat(word: &str) -> Result<v1::SeatConfig, String> {
@@ -382,12 +376,8 @@ mod tests {
 
     #[test]
     fn the_attendants_link_opens_the_page() {
-        let room = v1::Room {
-            room_id: "5f".into(),
-            ..v1::Room::default()
-        };
         assert_eq!(
-            attendant_link("http://[::1]:7/", &room, "ab"),
+            attendant_link("http://[::1]:7/", "5f", "ab"),
             "http://[::1]:7/rooms/5f/table#ticket=ab"
         );
     }

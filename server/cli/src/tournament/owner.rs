@@ -8,7 +8,7 @@ use crate::kind::KindArg;
 use chefshat_client::v1;
 use clap::Args;
 
-use super::super::connect::ServerArg;
+use super::super::connect::{ServerArg, attendant_link};
 use super::super::{CommandError, say};
 use super::words::state;
 
@@ -52,8 +52,8 @@ pub(super) struct Add {
     kind: KindArg,
 }
 
-/// Show the secrets of the physical table at which a game is being played: the attendant's page and
-/// the ticket for a camera.
+/// Show the secrets of the physical table at which a game is being played: the attendant's link and
+/// the ticket for a camera or `chefshat table`.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat tournament table 5f0c6a4de2b14b7f8a3d9c1e7b60425d 3 --owner-file ./owner\n\n\
@@ -96,20 +96,17 @@ impl Table {
             .physical_table(self.owned.tournament_id.as_str(), token, self.game)
             .await?;
         let (room, ticket, owner) = (table.room_id, table.table_ticket, table.owner_token);
-        let page = format!(
-            "{}/rooms/{room}/table#ticket={ticket}",
-            self.owned.server.url()
-        );
+        let link = attendant_link(self.owned.server.url(), &room, &ticket);
         if self.owned.json {
             say(serde_json::json!({
                 "event": "table", "game": self.game, "room_id": room, "table_ticket": ticket,
-                "owner_token": owner, "page": page,
+                "owner_token": owner, "attendant_link": link,
             }))?;
         } else {
-            say(format_args!("room          {room}"))?;
-            say(format_args!("table ticket  {ticket}"))?;
-            say(format_args!("owner token   {owner}"))?;
-            say(format_args!("the attendant's page: {page}"))?;
+            say(format_args!("room         {room}"))?;
+            say(format_args!("owner token  {owner}"))?;
+            say(format_args!("table ticket {ticket}"))?;
+            say(format_args!("attendant    {link}"))?;
         }
         Ok(ExitCode::SUCCESS)
     }
