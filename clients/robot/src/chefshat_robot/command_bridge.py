@@ -100,7 +100,7 @@ def report_printer(as_json: bool) -> Callable[[pb.TableReport, pb.ReportResponse
         if kind == "laid":
             text = f"{kind} {list(report.laid.cards.cards)} {verdict}"
         elif kind == "question":
-            text = f"{kind}: {report.question.text}"
+            text = f"{kind} {verdict}: {report.question.text}"
         detail = f": {response.detail}" if response.detail else ""
         say(as_json, values, f"{text}{detail} — {response.state.waiting_for}")
 

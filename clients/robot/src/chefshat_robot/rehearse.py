@@ -86,7 +86,9 @@ async def _create(client: aio.Client, arguments: argparse.Namespace) -> str:
         seats=[*people, *[None] * arguments.open, *others],
         physical=True,
     )
-    room = {"room": created.room.room_id, "join_code": created.join_code, "table_ticket": created.table_ticket}
-    lines = [f"Room {room['room']}", f"Join code {created.join_code}", f"Ticket of the table {created.table_ticket}"]
-    say(arguments.json, room, "\n".join(lines))
+    room = created.room.room_id
+    link = f"http://{arguments.address}/rooms/{room}/table#ticket={created.table_ticket}"
+    values = {"room": room, "join_code": created.join_code, "table_ticket": created.table_ticket, "attendant_link": link}
+    names = {"room": "room", "join_code": "join code", "table_ticket": "table ticket", "attendant_link": "attendant"}
+    say(arguments.json, values, "\n".join(f"{names[key]:12} {value}" for key, value in values.items()))
     return created.table_ticket

@@ -92,7 +92,7 @@ export const table = {
     },
     handReported: (name: string) => `The referee has seen the hand of ${name}`,
     violated: (text: string) => `is stopped by the referee: ${text}`,
-    corrected: (text: string) => `Corrected: ${text}`,
+    corrected: (text: string) => text || "A misread report was corrected",
     paused: "The game is paused",
     resumed: "The game continues",
   },

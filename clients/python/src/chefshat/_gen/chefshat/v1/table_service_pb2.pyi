@@ -642,7 +642,7 @@ class ReportResponse(_message.Message):
     VOID_REPORTS_FIELD_NUMBER: _builtins.int
     STATE_FIELD_NUMBER: _builtins.int
     report: _builtins.int
-    """Number of the report in its room, from 1."""
+    """Number of the report in its room: later reports have higher numbers."""
     verdict: Global___ReportVerdict.ValueType
     """The verdict."""
     detail: _builtins.str
