@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 import cv2
-from chefshat import pb
+from chefshat import ChefsHatError, pb
 
 from chefshat_robot.deck import FACES, Card
 from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, FieldChanged, FieldState, Frame, Laid, Observed, Picture, TakenBack
@@ -119,6 +119,10 @@ class Bridge:
                     await after(frame)
                 if watching.done():
                     watching.result()
+        except ChefsHatError as error:
+            # A remote seat may end the game before its last cards are laid.
+            if error.reason != "GAME_OVER":
+                raise
         finally:
             watching.cancel()
 
