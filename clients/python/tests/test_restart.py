@@ -178,3 +178,27 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
     for agent in agents.values():
         assert set(agent.asked.values()) == {1}
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))
+
+
+def test_reports_about_a_table_wait_for_the_server(tmp_path: Path) -> None:
+    binary = os.environ.get(BINARY)
+    if not binary:
+        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+    seats = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in ("Ada", "Bo", "Cy", "Di")]
+    opening = pb.TableReport(laid=pb.CardsLaid(seat=0, cards=pb.SeenCards(cards=[11, 11], golden=True)))
+    answer = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[9, 9])))
+    with (
+        RealServer(Path(binary), tmp_path, host="127.0.0.4") as server,
+        chefshat.Client(server.address, backoff=PATIENT) as client,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        ticket = client.create_room("real", seats=seats, physical=True).table_ticket
+        first = client.report(ticket, opening, report_id="first")
+        server.kill()
+        waiting = pool.submit(client.report, ticket, answer)
+        server.start()
+        second = waiting.result(WAIT_S)
+        assert client.report(ticket, opening, report_id="first").report == first.report
+        state = next(client.watch_table(ticket))
+    assert first.verdict == second.verdict == pb.REPORT_VERDICT_ACCEPTED
+    assert [report.report for report in state.reports] == [first.report, second.report]

@@ -5,6 +5,7 @@ decisions is played differs between the two and is in `chefshat.aio` and `chefsh
 """
 
 import random
+import secrets
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -187,10 +188,16 @@ class Calls(ABC):
 
         Returns:
             The verdict of the referee, and the state of the table afterwards. A report that the rules or the cards do not allow is
-            no error: see `verdict` and `detail`.
+            no error: see `verdict` and `detail`. Repeats the report while the server cannot be reached.
         """
-        request = pb.ReportRequest(table_ticket=table_ticket, report_id=report_id, report=report)
-        return called(self._table.Report, request)
+        request = pb.ReportRequest(table_ticket=table_ticket, report_id=report_id or secrets.token_hex(16), report=report)
+        failures = 0
+        while True:
+            try:
+                return called(self._table.Report, request)
+            except ChefsHatError as error:
+                failures += 1
+                self._wait(failures, error)
 
     def watch_table(self, table_ticket: str) -> Iterator[pb.TableState]:
         """Iterates over the state of a physical table: now, and after every change, until its game is over. Reconnects.
