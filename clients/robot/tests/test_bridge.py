@@ -1,0 +1,265 @@
+"""The bridge alone: what it reports and asks, with a table in this process."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from typing import cast
+
+import numpy as np
+import pytest
+from chefshat import ChefsHatError, pb
+
+from chefshat_robot.bridge import Bridge
+from chefshat_robot.deck import Card, deck
+from chefshat_robot.vision import (
+    Cleared,
+    Doubt,
+    DoubtResolved,
+    FieldChanged,
+    FieldState,
+    Frame,
+    Laid,
+    PassShown,
+    PassWithdrawn,
+    TakenBack,
+)
+from chefshat_robot.vision.hand import HandReader, HandSeen
+from chefshat_robot.vision.perception import Perception
+from tests.loop import run
+
+CARDS = {face: [card for card in deck(0) if card.face == face] for face in range(1, 13)}
+FRAME = Frame(0, 0.0, np.zeros((4, 4, 3), dtype=np.uint8))
+
+
+class Table:
+    """Accepts what it is told, unless a test says otherwise.
+
+    Attributes:
+        reports: what was reported.
+        verdicts: verdicts of the next reports; then all are accepted.
+        state: returned with each response.
+    """
+
+    def __init__(self) -> None:
+        self.reports: list[pb.TableReport] = []
+        self.verdicts: list[pb.ReportVerdict.ValueType] = []
+        self.state = pb.TableState(version=1)
+        self.error: ChefsHatError | None = None
+
+    async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        assert table_ticket == "ticket"
+        assert report_id
+        if self.error is not None:
+            raise self.error
+        self.reports.append(report)
+        verdict = self.verdicts.pop(0) if self.verdicts else pb.REPORT_VERDICT_ACCEPTED
+        return pb.ReportResponse(report=len(self.reports), verdict=verdict, state=self.state)
+
+    async def watch_table(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
+        yield self.state
+        await asyncio.Event().wait()
+
+    def kinds(self) -> list[str | None]:
+        return [report.WhichOneof("kind") for report in self.reports]
+
+
+class Eyes:
+    """Perception that sees what a test says.
+
+    Attributes:
+        events: what the next frames show.
+        answered: the answers to doubts.
+    """
+
+    def __init__(self) -> None:
+        self.events: list[list[Laid]] = []
+        self.answered: list[tuple[int, Card | bool]] = []
+
+    def see(self, frame: Frame) -> list[Laid]:
+        return self.events.pop(0) if self.events else []
+
+    def answers(self, place: int) -> list[Card]:
+        return [cards[0] for cards in CARDS.values()]
+
+    def answer(self, number: int, reading: Card | bool) -> list[Laid]:
+        self.answered.append((number, reading))
+        return [laid([reading])] if isinstance(reading, Card) else []
+
+
+@pytest.fixture
+def table() -> Table:
+    return Table()
+
+
+@pytest.fixture
+def eyes() -> Eyes:
+    return Eyes()
+
+
+@pytest.fixture
+def bridge(table: Table, eyes: Eyes) -> Bridge:
+    return Bridge(table, "ticket", cast("Perception", eyes))
+
+
+def laid(cards: list[Card], first: int = 1) -> Laid:
+    return Laid(0, 0.0, tuple(cards), tuple(range(first, first + len(cards))))
+
+
+def answer(table: Table, bridge: Bridge, option: int | None) -> None:
+    """Answers the newest question, as the page does."""
+    question = next(report.question for report in reversed(table.reports) if report.HasField("question"))
+    table.state = pb.TableState(version=table.state.version + 1)
+    table.state.answers.add(question_id=question.question_id, option=option)
+    run(bridge.run(iter([FRAME])))
+
+
+def test_events_become_reports(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid([*CARDS[9][:2], CARDS[12][0]]))
+        await bridge.observed(PassShown(0, 0.0, 2))
+        await bridge.observed(Cleared(0, 0.0))
+        await bridge.observed(laid([CARDS[11][-1]]))
+
+    run(test())
+    assert table.kinds() == ["laid", "pass", "cleared", "laid"]
+    assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9, 12], [], [], [11]]
+    assert [report.laid.cards.golden for report in table.reports] == [False, False, False, True]
+    assert all(report.source == pb.REPORT_SOURCE_CAMERA for report in table.reports)
+
+
+def test_a_pass_card_is_withdrawn_only_from_a_pizza_in_progress(table: Table, bridge: Bridge) -> None:
+    table.state.observation.passed = bytes([0, 1, 0, 0])
+
+    async def test() -> None:
+        for seat in (1, 2):
+            await bridge.observed(PassShown(0, 0.0, seat))
+            await bridge.observed(PassWithdrawn(0, 0.0, seat))
+
+    run(test())
+    assert table.kinds() == ["pass", "pass_withdrawn", "pass"]
+
+
+@pytest.mark.parametrize(("option", "kind", "faces"), [(0, "correction", [9, 9, 9]), (1, "laid", [9])])
+def test_cards_of_one_face_beside_a_play_are_asked_about(
+    table: Table, bridge: Bridge, option: int, kind: str, faces: list[int]
+) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(laid([CARDS[9][2]], first=3))
+
+    run(test())
+    assert table.kinds() == ["laid", "question"]
+    answer(table, bridge, option)
+    last = table.reports[-1]
+    assert last.WhichOneof("kind") == kind
+    assert list((last.correction.instead if option == 0 else last).laid.cards.cards) == faces
+
+
+def test_cards_of_one_face_on_a_play_are_a_play_of_their_own(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(laid([CARDS[9][2]]))
+
+    run(test())
+    assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [9]]
+
+
+def test_nothing_is_added_to_what_a_remote_seat_decided(table: Table, bridge: Bridge) -> None:
+    wanted = pb.CardsToLay(seat=3, pizza=1, cards=pb.SeenCards(cards=[9, 9]))
+    table.state.to_lay.append(wanted)
+
+    async def test() -> None:
+        await bridge.observed(PassShown(0, 0.0, 2))
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(laid([CARDS[9][2]], first=3))
+
+    run(test())
+    assert table.kinds() == ["pass", "laid", "laid"]
+
+
+def test_a_play_that_does_not_count_is_taken_back_without_a_question(table: Table, bridge: Bridge) -> None:
+    table.verdicts = [pb.REPORT_VERDICT_VIOLATION]
+
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
+        await bridge.observed(laid(CARDS[7][:2]))
+
+    run(test())
+    assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [7, 7]]
+
+
+def test_a_play_that_counts_is_taken_back_if_somebody_says_so(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
+
+    run(test())
+    assert table.kinds() == ["laid", "question"]
+    answer(table, bridge, 0)
+    assert table.reports[-1].correction.report == 1
+    assert not table.reports[-1].correction.HasField("instead")
+
+
+def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    picture = np.full((80, 60, 3), 200, dtype=np.uint8)
+    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, (CARDS[7][0], CARDS[9][0]), picture)))
+    question = table.reports[-1].question
+    assert (question.text, list(question.options)) == ("7 or 9 at place 1?", ["7", "9"])
+    assert question.picture.startswith(b"\xff\xd8")
+    answer(table, bridge, 1)
+    assert eyes.answered == [(4, CARDS[9][0])]
+    assert list(table.reports[-1].laid.cards.cards) == [9]
+
+
+def test_a_doubt_without_candidates_offers_every_face(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ())))
+    assert list(table.reports[-1].question.options) == [*map(str, range(1, 12)), "Joker"]
+    answer(table, bridge, None)
+    assert eyes.answered == []
+
+
+def test_questions_that_need_no_answer_any_more_are_withdrawn(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+        await bridge.observed(DoubtResolved(0, 0.0, 4))
+        await bridge.observed(FieldChanged(0, 0.0, FieldState.LOST))
+        await bridge.observed(FieldChanged(0, 0.0, FieldState.FOUND))
+
+    run(test())
+    asked = [report.question.question_id for report in table.reports if report.HasField("question")]
+    withdrawn = [report.answer.question_id for report in table.reports if report.HasField("answer")]
+    assert len(asked) == 2
+    assert withdrawn == asked
+
+
+def test_a_game_that_a_remote_seat_ended_ends_the_bridge(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    table.error = ChefsHatError("GAME_OVER", "the game is over")
+    eyes.events = [[laid(CARDS[9][:2])]]
+    run(bridge.run(iter([FRAME])))
+    assert table.reports == []
+
+
+class Hand:
+    """A hand reader that sees one more card in each frame."""
+
+    def __init__(self) -> None:
+        self._seen = 0
+
+    def see(self, frame: Frame) -> HandSeen:
+        self._seen += 1
+        return HandSeen(frame.index, frame.time, tuple(deck(0)[: self._seen]))
+
+
+def test_a_whole_hand_is_reported_when_the_table_waits_for_it(table: Table, bridge: Bridge) -> None:
+    table.state = pb.TableState(version=1, stage=pb.TABLE_STAGE_HAND, seat=2)
+    table.state.observation.cards_left = bytes([17, 17, 3, 17])
+    bridge.state = table.state
+
+    def frames() -> Iterator[Frame]:
+        yield from [FRAME] * 4
+
+    run(bridge.watch_hand(2, cast("HandReader", Hand()), frames()))
+    (report,) = table.reports
+    assert (report.hand.seat, list(report.hand.cards.cards)) == (2, [1, 2, 2])
