@@ -21,6 +21,8 @@ pub(crate) struct Contradiction {
     /// The line that states it.
     pub(crate) line: usize,
     pub(crate) problem: String,
+    /// Whether the search ended before everything was tried: it may be none.
+    pub(crate) is_unresolved: bool,
 }
 
 /// Completes the Shifts of a game in order.
@@ -61,6 +63,7 @@ impl Completer {
             Ok(plan) => return (plan, None),
             Err(problem) => problem,
         };
+        let is_unresolved = budget.exhausted;
         // A prefix of facts that fit also fits, so bisect. The game ends at the contradiction, so
         // this happens once.
         let again = |count: usize| solve(count, &mut SearchBudget::new(self.per_shift));
@@ -76,6 +79,7 @@ impl Completer {
         let contradiction = Contradiction {
             line: facts[breaks - 1].0,
             problem: failure,
+            is_unresolved,
         };
         (plan, Some(contradiction))
     }

@@ -91,6 +91,11 @@ impl PhysicalGame {
             .map(|found| found.problem.as_str())
     }
 
+    /// Whether the search for hands ended before everything was tried: the facts may fit after all.
+    pub fn is_unresolved(&self) -> bool {
+        (self.contradiction.as_ref()).is_some_and(|found| found.is_unresolved)
+    }
+
     /// Whether the gift of each seat is known; true if it gives none.
     pub fn gifts_known(&self) -> BySeat<bool> {
         self.plan

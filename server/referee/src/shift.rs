@@ -334,6 +334,23 @@ pub(crate) struct Played {
     pub(crate) gifts_known: BySeat<bool>,
 }
 
+/// Why no game contains what counts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Misfit {
+    pub(crate) text: String,
+    /// Whether the search for a game ended before all hands were tried: there may be one.
+    pub(crate) is_unresolved: bool,
+}
+
+impl<T: Into<String>> From<T> for Misfit {
+    fn from(text: T) -> Self {
+        Self {
+            text: text.into(),
+            is_unresolved: false,
+        }
+    }
+}
+
 /// Plays a Shift from what counts.
 ///
 /// # Errors
@@ -342,13 +359,16 @@ pub(crate) fn play(
     rules: &RuleSet,
     remote: &BySeat<bool>,
     shift: &Shift,
-) -> Result<Played, String> {
+) -> Result<Played, Misfit> {
     let (facts, mut decisions) = shift.facts(rules, remote);
     let mut physical = PhysicalGame::new(*rules, vec![facts]);
     let mut events = Vec::new();
     let game = physical.start(&shift.start, &mut events);
     if let Some(problem) = physical.problem() {
-        return Err(problem.to_owned());
+        return Err(Misfit {
+            text: problem.to_owned(),
+            is_unresolved: physical.is_unresolved(),
+        });
     }
     let mut game =
         (game.map_err(|error| error.to_string())?).expect("the Shift has facts, if only none");
@@ -389,7 +409,7 @@ pub(crate) fn play(
             .filter(|_| physical.is_open())
             .ok_or("the Shift is over")?;
         if open.seat != seat || open.kind != DecisionKind::Turn {
-            return Err(format!("it is seat {}'s turn", open.seat));
+            return Err(format!("it is seat {}'s turn", open.seat).into());
         }
         known = Some(apply(&mut game, &mut physical, open, action)?);
     }

@@ -69,7 +69,7 @@ impl Referee {
                 format!(
                     "{name} cannot hold {}: {}.",
                     counts_text(&seen.counts),
-                    self.names.replace_seats(&problem)
+                    self.names.replace_seats(&problem.text)
                 ),
             ),
         }
@@ -114,7 +114,7 @@ impl Referee {
         };
         match self.try_act(number, Some(&report), act) {
             Ok(()) => Ok(Verdict::Accepted),
-            Err(problem) => refuse(self.names.replace_seats(&problem)),
+            Err(problem) => refuse(self.names.replace_seats(&problem.text)),
         }
     }
 
@@ -137,6 +137,11 @@ impl Referee {
         }
         if self.shift().gift(seat).is_some() {
             return Ok(Verdict::Known);
+        }
+        let special = self.shift().open_special(&self.rules).flatten();
+        if special.is_some_and(|seat| self.remote[seat]) {
+            let text = "A special action has not been decided yet: wait for it.".to_owned();
+            return refuse(ViolatedRule::SpecialAction, text);
         }
         if let Some(seen) = seen.filter(|seen| size_of(&seen.counts) != pair.size) {
             return refuse(
@@ -189,7 +194,7 @@ impl Referee {
                 ViolatedRule::Gift,
                 format!(
                     "{name} cannot give these cards: {}.",
-                    self.names.replace_seats(&problem)
+                    self.names.replace_seats(&problem.text)
                 ),
             ),
         }

@@ -4,8 +4,10 @@ use chefshat_engine::{Action, Seat, Viewer};
 
 use super::turns::{seat_of, with_seat};
 use super::{Judged, Referee};
-use crate::shift::{Act, Entry};
+use crate::shift::{Act, Entry, Misfit};
 use crate::{Corrected, Report, Ruling, Verdict, ViolatedRule};
+
+const NOT_ALIKE: &str = "A report can be replaced only by one of the same kind and seat.";
 
 impl Referee {
     /// Takes a pass back.
@@ -29,21 +31,22 @@ impl Referee {
                 ),
             )),
             Some((number, true)) if self.is_correctable(number) => {
-                self.correct(number, None, ruling)
+                self.correct(number, Some(seat), None, ruling)
             }
             _ => Ok(Verdict::Known),
         }
     }
 
-    /// Replaces a report, or removes it.
+    /// Replaces a report, or removes it. `seat`: of the entry, if one report has several.
     pub(super) fn correct(
         &mut self,
         number: u64,
+        seat: Option<Seat>,
         instead: Option<&Report>,
         ruling: &mut Ruling,
     ) -> Judged {
         let before = self.clone();
-        let judged = self.correct_unless_refused(number, instead, ruling);
+        let judged = self.correct_unless_refused(number, seat, instead, ruling);
         if judged.is_err() {
             *self = before;
             ruling.corrected = None;
@@ -54,14 +57,17 @@ impl Referee {
     fn correct_unless_refused(
         &mut self,
         number: u64,
+        seat: Option<Seat>,
         instead: Option<&Report>,
         ruling: &mut Ruling,
     ) -> Judged {
         let refuse = |text: &str| Err((None, (ViolatedRule::Correction, text.to_owned())));
         // A report that still waits is simply dropped or replaced.
         if let Some(index) = self.held.iter().position(|(held, _)| *held == number) {
+            let old = &self.held[index].1;
             match instead {
-                Some(instead) => self.held[index].1 = instead.clone(),
+                Some(instead) if !is_alike(old, instead) => return refuse(NOT_ALIKE),
+                Some(instead) => self.held[index].1 = as_seat_of(old, instead),
                 None => drop(self.held.remove(index)),
             }
             self.held = self.drop_question();
@@ -81,25 +87,28 @@ impl Referee {
             return refuse("This report cannot be corrected any more: its pizza is over.");
         }
         let entries = self.shift().entries.clone();
-        let of_report = |entry: &Entry| entry.number == number;
-        let index = (entries.iter())
-            .position(|entry| of_report(entry) && entry.report.is_some())
-            .expect("it counts");
+        // Passes that were confirmed with one answer have one number: the seat tells them apart.
+        let seat = seat.or_else(|| instead.and_then(seat_of));
+        let matches = |entry: &Entry| {
+            let report = (entry.report.as_ref()).filter(|_| entry.number == number);
+            report.is_some_and(|report| seat.is_none_or(|seat| seat_of(report) == Some(seat)))
+        };
+        let Some(index) = entries.iter().position(matches) else {
+            return refuse(NOT_ALIKE);
+        };
         let old = entries[index].report.clone().expect("it is a report");
         // Passes that were inferred from the report fall with it.
-        let first = entries.iter().position(of_report).unwrap_or(index);
+        let inferred = |entry: &&Entry| entry.number == number && entry.report.is_none();
+        let first = index - entries[..index].iter().rev().take_while(inferred).count();
         if instead.is_some_and(|instead| !is_alike(&old, instead)) {
-            return refuse("A report can be replaced only by one of the same kind.");
+            return refuse(NOT_ALIKE);
         }
         let waiting = self.drop_question();
         self.set_entries(entries[..first].to_vec())
-            .map_err(|problem| (None, (ViolatedRule::Correction, problem)))?;
+            .map_err(|misfit| (None, (ViolatedRule::Correction, misfit.text)))?;
         let mut verdict = Verdict::Accepted;
         if let Some(instead) = instead {
-            let instead = match (seat_of(&old), seat_of(instead)) {
-                (Some(seat), None) => with_seat(instead, seat),
-                _ => instead.clone(),
-            };
+            let instead = as_seat_of(&old, instead);
             verdict = self.judge(number, &instead, ruling);
             match &verdict {
                 Verdict::Accepted | Verdict::Held { .. } => {}
@@ -143,18 +152,20 @@ impl Referee {
     /// Judges again what came after a corrected report; what no longer fits is void.
     fn replay(&mut self, later: &[Entry]) -> Vec<u64> {
         let mut void = Vec::new();
+        let shift = self.shifts.len();
         for entry in later {
-            let fits = match (&entry.report, entry.act) {
-                (Some(report), Act::Turn(..)) if self.asked.is_some() => {
-                    self.held.push((entry.number, report.clone()));
-                    true
-                }
-                (Some(report), Act::Turn(..)) => self.take_turn(entry.number, report).is_ok(),
-                // A pass that followed from reports is inferred again, if it still follows.
-                (None, Act::Turn(seat, _)) if !self.remote[seat] => true,
-                (None, Act::Turn(..)) if self.asked.is_some() || !void.is_empty() => false,
-                _ => self.add(entry).is_ok(),
-            };
+            let fits = self.shifts.len() == shift
+                && match (&entry.report, entry.act) {
+                    (Some(report), Act::Turn(..)) if self.asked.is_some() => {
+                        self.held.push((entry.number, report.clone()));
+                        true
+                    }
+                    (Some(report), Act::Turn(..)) => self.take_turn(entry.number, report).is_ok(),
+                    // A pass that followed from reports is inferred again, if it still follows.
+                    (None, Act::Turn(seat, _)) if !self.remote[seat] => true,
+                    (None, Act::Turn(..)) if self.asked.is_some() || !void.is_empty() => false,
+                    _ => self.add(entry).is_ok(),
+                };
             if !fits {
                 void.push(entry.number);
             }
@@ -162,7 +173,7 @@ impl Referee {
         void
     }
 
-    fn add(&mut self, entry: &Entry) -> Result<(), String> {
+    fn add(&mut self, entry: &Entry) -> Result<(), Misfit> {
         let mut entries = self.shift().entries.clone();
         entries.push(Entry {
             pizza: self.game().observe(Viewer::Spectator).pizza,
@@ -197,6 +208,14 @@ impl Referee {
                 && (!matches!(entry.act, Act::Turn(..))
                     || last.is_some_and(|last| last.pizza <= entry.pizza + 1))
         })
+    }
+}
+
+/// A report about the seat of another.
+fn as_seat_of(old: &Report, new: &Report) -> Report {
+    match (seat_of(old), seat_of(new)) {
+        (Some(seat), None) => with_seat(new, seat),
+        _ => new.clone(),
     }
 }
 

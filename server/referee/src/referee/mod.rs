@@ -16,7 +16,7 @@ use chefshat_engine::{
 pub use state::ShiftStory;
 
 use crate::judge::Broken;
-use crate::shift::{Act, Entry, Played, Shift, play};
+use crate::shift::{Act, Entry, Misfit, Played, Shift, play};
 use crate::words::Names;
 use crate::{
     Corrected, Question, Report, Ruling, StartState, ToLay, Verdict, ViolatedRule, Violation,
@@ -24,6 +24,8 @@ use crate::{
 
 /// The most open questions of bridges.
 pub const MAX_QUESTIONS: usize = 16;
+/// How the ids of the referee's own questions begin.
+const QUESTION_PREFIX: &str = "referee-";
 /// The most answers that are kept for the bridge that asked.
 const MAX_ANSWERS: usize = 16;
 /// The most reports that wait for an answer.
@@ -48,6 +50,8 @@ pub struct Referee {
     held: Vec<(u64, Report)>,
     /// Open questions, those of bridges and of the referee.
     questions: Vec<Question>,
+    /// Number of questions that the referee has asked.
+    questions_asked: u64,
     /// The last answers.
     answers: VecDeque<Answer>,
     violation: Option<(u64, Violation)>,
@@ -122,6 +126,7 @@ impl Referee {
             asked: None,
             held: Vec::new(),
             questions: Vec::new(),
+            questions_asked: 0,
             answers: VecDeque::new(),
             violation: None,
             to_lay: Vec::new(),
@@ -200,7 +205,7 @@ impl Referee {
             Report::Correction {
                 number: corrected,
                 instead,
-            } => self.correct(*corrected, instead.as_deref(), ruling),
+            } => self.correct(*corrected, None, instead.as_deref(), ruling),
             Report::Question(question) => self.ask(question),
             Report::Answer { id, option } => self.answer(number, id, *option, ruling),
             Report::Pause(paused) => {
@@ -221,6 +226,10 @@ impl Referee {
     fn ask(&mut self, question: &Question) -> Judged {
         if self.questions.iter().any(|open| open.id == question.id) {
             return Ok(Verdict::Known);
+        }
+        if question.id.starts_with(QUESTION_PREFIX) {
+            let text = format!("Only the referee's questions begin with `{QUESTION_PREFIX}`.");
+            return Err((question.seat, (ViolatedRule::Form, text)));
         }
         if self.questions.len() >= MAX_QUESTIONS {
             return Err((
@@ -256,7 +265,7 @@ impl Referee {
     ///
     /// # Errors
     /// No game contains it; nothing is changed.
-    fn set_entries(&mut self, entries: Vec<Entry>) -> Result<(), String> {
+    fn set_entries(&mut self, entries: Vec<Entry>) -> Result<(), Misfit> {
         let shift = Shift {
             start: self.shift().start.clone(),
             entries,
@@ -272,7 +281,7 @@ impl Referee {
     }
 
     /// Adds something that counts.
-    fn try_act(&mut self, number: u64, report: Option<&Report>, act: Act) -> Result<(), String> {
+    fn try_act(&mut self, number: u64, report: Option<&Report>, act: Act) -> Result<(), Misfit> {
         let pizza = self.game().observe(Viewer::Spectator).pizza;
         let mut entries = self.shift().entries.clone();
         entries.push(Entry {

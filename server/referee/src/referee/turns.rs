@@ -5,9 +5,9 @@ use chefshat_engine::{
 };
 
 use super::before::counts_of_action;
-use super::{Answer, Asked, Doubt, Judged, MAX_ANSWERS, MAX_HELD, Referee};
+use super::{Answer, Asked, Doubt, Judged, MAX_ANSWERS, MAX_HELD, QUESTION_PREFIX, Referee};
 use crate::judge::{as_play, check_play};
-use crate::shift::{Act, Entry, Shift, play};
+use crate::shift::{Act, Entry, Misfit, Shift, play};
 use crate::words::turn_text;
 use crate::{Question, Report, Ruling, ToLay, Verdict, ViolatedRule, Violation};
 
@@ -38,11 +38,13 @@ impl Referee {
         let Some(asked) = self.asked.clone() else {
             return self.take_turn(number, report);
         };
-        // A turn that is possible now answers the question: nobody passed before it unseen.
+        // A turn that is possible now answers the question: nobody passed before it unseen. Unless it
+        // is not known whose turn it is.
+        let is_certain = matches!(report, Report::Cleared) || seat_of(report).is_some();
         let before = self.clone();
         self.asked = None;
-        match self.take_turn(number, report) {
-            Ok(verdict @ (Verdict::Accepted | Verdict::Known)) if self.asked.is_none() => {
+        match is_certain.then(|| self.take_turn(number, report)) {
+            Some(Ok(verdict @ (Verdict::Accepted | Verdict::Known))) if self.asked.is_none() => {
                 if verdict == Verdict::Accepted {
                     self.close_question(&asked.id);
                     self.judge_held(ruling);
@@ -67,6 +69,10 @@ impl Referee {
 
     /// Judges a report about a turn while no question is open.
     pub(super) fn take_turn(&mut self, number: u64, report: &Report) -> Judged {
+        if self.game().is_over() {
+            let text = "The game is over.".to_owned();
+            return Err((seat_of(report), (ViolatedRule::Turn, text)));
+        }
         let turn = match report {
             Report::Laid { seat, cards } => TurnReport::Acted {
                 seat: *seat,
@@ -98,8 +104,12 @@ impl Referee {
         }
     }
 
-    /// A report of what a remote seat decided; `None` if the report is not about a remote seat.
+    /// A report of what a remote seat decided; `None` if the report is not about a remote seat. A pass
+    /// without a seat is one of whoever is to act.
     fn confirm_turn(&mut self, seat: Option<Seat>, action: Action) -> Option<Judged> {
+        if seat.is_none() && action == Action::Pass {
+            return None;
+        }
         let awaited = |of: Seat| {
             let open = |it: &ToLay| it.seat == of && it.kind == DecisionKind::Turn;
             self.to_lay.iter().any(open)
@@ -206,6 +216,7 @@ impl Referee {
         self.end_exchange(number, seat)?;
         let refuse = |seat, broken| Err((Some(seat), broken));
         let opening = !self.shift().has_turns();
+        let is_named = seat.is_some();
         let seat = match (seat, opening) {
             (Some(seat), _) => seat,
             (None, false) => self.to_act().expect("a Shift in progress has a turn"),
@@ -214,6 +225,13 @@ impl Referee {
                 None => return Ok(self.ask_who_opened(number, report)),
             },
         };
+        if !is_named && self.remote[seat] {
+            let text = format!(
+                "It is {}'s turn, who has not decided yet.",
+                self.names.of(seat)
+            );
+            return refuse(seat, (ViolatedRule::Decision, text));
+        }
         if opening {
             let required = self.requirement(self.game());
             check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
@@ -263,7 +281,7 @@ impl Referee {
             Err(problem) => refuse(format!(
                 "{name} cannot have {}: {}.",
                 turn_text(action),
-                self.names.replace_seats(&problem)
+                self.names.replace_seats(&problem.text)
             )),
         }
     }
@@ -299,7 +317,7 @@ impl Referee {
             .map_err(|problem| {
                 (
                     seat,
-                    (ViolatedRule::Gift, self.names.replace_seats(&problem)),
+                    (ViolatedRule::Gift, self.names.replace_seats(&problem.text)),
                 )
             })
     }
@@ -364,7 +382,7 @@ impl Referee {
         if certain && self.only_passes_fit(number, &missed, then) {
             for seat in &missed {
                 self.try_act(number, None, Act::Turn(*seat, Action::Pass))
-                    .map_err(|problem| (Some(*seat), (ViolatedRule::Turn, problem)))?;
+                    .map_err(|misfit| (Some(*seat), (ViolatedRule::Turn, misfit.text)))?;
             }
             return self.take_turn(number, report);
         }
@@ -396,7 +414,8 @@ impl Referee {
         options: Vec<String>,
         seat: Option<Seat>,
     ) -> Verdict {
-        let id = format!("referee-{number}");
+        self.questions_asked += 1;
+        let id = format!("{QUESTION_PREFIX}{}", self.questions_asked);
         self.questions.push(Question {
             id: id.clone(),
             text,
@@ -438,6 +457,7 @@ impl Referee {
         true
     }
 
+    /// Whether turns can follow, as far as can be found out.
     fn can_be_played(&self, number: u64, turns: &[(Seat, Action)]) -> bool {
         let shift = self.shift();
         let entries = turns.iter().map(|(seat, action)| Entry {
@@ -451,10 +471,13 @@ impl Referee {
             start: shift.start.clone(),
             entries: shift.entries.iter().cloned().chain(entries).collect(),
         };
-        play(&self.rules, &self.remote, &shift).is_ok()
+        match play(&self.rules, &self.remote, &shift) {
+            Ok(_) => true,
+            Err(misfit) => misfit.is_unresolved,
+        }
     }
 
-    fn insert_passes(&mut self, number: u64, missed: &[Seat]) -> Result<(), String> {
+    fn insert_passes(&mut self, number: u64, missed: &[Seat]) -> Result<(), Misfit> {
         for seat in missed {
             let report = Report::Pass { seat: Some(*seat) };
             self.try_act(number, Some(&report), Act::Turn(*seat, Action::Pass))?;
@@ -533,8 +556,16 @@ impl Referee {
     pub(super) fn judge_held(&mut self, ruling: &mut Ruling) {
         let held = std::mem::take(&mut self.held);
         let mut held = held.into_iter();
+        let shift = self.shifts.len();
         for (number, report) in held.by_ref() {
-            match self.take_turn(number, &report) {
+            let judged = match self.shifts.len() == shift {
+                true => self.take_turn(number, &report),
+                false => {
+                    let text = "The Shift was over before this.".to_owned();
+                    Err((seat_of(&report), (ViolatedRule::Turn, text)))
+                }
+            };
+            match judged {
                 Ok(Verdict::Held { .. }) => break,
                 Ok(_) => {}
                 Err((seat, (rule, text))) => {

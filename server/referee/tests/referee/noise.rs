@@ -157,6 +157,45 @@ fn misread(table: &mut Table, report: &Report) -> Report {
 }
 
 fn play_noisily(table: &mut Table, noise: f64) {
+    play(table, |table, report| {
+        if !table.rng.random_bool(noise) {
+            table.report(report);
+            return;
+        }
+        match table.rng.random_range(0..3) {
+            0 => {}
+            1 => {
+                table.report(report);
+                table.report(report);
+            }
+            _ => {
+                let wrong = misread(table, report);
+                table.report(&wrong);
+            }
+        }
+    });
+}
+
+/// Reports everything but some passes. Whatever counts then is what happened: the referee infers a
+/// pass only if nothing else is possible.
+fn play_with_missing_passes(table: &mut Table, missing: f64) {
+    play(table, |table, report| {
+        if matches!(report, Report::Pass { .. }) && table.rng.random_bool(missing) {
+            return;
+        }
+        table.report(report);
+        let counted = table.counted();
+        let truth = table.true_turns();
+        assert!(counted.len() <= truth.len());
+        for ((_, seat, action), right) in counted.iter().zip(truth) {
+            assert_eq!((*seat, *action), *right);
+        }
+    });
+}
+
+/// Plays a game of which the turns at the table are reported by `report`. An attendant answers
+/// questions and corrects what is wrong.
+fn play(table: &mut Table, mut report_turn: impl FnMut(&mut Table, &Report)) {
     while table.referee.stage() != Stage::Over {
         if table.referee.stage() == Stage::Question {
             attend(table);
@@ -183,21 +222,7 @@ fn play_noisily(table: &mut Table, noise: f64) {
         if table.remote[seat] {
             continue;
         }
-        if !table.rng.random_bool(noise) {
-            table.report(&report);
-        } else {
-            match table.rng.random_range(0..3) {
-                0 => {}
-                1 => {
-                    table.report(&report);
-                    table.report(&report);
-                }
-                _ => {
-                    let wrong = misread(table, &report);
-                    table.report(&wrong);
-                }
-            }
-        }
+        report_turn(table, &report);
         // A correction is possible within the pizza: the attendant looks before it is cleared.
         let pizza = table
             .truth
@@ -248,6 +273,20 @@ proptest! {
     ) {
         let mut table = Table::new(varied(faces, 2, variation), seed, remote);
         play_noisily(&mut table, noise);
+        table.check_end();
+    }
+
+    /// Missing passes are never guessed wrong, whether an attendant looks or not.
+    #[test]
+    fn missing_passes_are_inferred_or_asked_for(
+        seed in any::<u64>(),
+        remote in 0u8..15,
+        faces in 5u8..=11,
+        variation in 0u8..16,
+        missing in 0.0..1.0,
+    ) {
+        let mut table = Table::new(varied(faces, 2, variation), seed, remote);
+        play_with_missing_passes(&mut table, missing);
         table.check_end();
     }
 }

@@ -222,7 +222,7 @@ fn corrections_and_questions() {
         (Report::Correction { number: 99, instead: None }, "This report cannot be corrected: it is no report of this Shift that counts."),
         (
             Report::Correction { number: 2, instead: Some(Box::new(Report::Cleared)) },
-            "A report can be replaced only by one of the same kind.",
+            "A report can be replaced only by one of the same kind and seat.",
         ),
         (Report::Role { seat: Seat::new(0), role: Role::Chef }, "The first Shift has no roles."),
         (Report::Gift { seat: Seat::new(0), cards: None }, "Ada gives no cards in this Shift."),
@@ -237,4 +237,122 @@ fn corrections_and_questions() {
             "Di has 17 cards, but 3 are seen. Show all of them side by side.",
         ),
     ]);
+}
+
+#[test]
+fn what_came_after_a_corrected_end_of_the_game_is_void() {
+    let names = ["Ada", "Bo"].map(str::to_owned).to_vec();
+    let mut referee = Referee::new(rules(2, 4, 1), BySeat::filled(2, false), names);
+    referee.start();
+    let mut evening = Evening { referee, number: 0 };
+    let golden = Report::Laid {
+        seat: Some(Seat::new(0)),
+        cards: cards(&[4, 4], Some(true)),
+    };
+    evening.check(&[
+        (golden, "accepted"),
+        (laid(1, &[3, 3]), "accepted"),
+        (laid(0, &[2, 2]), "accepted"),
+        (pass(1), "accepted"),
+        (laid(0, &[4]), "accepted"),
+        (laid(1, &[3]), "accepted"),
+    ]);
+    // Ada had laid both her cards, and the game was over.
+    let instead = Some(Box::new(laid(0, &[4, 4])));
+    let ruling = (evening.referee).report(7, &Report::Correction { number: 5, instead });
+    assert_eq!(ruling.corrected.unwrap().void_reports, [6]);
+    assert!(evening.referee.game().is_over());
+}
+
+#[test]
+fn reports_without_a_seat_are_never_those_of_a_remote_seat() {
+    let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(1)));
+    let hand = cards(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10], None);
+    let somebody = |faces: &[usize]| Report::Laid {
+        seat: None,
+        cards: cards(faces, None),
+    };
+    evening.check(&[
+        (
+            Report::Hand {
+                seat: Seat::new(1),
+                cards: hand,
+            },
+            "accepted",
+        ),
+        (laid(0, &[11]), "accepted"),
+        (
+            Report::Pass { seat: None },
+            "It is Bo's turn, who has not decided yet.",
+        ),
+        (somebody(&[8]), "It is Bo's turn, who has not decided yet."),
+    ]);
+    evening.decide(1, "pass");
+    // Cy passes; the pass card of Bo is shown later.
+    evening.check(&[
+        (Report::Pass { seat: None }, "accepted"),
+        (pass(1), "accepted"),
+    ]);
+    assert_eq!(evening.referee.waiting_for(), "It is Di's turn.");
+}
+
+#[test]
+fn reports_without_a_seat_wait_for_the_answer_to_a_question() {
+    let mut evening = Evening::new();
+    let somebody = Report::Laid {
+        seat: None,
+        cards: cards(&[8], None),
+    };
+    evening.check(&[
+        (laid(0, &[11]), "accepted"),
+        (laid(2, &[9]), "Did Bo pass?"),
+        (somebody, "Did Bo pass?"),
+    ]);
+    let held = evening.number;
+    let hand = Report::Hand {
+        seat: Seat::new(1),
+        cards: cards(&[1], None),
+    };
+    let instead = Some(Box::new(hand));
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[
+        (
+            Report::Correction {
+                number: held,
+                instead,
+            },
+            "A report can be replaced only by one of the same kind and seat.",
+        ),
+        (
+            Report::Answer {
+                id,
+                option: Some(0),
+            },
+            "accepted",
+        ),
+    ]);
+    // Di laid the 8.
+    assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
+}
+
+#[test]
+fn passes_of_one_answer_are_taken_back_one_by_one() {
+    let mut evening = Evening::new();
+    evening.check(&[
+        (laid(0, &[11]), "accepted"),
+        (laid(3, &[9]), "Did Bo and Cy pass?"),
+    ]);
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[
+        (
+            Report::Answer {
+                id,
+                option: Some(0),
+            },
+            "accepted",
+        ),
+        (Report::PassWithdrawn { seat: Seat::new(2) }, "accepted"),
+    ]);
+    // Bo has passed; Di's cards wait again.
+    assert_eq!(evening.referee.waiting_for(), "Did Cy pass?");
 }
