@@ -3,15 +3,15 @@
     taskset -c 0 python benchmarks/perception.py
     taskset -c 0 python benchmarks/perception.py --shifts 2 --difficulty hard --json
 
-Every happening (cards laid, field cleared, pass card shown or withdrawn) is one of:
+Every true event (cards laid, field cleared, pass card shown or withdrawn) is one of:
 
 - *first*: reported exactly, and without a doubt about it;
 - *asked*: reported exactly, after a doubt about it was answered with the truth;
 - *wrong*: missing, out of order, or reported otherwise than it was.
 
-Some of the first are *held*: they wait for the answer about another happening, because events keep their order. A *false* event is
+Some of the first are *held*: they wait for the answer about another event, because events keep their order. A *false* event is
 one that was reported without a doubt about it and did not happen like this. *Needless* doubts are about places where nothing new
-lies. An *unreadable* happening is one with a piece both of whose tags are stained: only asking can get it right. The latency is the
+lies. An *unreadable* event is one with a piece both of whose tags are stained: only asking can get it right. The latency is the
 time from the last card at rest to the event, in the frames' own time, of the first that were not held. Frames per second count
 processor time for reading and deciding, on one thread and without painting the frames.
 
@@ -38,9 +38,9 @@ from chefshat_robot.synthetic import (
     DIFFICULTIES,
     Difficulty,
     FrameTruth,
-    Happening,
     Lying,
     SyntheticTable,
+    TrueEvent,
     acts_of_steps,
     random_shift,
 )
@@ -60,7 +60,7 @@ from chefshat_robot.vision.frames import Frame
 ANSWER_SECONDS = 0.5
 """A doubt is answered so long after it was asked, in s: the synthetic players do not wait for a slow answer."""
 LATE_SECONDS = 0.7
-"""Events that come later than this after their happening are listed."""
+"""Events that come later than this after what they report are listed."""
 NAIVE_EVERY = 15
 """The naive reader looks at one frame of so many."""
 
@@ -69,7 +69,7 @@ NAIVE_EVERY = 15
 class Result:
     """What was counted in some Shifts."""
 
-    happenings: int = 0
+    true_events: int = 0
     first: int = 0
     held: int = 0
     asked: int = 0
@@ -97,9 +97,9 @@ class Result:
     def summary(self, fps: float) -> dict[str, Any]:
         """The numbers as a JSON object."""
         latencies = np.array(self.latencies or [0.0])
-        count = max(self.happenings, 1)
+        count = max(self.true_events, 1)
         return {
-            "happenings": self.happenings,
+            "events": self.true_events,
             "first_percent": round(100 * self.first / count, 2),
             "held_percent": round(100 * self.held / count, 2),
             "unreadable_percent": round(100 * self.unreadable / count, 2),
@@ -136,9 +136,9 @@ class Report:
     asked: bool
 
 
-def key(event: Observed | Happening) -> tuple[Any, ...]:
-    """What an event or a happening says, comparably."""
-    if isinstance(event, Happening):
+def key(event: Observed | TrueEvent) -> tuple[Any, ...]:
+    """What a reported or a true event says, comparably."""
+    if isinstance(event, TrueEvent):
         cards = tuple(sorted(zip(event.places, event.cards, strict=True))) if event.kind != "cleared" else ()
         return (event.kind, event.seat if event.kind.startswith("pass") else None, cards)
     if isinstance(event, Laid | TakenBack):
@@ -172,11 +172,11 @@ def is_about(event: Observed, doubt: Doubt, reading: Card | bool) -> bool:
     return False
 
 
-def is_unreadable(happening: Happening, truth: FrameTruth) -> bool:
-    """Whether a happening shows a piece without a tag that can be read; `truth` is that of the first frame after it."""
-    if happening.kind == "pass_shown":
-        return any(all(lying.smudged) for lying in there(f"pass {happening.seat}", truth))
-    return happening.kind == "laid" and any(all(lying.smudged) for lying in truth.lying if lying.piece.card in happening.cards)
+def is_unreadable(true_event: TrueEvent, truth: FrameTruth) -> bool:
+    """Whether a true event shows a piece without a tag that can be read; `truth` is that of the first frame after it."""
+    if true_event.kind == "pass_shown":
+        return any(all(lying.smudged) for lying in there(f"pass {true_event.seat}", truth))
+    return true_event.kind == "laid" and any(all(lying.smudged) for lying in truth.lying if lying.piece.card in true_event.cards)
 
 
 def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: float) -> Result:
@@ -191,7 +191,7 @@ def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: flo
     """The open doubts, and when they are answered."""
     answered: list[tuple[Doubt, Card | bool]] = []
     spans: list[tuple[float, float]] = []
-    """From when to when happenings had to wait for a doubt."""
+    """From when to when events had to wait for a doubt."""
     truths: list[FrameTruth] = []
 
     def begin(doubt: Doubt) -> float:
@@ -227,8 +227,8 @@ def run_shift(seed: int, difficulty: Difficulty, size: tuple[int, int], fps: flo
         if frame.index % NAIVE_EVERY == 0 and truth.lying and not truth.hands:
             result.naive_frames += 1
             result.naive_right += naive_is_right(naive, frame, truth)
-    result.unreadable = sum(is_unreadable(happening, truths[math.ceil(happening.time * fps)]) for happening in table.happenings)
-    judge(result, table.happenings, reports, spans, seed)
+    result.unreadable = sum(is_unreadable(true_event, truths[math.ceil(true_event.time * fps)]) for true_event in table.true_events)
+    judge(result, table.true_events, reports, spans, seed)
     return result
 
 
@@ -240,19 +240,19 @@ def naive_is_right(detector: cv2.aruco.ArucoDetector, frame: Frame, truth: Frame
     return read.issuperset(top.values())
 
 
-def judge(result: Result, happenings: list[Happening], reports: list[Report], spans: list[tuple[float, float]], seed: int) -> None:
-    """Compares events with what happened; `spans` says from when to when happenings had to wait for a doubt."""
+def judge(result: Result, true_events: list[TrueEvent], reports: list[Report], spans: list[tuple[float, float]], seed: int) -> None:
+    """Compares events with what happened; `spans` says from when to when events had to wait for a doubt."""
     rest = list(reports)
     latest: Counter[str] = Counter()
-    for happening in happenings:
-        result.happenings += 1
-        exact = [report for report in rest if key(report.event) == key(happening) and report.event.time > happening.time - 1.0]
+    for true_event in true_events:
+        result.true_events += 1
+        exact = [report for report in rest if key(report.event) == key(true_event) and report.event.time > true_event.time - 1.0]
         # Pass cards are taken back while the field is being cleared, in any order.
-        orders = [] if happening.kind == "pass_withdrawn" else ["play"]
-        orders += [f"seat {happening.seat}"] if happening.kind.startswith("pass") else []
+        orders = [] if true_event.kind == "pass_withdrawn" else ["play"]
+        orders += [f"seat {true_event.seat}"] if true_event.kind.startswith("pass") else []
         if not exact or any(reports.index(exact[0]) < latest[order] for order in orders):
             result.wrong += 1
-            result.mistakes.append(f"Shift {seed}, {happening.time:.1f} s: missed {happening}")
+            result.mistakes.append(f"Shift {seed}, {true_event.time:.1f} s: missed {true_event}")
             continue
         latest.update({order: reports.index(exact[0]) - latest[order] for order in orders})
         rest.remove(exact[0])
@@ -261,12 +261,12 @@ def judge(result: Result, happenings: list[Happening], reports: list[Report], sp
             result.asked += 1
             continue
         result.first += 1
-        if any(begin < event.time and happening.time < end for begin, end in spans):
+        if any(begin < event.time and true_event.time < end for begin, end in spans):
             result.held += 1
         else:
-            result.latencies.append(event.time - happening.time)
-            if event.time - happening.time > LATE_SECONDS:
-                result.mistakes.append(f"Shift {seed}, {happening.time:.1f} s: {event.time - happening.time:.2f} s late {event}")
+            result.latencies.append(event.time - true_event.time)
+            if event.time - true_event.time > LATE_SECONDS:
+                result.mistakes.append(f"Shift {seed}, {true_event.time:.1f} s: {event.time - true_event.time:.2f} s late {event}")
     for report in rest:
         result.false += not report.asked
         result.mistakes.append(f"Shift {seed}, {report.event.time:.1f} s: false {report.event}")
@@ -291,7 +291,7 @@ def main() -> int:
             total.add(run_shift(seed, DIFFICULTIES[name], size, arguments.fps))
             print(f"\r{name}: {seed + 1 - arguments.first} of {arguments.shifts} Shifts", end="", file=sys.stderr, flush=True)
         print(file=sys.stderr)
-        assert total.happenings > 20 * arguments.shifts, "a Shift has more happenings than this"
+        assert total.true_events > 20 * arguments.shifts, "a Shift has more events than this"
         summaries[name] = total.summary(arguments.fps)
         if not arguments.json:
             print(f"{name}: {json.dumps(summaries[name], indent=2)}")

@@ -24,12 +24,12 @@ from chefshat_robot.synthetic import (
     Clear,
     Difficulty,
     FrameTruth,
-    Happening,
     Hover,
     LayCards,
     ShowPass,
     SyntheticTable,
     TakeBack,
+    TrueEvent,
     WithdrawPass,
     acts_of_steps,
     random_shift,
@@ -65,14 +65,14 @@ ROUND: list[Act] = [
 """A short pizza: a play, a pass, a play on top of it, and clearing."""
 
 
-def said(event: Observed | Happening) -> tuple[Any, ...]:
-    """What an event or a happening says, without its time."""
+def said(event: Observed | TrueEvent) -> tuple[Any, ...]:
+    """What a reported or a true event says, without its time."""
     match event:
-        case Happening(kind="laid" | "taken_back" as kind, cards=cards, places=places):
+        case TrueEvent(kind="laid" | "taken_back" as kind, cards=cards, places=places):
             return (kind, *sorted(zip(places, cards, strict=True)))
-        case Happening(kind="cleared" as kind):
+        case TrueEvent(kind="cleared" as kind):
             return (kind,)
-        case Happening(kind=kind, seat=seat):
+        case TrueEvent(kind=kind, seat=seat):
             return (kind, seat)
         case Laid(cards=cards, places=places):
             return ("laid", *sorted(zip(places, cards, strict=True)))
@@ -122,9 +122,9 @@ def happened(events: Sequence[Observed]) -> list[tuple[Any, ...]]:
 
 def assert_true(table: SyntheticTable, events: Sequence[Observed]) -> None:
     """The events are what truly happened; withdrawn pass cards may come before or after the clearing beside them."""
-    assert sorted(map(str, happened(events))) == sorted(str(said(happening)) for happening in table.happenings)
+    assert sorted(map(str, happened(events))) == sorted(str(said(true_event)) for true_event in table.true_events)
     laid = [event for event in happened(events) if event[0] in ("laid", "cleared")]
-    assert laid == [said(happening) for happening in table.happenings if happening.kind in ("laid", "cleared")]
+    assert laid == [said(true_event) for true_event in table.true_events if true_event.kind in ("laid", "cleared")]
 
 
 @pytest.mark.parametrize("name", list(DIFFICULTIES))
@@ -132,7 +132,7 @@ def test_the_first_pizzas_of_a_shift(name: str) -> None:
     difficulty = DIFFICULTIES[name]
     acts = [act for act in acts_of_steps(random_shift(11), 11, difficulty.pause, difficulty.hovers) if act.start < 18.0]
     table = SyntheticTable(acts, difficulty, seed=11)
-    assert len(table.happenings) >= 8
+    assert len(table.true_events) >= 8
     assert_true(table, watch(table))
 
 
@@ -334,6 +334,6 @@ def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pyt
     assert cli.main(["perceive", "--replay", str(recording), "--json"]) == 0
     assert capsys.readouterr().out == seen
     events = happened([from_json(json.loads(line)) for line in seen.splitlines()])
-    truth = [json.loads(line) for line in (evening / "happenings.jsonl").read_text().splitlines()]
+    truth = [json.loads(line) for line in (evening / "events.jsonl").read_text().splitlines()]
     assert events
-    assert [event[0] for event in events] == [happening["kind"] for happening in truth][: len(events)]
+    assert [event[0] for event in events] == [true_event["kind"] for true_event in truth][: len(events)]

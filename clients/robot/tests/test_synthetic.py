@@ -86,7 +86,7 @@ def test_the_truth_is_what_lies_there() -> None:
     cards = (deck.Card(0, 30), deck.Card(0, 31))
     acts: list[Act] = [LayCards(0.2, 1, cards, (1, 2)), ShowPass(1.4, 3), Clear(2.5, 0), WithdrawPass(4.2, 3)]
     table = SyntheticTable(acts, EASY, seed=4)
-    assert [happening.kind for happening in table.happenings] == ["laid", "pass_shown", "cleared", "pass_withdrawn"]
+    assert [true_event.kind for true_event in table.true_events] == ["laid", "pass_shown", "cleared", "pass_withdrawn"]
     truths = [truth for _, truth in table.frames()]
     laid = truths[int(1.3 * table.fps)].lying
     assert [lying.piece.card for lying in laid] == list(cards)

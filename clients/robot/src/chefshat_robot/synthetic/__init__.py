@@ -5,7 +5,7 @@
 
 from .difficulty import DIFFICULTIES, EASY, HARD, MEDIUM, Difficulty
 from .script import Act, Clear, Hover, LayCards, ShowPass, TakeBack, WithdrawPass, acts_of_steps, random_shift, shifts_of_record
-from .table import Bump, FrameTruth, Happening, Lying, SyntheticTable
+from .table import Bump, FrameTruth, Lying, SyntheticTable, TrueEvent
 
 __all__ = [
     "DIFFICULTIES",
@@ -17,13 +17,13 @@ __all__ = [
     "Clear",
     "Difficulty",
     "FrameTruth",
-    "Happening",
     "Hover",
     "LayCards",
     "Lying",
     "ShowPass",
     "SyntheticTable",
     "TakeBack",
+    "TrueEvent",
     "WithdrawPass",
     "acts_of_steps",
     "random_shift",

@@ -21,7 +21,7 @@ from .table import SyntheticTable
 _DESCRIPTION = """\
 Write a video of a Shift at a synthetic table, as a camera above it would see it, and the truth:
   video.mp4          the frames (or frames/*.png with --pictures, without loss)
-  happenings.jsonl   what happens: cards laid, pass cards shown and withdrawn, the field cleared
+  events.jsonl       what happens: cards laid, pass cards shown and withdrawn, the field cleared
   truth.jsonl        for each frame what lies where
   camera.json        the camera's calibration, for `chefshat-robot perceive --camera`
 
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     table.camera.save(arguments.output / "camera.json")
     end = min(table.duration, arguments.seconds) if arguments.seconds is not None else table.duration
     _write_lines(
-        arguments.output / "happenings.jsonl", (asdict(happening) for happening in table.happenings if happening.time < end)
+        arguments.output / "events.jsonl", (asdict(true_event) for true_event in table.true_events if true_event.time < end)
     )
     _write_frames(table, arguments.output, end, arguments.pictures)
     return 0

@@ -69,7 +69,7 @@ class Lying:
 
 
 @dataclass(frozen=True)
-class Happening:
+class TrueEvent:
     """Something that truly happened.
 
     Attributes:
@@ -176,7 +176,7 @@ class SyntheticTable:
 
     Attributes:
         camera: The intrinsics of its camera.
-        happenings: What truly happens, in the order of the times.
+        true_events: What truly happens, in the order of the times.
     """
 
     def __init__(
@@ -194,7 +194,7 @@ class SyntheticTable:
         self.seed = seed
         self.fps = fps
         self.size = size
-        self.happenings: list[Happening] = []
+        self.true_events: list[TrueEvent] = []
         self._deck = deck_number
         self._bumps = sorted(bumps, key=lambda bump: bump.time)
         self._gestures: list[_Gesture] = []
@@ -270,8 +270,8 @@ class SyntheticTable:
             self._take(act, taken)
 
     def _happened(self, kind: str, time: float, seat: int, cards: tuple[Card, ...] = (), places: tuple[int, ...] = ()) -> None:
-        self.happenings.append(Happening(kind, time, seat, cards, places))
-        self.happenings.sort(key=lambda happening: happening.time)
+        self.true_events.append(TrueEvent(kind, time, seat, cards, places))
+        self.true_events.sort(key=lambda true_event: true_event.time)
 
     def _lay(
         self, start: float, seat: int, pieces: list[tuple[Piece, int, field.Place]], face_down: bool, rng: np.random.Generator
