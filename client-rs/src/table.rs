@@ -15,7 +15,7 @@ use crate::v1::{self, table_service_client::TableServiceClient};
 
 impl Client {
     /// Reports something that happened at a physical table. `table_ticket` comes from
-    /// [`Client::create_room`]. If the response is lost, the call is repeated and reports nothing
+    /// [`Client::create_room`], or from `GetPhysicalTable` of a tournament. If the response is lost, the call is repeated and reports nothing
     /// twice.
     ///
     /// A report that the rules or the cards do not allow is no error: see `verdict` and `detail`.

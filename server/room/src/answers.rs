@@ -84,6 +84,9 @@ pub enum ReportError {
     /// The game is over.
     #[error("the game is over")]
     GameOver,
+    /// The id was used for another report.
+    #[error("this report id was used for another report; choose a new one")]
+    IdUsed,
     /// There are too many reports.
     #[error("a game has at most {MAX_REPORTS} reports")]
     TooMany,

@@ -226,10 +226,17 @@ pub struct Reported {
     pub id: String,
     /// Who reports.
     pub source: ReportSource,
-    /// The time between the happening and the report.
+    /// The time between the event and the report.
     pub age: Duration,
     /// The report.
     pub report: Report,
+}
+
+impl Reported {
+    /// Whether a report with the same id says the same. A repetition may be older.
+    pub(super) fn is_repeated_by(&self, other: &Self) -> bool {
+        self.source == other.source && self.report == other.report
+    }
 }
 
 /// Who reports from a physical table.

@@ -31,8 +31,8 @@ impl Core {
         self.table().and_then(PhysicalTable::paused_since)
     }
 
-    /// Takes a report from the physical table. A report with a known id changes nothing and gets
-    /// the same ruling again.
+    /// Takes a report from the physical table. A repeated report, which has a known id, changes
+    /// nothing and gets the same ruling again.
     ///
     /// # Errors
     /// The report is not accepted. Nothing has changed.
@@ -45,8 +45,11 @@ impl Core {
             reported.id.clone(),
             matches!(reported.report, Report::Question(_)),
         );
-        if let Some(outcome) = self.table().and_then(|table| table.outcome(&id)) {
-            return Ok(outcome.clone());
+        if let Some((first, outcome)) = self.table().and_then(|table| table.outcome(&id)) {
+            return match first.is_repeated_by(&reported) {
+                true => Ok(outcome.clone()),
+                false => Err(ReportError::IdUsed),
+            };
         }
         if self.state.is_over() {
             return Err(ReportError::GameOver);
@@ -60,7 +63,8 @@ impl Core {
         }
         self.commit(now, Change::Reported(Box::new(reported)));
         let outcome = self.table().and_then(|table| table.outcome(&id));
-        let outcome = outcome.expect("the report has just been folded").clone();
+        let (_, outcome) = outcome.expect("the report has just been folded");
+        let outcome = outcome.clone();
         self.advance(now);
         Ok(outcome)
     }

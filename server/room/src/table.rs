@@ -51,8 +51,8 @@ impl RoomGame {
 #[derive(Debug)]
 pub struct PhysicalTable {
     referee: Referee,
-    /// The ruling on each report, by the id its client chose.
-    outcomes: BTreeMap<String, ReportOutcome>,
+    /// Each report and the ruling on it, by the id its client chose.
+    outcomes: BTreeMap<String, (Reported, ReportOutcome)>,
     /// When and by whom each report was made, by its number.
     made: BTreeMap<u64, Made>,
     /// The events of the game that no correction has voided, in order.
@@ -70,7 +70,7 @@ pub struct Made {
     pub at: Duration,
     /// Who reported.
     pub source: ReportSource,
-    /// The time between the happening and the report.
+    /// The time between the event and the report.
     pub age: Duration,
     /// The measured time of the decision that was reported, microseconds; 0 if it is not known.
     pub time_us: u64,
@@ -121,8 +121,8 @@ impl PhysicalTable {
         self.made.get(&number).copied()
     }
 
-    /// The ruling on the report with this id.
-    pub(super) fn outcome(&self, id: &str) -> Option<&ReportOutcome> {
+    /// The report with this id, and the ruling on it.
+    pub(super) fn outcome(&self, id: &str) -> Option<&(Reported, ReportOutcome)> {
         self.outcomes.get(id)
     }
 
@@ -180,15 +180,13 @@ impl PhysicalTable {
             },
         );
         self.note_progress(stage, &ruling.events, happened);
-        self.outcomes.insert(
-            reported.id.clone(),
-            ReportOutcome {
-                number,
-                verdict: ruling.verdict.clone(),
-                void_reports: (ruling.corrected.as_ref())
-                    .map_or_else(Vec::new, |corrected| corrected.void_reports.clone()),
-            },
-        );
+        let outcome = ReportOutcome {
+            number,
+            verdict: ruling.verdict.clone(),
+            void_reports: (ruling.corrected.as_ref())
+                .map_or_else(Vec::new, |corrected| corrected.void_reports.clone()),
+        };
+        (self.outcomes).insert(reported.id.clone(), (reported.clone(), outcome));
         ruling
     }
 

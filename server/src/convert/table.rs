@@ -28,7 +28,7 @@ const MAX_OPTION: usize = 64;
 const OPTIONS: std::ops::RangeInclusive<usize> = 2..=12;
 /// Largest picture of a question, bytes.
 const MAX_PICTURE_BYTES: usize = 32 * 1024;
-/// Oldest happening that can be reported, milliseconds.
+/// Oldest event that can be reported, milliseconds.
 const MAX_AGE_MS: u32 = 3_600_000;
 /// Most cards in one report: more than a deck, since cards can be read twice.
 const MAX_CARDS: usize = 255;

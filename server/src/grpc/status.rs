@@ -101,7 +101,7 @@ pub fn table_unknown() -> Status {
     status(
         Code::Unauthenticated,
         "TICKET_UNKNOWN",
-        "no physical table has this ticket: it is mistyped, or the room is gone; `table_ticket` of CreateRoom is its ticket",
+        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament",
         [("field", "table_ticket")],
     )
 }
@@ -282,6 +282,7 @@ impl From<ReportRefusal> for Refusal {
         let (code, reason) = match error {
             ReportError::GameNotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
             ReportError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
+            ReportError::IdUsed => (Code::AlreadyExists, "REPORT_ID_USED"),
             ReportError::TooMany => (Code::ResourceExhausted, "TOO_MANY_REPORTS"),
             ReportError::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
         };

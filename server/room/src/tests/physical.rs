@@ -111,14 +111,24 @@ fn a_repeated_report_gets_the_same_ruling_and_changes_nothing() {
     let first = mixed.table.core.report(now, reported.clone());
     mixed.table.commit();
     let changes = mixed.table.core.changes();
-    let again = mixed.table.core.report(now + ms(50), reported);
+    let later = Reported {
+        age: ms(50),
+        ..reported.clone()
+    };
+    let again = mixed.table.core.report(now + ms(50), later);
     assert_eq!(first, again);
+    let other = Reported {
+        report: Report::Pause(true),
+        ..reported
+    };
+    let refused = mixed.table.core.report(now, other);
+    assert_eq!(refused, Err(ReportError::IdUsed));
     assert!(matches!(first, Ok(outcome) if outcome.number == changes));
     assert_eq!(mixed.table.core.changes(), changes);
 }
 
 #[test]
-fn the_time_at_the_table_counts_from_the_turn_to_the_happening() {
+fn the_time_at_the_table_counts_from_the_turn_to_the_event() {
     let mut mixed = Mixed::new([PERSON; 4], 1, 2);
     mixed.until(|it| it.sources().len() == 3);
     // The last turn was reported when it happened; the next one late.

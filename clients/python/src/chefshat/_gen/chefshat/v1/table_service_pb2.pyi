@@ -65,7 +65,7 @@ class _ReportVerdictEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_ReportV
     REPORT_VERDICT_ACCEPTED: _ReportVerdict.ValueType  # 1
     """It counts."""
     REPORT_VERDICT_KNOWN: _ReportVerdict.ValueType  # 2
-    """It was known already: a second report of the same happening. Nothing changed."""
+    """It was known already: a second report of the same event. Nothing changed."""
     REPORT_VERDICT_VIOLATION: _ReportVerdict.ValueType  # 3
     """The rules or the cards do not allow it. A Violation event says so; the game stands as before.
     Have the cards taken back, or correct what was misread.
@@ -81,7 +81,7 @@ REPORT_VERDICT_UNSPECIFIED: ReportVerdict.ValueType  # 0
 REPORT_VERDICT_ACCEPTED: ReportVerdict.ValueType  # 1
 """It counts."""
 REPORT_VERDICT_KNOWN: ReportVerdict.ValueType  # 2
-"""It was known already: a second report of the same happening. Nothing changed."""
+"""It was known already: a second report of the same event. Nothing changed."""
 REPORT_VERDICT_VIOLATION: ReportVerdict.ValueType  # 3
 """The rules or the cards do not allow it. A Violation event says so; the game stands as before.
 Have the cards taken back, or correct what was misread.
@@ -148,10 +148,11 @@ class ReportRequest(_message.Message):
     REPORT_ID_FIELD_NUMBER: _builtins.int
     REPORT_FIELD_NUMBER: _builtins.int
     table_ticket: _builtins.str
-    """`table_ticket` of CreateRoomResponse."""
+    """`table_ticket` of CreateRoomResponse or GetPhysicalTableResponse."""
     report_id: _builtins.str
-    """Chosen by the client, 1..=64 characters. A repeated call with the same id gets the same response
-    and reports nothing new, also after a restart of the server.
+    """Chosen by the client, 1..=64 characters, unique in the room. A repeated call gets the same
+    verdict and reports nothing new, also after a restart of the server; its `age_ms` may differ. The
+    same id with another report or source: ALREADY_EXISTS (REPORT_ID_USED).
     """
     @_builtins.property
     def report(self) -> Global___TableReport:
@@ -174,7 +175,7 @@ Global___ReportRequest: _TypeAlias = ReportRequest  # noqa: Y015
 
 @_typing.final
 class TableReport(_message.Message):
-    """Something that happened at a physical table, in the order of happening."""
+    """Something that happened at a physical table. Report events in the order in which they happened."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -195,8 +196,8 @@ class TableReport(_message.Message):
     source: Global___ReportSource.ValueType
     """Who reports."""
     age_ms: _builtins.int
-    """Milliseconds between the happening and this report, 0..=3600000. Decision times count until the
-    happening.
+    """Milliseconds between the event and this report, 0..=3600000. Decision times count until the
+    event.
     """
     @_builtins.property
     def hand(self) -> Global___HandSeen:
@@ -508,8 +509,8 @@ Global___RoleTaken: _TypeAlias = RoleTaken  # noqa: Y015
 class ReportCorrection(_message.Message):
     """An earlier report was wrong: misread, or something that was not a play. Possible for hands and
     gifts of the Shift in progress, and for plays and passes of the pizza in progress and of the one
-    before; after the end of a Shift, until something of the next is reported. Everything after it is
-    judged again; what then no longer fits is void.
+    before; after the end of a Shift, until something of the next is reported; never after the end of
+    the game. Everything after it is judged again; what then no longer fits is void.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -520,8 +521,9 @@ class ReportCorrection(_message.Message):
     """Number of the report to correct."""
     @_builtins.property
     def instead(self) -> Global___TableReport:
-        """What happened instead: a report of the same seat, as `hand`, `laid`, `pass`, or `gift`. Unset:
-        nothing happened.
+        """What happened instead: a report of the same kind and seat, as `hand`, `laid`, `pass`, `gift` or
+        `special`. `laid` and `pass` can replace each other, and a `special` can name another seat or
+        none. Unset: nothing happened.
         """
 
     def __init__(
@@ -680,7 +682,7 @@ class TableServiceWatchRequest(_message.Message):
 
     TABLE_TICKET_FIELD_NUMBER: _builtins.int
     table_ticket: _builtins.str
-    """`table_ticket` of CreateRoomResponse."""
+    """`table_ticket` of CreateRoomResponse or GetPhysicalTableResponse."""
     def __init__(
         self,
         *,

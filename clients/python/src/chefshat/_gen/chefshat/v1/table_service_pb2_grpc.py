@@ -55,10 +55,10 @@ class TableServiceServicer:
 
     def Report(self, request, context):
         """Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
-        INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; FAILED_PRECONDITION
-        (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS);
-        UNAVAILABLE (ROOM_GONE). A report that the rules or the cards do not allow is no error: see
-        `verdict`.
+        INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
+        (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED
+        (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS); UNAVAILABLE (ROOM_GONE). A report that the rules or the
+        cards do not allow is not an error: see `verdict`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

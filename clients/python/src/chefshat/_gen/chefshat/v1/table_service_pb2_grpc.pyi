@@ -40,10 +40,10 @@ class TableServiceStub:
     def __new__(cls, channel: _aio.Channel) -> TableServiceAsyncStub: ...
     Report: _grpc.UnaryUnaryMultiCallable[_table_service_pb2.ReportRequest, _table_service_pb2.ReportResponse]
     """Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
-    INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; FAILED_PRECONDITION
-    (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS);
-    UNAVAILABLE (ROOM_GONE). A report that the rules or the cards do not allow is no error: see
-    `verdict`.
+    INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
+    (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED
+    (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS); UNAVAILABLE (ROOM_GONE). A report that the rules or the
+    cards do not allow is not an error: see `verdict`.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_table_service_pb2.TableServiceWatchRequest, _table_service_pb2.TableServiceWatchResponse]
     """Streams the state of the table: at once, and after each change. A message without a state is a
@@ -60,10 +60,10 @@ class TableServiceAsyncStub(TableServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     Report: _aio.UnaryUnaryMultiCallable[_table_service_pb2.ReportRequest, _table_service_pb2.ReportResponse]  # type: ignore[assignment]
     """Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
-    INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; FAILED_PRECONDITION
-    (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS);
-    UNAVAILABLE (ROOM_GONE). A report that the rules or the cards do not allow is no error: see
-    `verdict`.
+    INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
+    (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED
+    (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS); UNAVAILABLE (ROOM_GONE). A report that the rules or the
+    cards do not allow is not an error: see `verdict`.
     """
     Watch: _aio.UnaryStreamMultiCallable[_table_service_pb2.TableServiceWatchRequest, _table_service_pb2.TableServiceWatchResponse]  # type: ignore[assignment]
     """Streams the state of the table: at once, and after each change. A message without a state is a
@@ -83,10 +83,10 @@ class TableServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_table_service_pb2.ReportResponse, _abc.Awaitable[_table_service_pb2.ReportResponse]]:
         """Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
-        INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; FAILED_PRECONDITION
-        (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS);
-        UNAVAILABLE (ROOM_GONE). A report that the rules or the cards do not allow is no error: see
-        `verdict`.
+        INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
+        (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER, GAME_NOT_STARTED); RESOURCE_EXHAUSTED
+        (TOO_MANY_REPORTS, TOO_MANY_QUESTIONS); UNAVAILABLE (ROOM_GONE). A report that the rules or the
+        cards do not allow is not an error: see `verdict`.
         """
 
     @_abc_1.abstractmethod
