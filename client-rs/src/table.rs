@@ -22,7 +22,8 @@ impl Client {
     ///
     /// # Errors
     /// `TICKET_UNKNOWN`, `REPORT_REFUSED` with the malformed field in the metadata,
-    /// `GAME_NOT_STARTED`, `GAME_OVER`, `TOO_MANY_REPORTS`, `TOO_MANY_QUESTIONS`.
+    /// `GAME_NOT_STARTED`, `GAME_OVER`, `NOT_CORRECTABLE`, `NO_SUCH_OPTION`,
+    /// `TOO_MANY_HELD_REPORTS`, `TOO_MANY_QUESTIONS`.
     ///
     /// # Panics
     /// If the operating system has no random bytes.

@@ -5,7 +5,7 @@ use chefshat_engine::{Action, Cards, Face, PlayRequirement, RuleSet};
 
 use crate::counts::{Counts, JOKER, size_of};
 use crate::shift::cards_of;
-use crate::words::{counts_text, kind_text};
+use crate::words::kind_text;
 use crate::{SeenCards, ViolatedRule};
 
 /// A broken rule, with the text for people.
@@ -144,9 +144,8 @@ pub(crate) fn as_cards(
             return Err((
                 ViolatedRule::Cards,
                 format!(
-                    "Say whether the Golden {} is among {}.",
-                    rules.faces(),
-                    counts_text(&seen.counts)
+                    "Say whether the Golden {} is among these cards.",
+                    rules.faces()
                 ),
             ));
         }

@@ -147,8 +147,36 @@ pub struct Violation {
     pub seat: Option<Seat>,
     /// The rule.
     pub rule: ViolatedRule,
-    /// For people at the table.
+    /// For people at the table. May follow from hidden cards, and name cards of hands and gifts.
     pub text: String,
+}
+
+impl Violation {
+    /// For everybody: names no cards of hands and gifts, nor who may declare a special action.
+    /// `name`: of the seat.
+    pub fn public_text(&self, name: Option<&str>) -> String {
+        let name = name.unwrap_or("a player");
+        match self.rule {
+            ViolatedRule::Cards => {
+                format!("The cards reported for {name} do not fit what is known.")
+            }
+            ViolatedRule::SpecialAction => {
+                "The special action that was reported is not possible.".into()
+            }
+            ViolatedRule::Gift => format!("The gift reported for {name} is not possible."),
+            ViolatedRule::Decision => {
+                format!("What was reported for {name} was decided otherwise, or not yet.")
+            }
+            ViolatedRule::Correction => "A report cannot be corrected in this way.".into(),
+            ViolatedRule::Turn
+            | ViolatedRule::Face
+            | ViolatedRule::Size
+            | ViolatedRule::Form
+            | ViolatedRule::Opening
+            | ViolatedRule::Pass
+            | ViolatedRule::Role => self.text.clone(),
+        }
+    }
 }
 
 /// What follows from a report or a decision. The events of the game contain only known cards.

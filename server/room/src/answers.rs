@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use crate::journal::{Fill, SeatedParticipant};
-use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_REPORTS, MAX_SEATINGS};
-use chefshat_referee::MAX_QUESTIONS;
+use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
+use chefshat_referee::Refusal;
 pub use chefshat_referee::Verdict as ReportVerdict;
 
 /// The public state of a seat.
@@ -87,12 +87,9 @@ pub enum ReportError {
     /// The id was used for another report.
     #[error("this report id was used for another report; choose a new one")]
     IdUsed,
-    /// There are too many reports.
-    #[error("a game has at most {MAX_REPORTS} reports")]
-    TooMany,
-    /// There are too many open questions.
-    #[error("{MAX_QUESTIONS} questions are open; have one answered, or withdraw one")]
-    TooManyQuestions,
+    /// The referee does not judge it.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
 }
 
 /// The referee's ruling on a report.

@@ -7,8 +7,8 @@ use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, Seat, Viewer};
 
 use super::{
-    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST,
-    State,
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, MAX_IDLE, RECALL_TIME, RECHECK_INTERVAL,
+    REPLAY_COST, State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
@@ -23,20 +23,33 @@ impl Core {
                 Some(hold.map_or(given_up, |hold| hold.min(given_up)))
             }
             State::Playing => {
-                let open = self.open.as_ref().filter(|_| !self.is_paused())?;
-                if self.next_taken_over().is_some() {
-                    return Some(open.released);
-                }
-                let seat = open.decision.seat;
-                Some(if self.is_automatic(seat) {
-                    open.released + self.pace()
-                } else {
-                    let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
-                    deadline.max(open.recheck_at)
-                })
+                let decision = self.decision_deadline();
+                decision.into_iter().chain(self.idle_until()).min()
             }
             State::Finished | State::Aborted(_) => None,
         }
+    }
+
+    /// When something is due for the open decision.
+    fn decision_deadline(&self) -> Option<Duration> {
+        let open = self.open.as_ref().filter(|_| !self.is_paused())?;
+        if self.next_taken_over().is_some() {
+            return Some(open.released);
+        }
+        let seat = open.decision.seat;
+        Some(if self.is_automatic(seat) {
+            open.released + self.pace()
+        } else {
+            let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
+            deadline.max(open.recheck_at)
+        })
+    }
+
+    /// When the game of a physical table is aborted unless something is reported. A restart leaves
+    /// its bridge time to return.
+    fn idle_until(&self) -> Option<Duration> {
+        let last = self.table()?.last_report();
+        Some(last.max(self.restarted.unwrap_or_default()) + MAX_IDLE)
     }
 
     /// Whether only answers of participants advance the game now: no built-in agent or substitute
@@ -238,6 +251,9 @@ impl Core {
     }
 
     fn tick_playing(&mut self, now: Duration, handed: Option<Duration>) {
+        if self.idle_until().is_some_and(|until| until <= now) {
+            return self.abort(now, AbortReason::ParticipantsLost);
+        }
         if self.is_paused() {
             return;
         }

@@ -5,10 +5,12 @@ use std::time::Duration;
 
 use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 
-use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
+use super::{
+    Answered, Core, LastAnswer, MAX_GAME_CHANGES, MAX_REPORTS, OpenDecision, State, Verdict,
+};
 use crate::journal::{Change, Decided, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
-use crate::table::{RoomGame, micros};
+use crate::table::{PhysicalTable, RoomGame, micros};
 
 impl Core {
     pub(super) fn fold(&mut self, at: Duration, change: &Change) {
@@ -275,7 +277,10 @@ impl Core {
 
     /// Whether the log or the journal has reached its limit.
     pub(super) fn is_too_long(&self) -> bool {
-        self.log.len() >= MAX_GAME_EVENTS || self.changes >= MAX_GAME_CHANGES
+        let reports = self.table().map_or(0, PhysicalTable::reports);
+        self.log.len() >= MAX_GAME_EVENTS
+            || self.changes >= MAX_GAME_CHANGES
+            || reports >= MAX_REPORTS
     }
 
     /// The change that takes a decision.

@@ -162,7 +162,7 @@ pub enum AbortReason {
     Closed,
     /// The server shut down.
     Shutdown,
-    /// Participants were lost.
+    /// Participants were lost, or nothing was reported from the physical table for too long.
     ParticipantsLost,
     /// It waited too long for its seats.
     NeverStarted,

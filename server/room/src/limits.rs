@@ -28,8 +28,11 @@ pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
 
 /// Most times that seats are taken in a room, including freed ones: each stays in its log.
 pub const MAX_SEATINGS: usize = 1_000;
-/// Most reports from the physical table in one game.
+/// Most reports from the physical table in one game. A game that reaches this limit is aborted.
 pub const MAX_REPORTS: usize = 20_000;
+/// The game of a physical table is aborted if nothing is reported for this long, also while it is
+/// paused.
+pub const MAX_IDLE: Duration = Duration::from_secs(12 * 60 * 60);
 /// Invalid attempts at one decision after which the default is taken even if attempts are
 /// unlimited, so that records stay bounded.
 pub const MAX_ATTEMPTS: u32 = 10_000;

@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use chefshat_engine::{BySeat, Event, Seat};
-use chefshat_referee::{MAX_QUESTIONS, Report, Ruling};
+use chefshat_referee::Ruling;
 
 use crate::Core;
 use crate::answers::{ReportError, ReportOutcome};
 use crate::journal::{Change, Fill, Reported, Source};
-use crate::limits::MAX_REPORTS;
 use crate::log::{Correction, HandReported, RoomEvent};
 use crate::table::{PhysicalTable, RoomGame, StandingEvent, Taken, stated};
 
@@ -41,10 +40,7 @@ impl Core {
         now: Duration,
         reported: Reported,
     ) -> Result<ReportOutcome, ReportError> {
-        let (id, is_question) = (
-            reported.id.clone(),
-            matches!(reported.report, Report::Question(_)),
-        );
+        let id = reported.id.clone();
         if let Some((first, outcome)) = self.table().and_then(|table| table.outcome(&id)) {
             return match first.is_repeated_by(&reported) {
                 true => Ok(outcome.clone()),
@@ -55,12 +51,7 @@ impl Core {
             return Err(ReportError::GameOver);
         }
         let table = self.table().ok_or(ReportError::GameNotStarted)?;
-        if table.reports() >= MAX_REPORTS {
-            return Err(ReportError::TooMany);
-        }
-        if is_question && table.referee().questions().len() >= MAX_QUESTIONS {
-            return Err(ReportError::TooManyQuestions);
-        }
+        table.referee().check(&reported.report)?;
         self.commit(now, Change::Reported(Box::new(reported)));
         let outcome = self.table().and_then(|table| table.outcome(&id));
         let (_, outcome) = outcome.expect("the report has just been folded");

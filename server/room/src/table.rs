@@ -61,6 +61,8 @@ pub struct PhysicalTable {
     awaited_since: Duration,
     /// Since when it is paused.
     paused_since: Option<Duration>,
+    /// When something was reported last; at first, when the game started.
+    last_report: Duration,
 }
 
 /// How a report was made.
@@ -108,6 +110,7 @@ impl PhysicalTable {
             standing: Vec::new(),
             awaited_since: at,
             paused_since: None,
+            last_report: at,
         }
     }
 
@@ -129,6 +132,11 @@ impl PhysicalTable {
     /// Number of reports.
     pub(super) fn reports(&self) -> usize {
         self.outcomes.len()
+    }
+
+    /// When something was reported last; before the first report, when the game started.
+    pub(super) fn last_report(&self) -> Duration {
+        self.last_report
     }
 
     /// Since when the table is paused.
@@ -166,6 +174,7 @@ impl PhysicalTable {
         let stage = self.referee.stage();
         let ruling = self.referee.report(number, &reported.report);
         let happened = at.saturating_sub(reported.age);
+        self.last_report = at;
         // If several decisions became known at once, their times are not known.
         let decisions = ruling.events.iter().filter_map(stated).count();
         let is_measured = decisions == 1 && ruling.corrected.is_none();

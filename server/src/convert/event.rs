@@ -101,7 +101,11 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         }
         RoomEvent::Violation(violation) => {
             let (report, violation) = &**violation;
-            Kind::Violation(Box::new(violation_to_proto(*report, violation)))
+            let name = violation.seat.map(|seat| core.name_of(seat));
+            Kind::Violation(Box::new(v1::Violation {
+                text: violation.public_text(name.as_deref()),
+                ..violation_to_proto(*report, violation)
+            }))
         }
         RoomEvent::Correction(correction) => Kind::Correction(Box::new(v1::Correction {
             first_void: correction.first_void,

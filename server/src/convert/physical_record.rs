@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use chefshat_engine::{Action, Event, Seat, Viewer};
-use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::seat_number;
 use chefshat_record::import::{PhysicalRoom, RoomEntry};
 use chefshat_referee::{Fact, ShiftFacts, ShiftStory};
@@ -15,6 +15,7 @@ use tracing::error;
 use super::decision::source_to_proto;
 use super::event::event_to_proto;
 use super::policy::millis;
+use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, Fill, GameHeader};
@@ -46,7 +47,10 @@ pub(super) fn physical_record_lines(
         // The decisions alone are a game in any case.
         error!(game = %header.game_id, problem, "a record lacks the hands and gifts");
         let turns = shifts.into_iter().map(without_cards).collect::<Vec<_>>();
-        (room.record(&turns)).expect("the decisions that a referee accepted are a game")
+        room.record(&turns).unwrap_or_else(|problem| {
+            error!(game = %header.game_id, problem, "a record is only the log of its room");
+            room.log()
+        })
     })
 }
 
@@ -152,6 +156,24 @@ impl Room {
                 entry: RoomEntryOf::Event(elapsed_ms, kind),
             });
         }
+    }
+
+    /// The log with all that was void, as a record without decisions.
+    fn log(&self) -> Vec<v1::RecordLine> {
+        let log = &self.core.log();
+        let events = (0..log.len())
+            .filter_map(|position| event_to_proto(&self.core, position, Viewer::Everything))
+            .map(Line::Event);
+        let footer = v1::RecordFooter {
+            state: state_to_proto(self.core.state()).into(),
+            events: u64::try_from(log.len()).unwrap_or(u64::MAX),
+            decisions: 0,
+        };
+        std::iter::once(Line::Header(record_header(&self.core)))
+            .chain(events)
+            .chain(std::iter::once(Line::Footer(footer)))
+            .map(|line| v1::RecordLine { line: Some(line) })
+            .collect()
     }
 
     /// The Shifts as they count.
@@ -273,7 +295,6 @@ fn without_cards(mut shift: ShiftStory) -> ShiftStory {
 #[cfg(test)]
 mod tests {
     use chefshat_engine::{ActionId, Cards, Seat};
-    use chefshat_proto::v1::record_line::Line;
     use chefshat_record::replay::replay;
     use chefshat_room::journal::{AbortReason, Report};
     use chefshat_room::testing::OPEN;

@@ -494,7 +494,8 @@ fn play_requirement(core: &Core, stage: v1::TableStage) -> Option<v1::PlayRequir
 fn stage_to_proto(stage: Stage) -> (v1::TableStage, Option<Seat>) {
     match stage {
         Stage::Hand(seat) => (v1::TableStage::Hand, Some(seat)),
-        Stage::Special(seat) => (v1::TableStage::SpecialAction, seat),
+        // Nobody learns who has both jokers and keeps quiet (`docs/rules.md` §3.3).
+        Stage::Special(_) => (v1::TableStage::SpecialAction, None),
         Stage::Gift(seat) => (v1::TableStage::Gift, Some(seat)),
         Stage::Opening => (v1::TableStage::Opening, None),
         Stage::Turn(seat) => (v1::TableStage::Turn, Some(seat)),

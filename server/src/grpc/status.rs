@@ -6,6 +6,7 @@ use std::collections::HashMap;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
+use chefshat_referee::Refusal as Unjudged;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -283,8 +284,16 @@ impl From<ReportRefusal> for Refusal {
             ReportError::GameNotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
             ReportError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
             ReportError::IdUsed => (Code::AlreadyExists, "REPORT_ID_USED"),
-            ReportError::TooMany => (Code::ResourceExhausted, "TOO_MANY_REPORTS"),
-            ReportError::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
+            ReportError::Refused(unjudged) => match unjudged {
+                Unjudged::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
+                Unjudged::ReservedQuestionId => {
+                    let problem = FieldProblem::new("question.question_id", error.to_string());
+                    return Self(field("REPORT_REFUSED", &problem));
+                }
+                Unjudged::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
+                Unjudged::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
+                Unjudged::NotCorrectable => (Code::FailedPrecondition, "NOT_CORRECTABLE"),
+            },
         };
         Self(status(code, reason, error.to_string(), []))
     }

@@ -8,10 +8,13 @@ use std::time::Duration;
 use chefshat_engine::{ActionId, BySeat, Cards, Seat, SeedPlan, Stop, Viewer};
 use chefshat_proto::v1;
 use chefshat_record::convert::{decision_kind, observation_to_proto};
-use chefshat_room::journal::GameHeader;
+use chefshat_referee::counts::JOKER;
+use chefshat_referee::{Report, SeenCards};
+use chefshat_room::journal::{GameHeader, ParticipantKind};
 use chefshat_room::policy::Policy;
+use chefshat_room::testing::real_table::{PERSON, policy, shifts};
 use chefshat_room::testing::{OPEN, Table, ms};
-use chefshat_room::{Core, OpenDecision, Verdict};
+use chefshat_room::{Core, OpenDecision, ReportVerdict, Verdict};
 use prost::Message as _;
 
 use crate::convert;
@@ -221,4 +224,63 @@ fn a_deliberate_leak_is_detected() {
         sent_to(&plain, viewer, Viewer::Everything),
         sent_to(&swapped, viewer, Viewer::Everything)
     );
+}
+
+/// What the table reports wrongly about hidden cards, and the public events that follow.
+fn wrong_reports_about(remote_hand: &[usize]) -> (Vec<String>, Vec<Vec<u8>>) {
+    let seen = |faces: &[usize], golden| {
+        let mut counts = [0; JOKER + 1];
+        for face in faces {
+            counts[face - 1] += 1;
+        }
+        SeenCards { counts, golden }
+    };
+    let hand = |seat, faces: &[usize], golden| Report::Hand {
+        seat: Seat::new(seat),
+        cards: seen(faces, golden),
+    };
+    let ada = [8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10];
+    let with_elevens = [2, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 10, 10, 11, 11, 11];
+    let mut table = Table::physical(policy(), vec![PERSON, OPEN, PERSON, PERSON], shifts(1));
+    let seat = table.join(ParticipantKind::Agent).expect("a free seat");
+    table.attach(seat);
+    let first = table.report(hand(1, remote_hand, Some(false)));
+    let mut details = Vec::new();
+    for report in [
+        hand(1, &ada, Some(false)),
+        hand(1, &[1, 2], Some(false)),
+        hand(0, &ada, Some(false)),
+        hand(2, &with_elevens, None),
+        Report::Laid {
+            seat: Some(seat),
+            cards: seen(&[9, 9], None),
+        },
+        Report::Correction {
+            number: first.number,
+            instead: Some(Box::new(hand(1, &[9; 17], Some(false)))),
+        },
+        Report::Gift {
+            seat,
+            cards: Some(seen(&[9], None)),
+        },
+        Report::Special {
+            seat: Some(Seat::new(2)),
+        },
+    ] {
+        match table.report(report).verdict {
+            ReportVerdict::Violation(violation) => details.push(violation.text),
+            verdict => panic!("{verdict:?}"),
+        }
+    }
+    (details, sent_to(&table, Seat::new(0), Viewer::Spectator))
+}
+
+#[test]
+fn violations_do_not_tell_hidden_cards() {
+    let (details, public) =
+        wrong_reports_about(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10]);
+    let (other_details, other_public) =
+        wrong_reports_about(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10, 10]);
+    assert_ne!(details, other_details, "the table learns what does not fit");
+    assert_eq!(public, other_public);
 }

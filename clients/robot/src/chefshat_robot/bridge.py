@@ -238,11 +238,17 @@ class Bridge:
                 await self._new_play(play.cards, play.places)
             return
         instead = pb.TableReport(laid=pb.CardsLaid(cards=seen_cards(play.cards))) if play.cards else None
-        response = await self._report(pb.TableReport(correction=pb.ReportCorrection(report=play.report, instead=instead)))
+        try:
+            response = await self._report(pb.TableReport(correction=pb.ReportCorrection(report=play.report, instead=instead)))
+        except ChefsHatError as error:
+            if error.reason != "NOT_CORRECTABLE":
+                raise
+            LOG.warning("the table refused a correction: %s", error)
+        else:
+            if play.cards and response.verdict not in _COUNTS:
+                LOG.warning("the table refused a correction: %s", response.detail)
         if not play.cards:
             self._play = None
-        elif response.verdict not in _COUNTS:
-            LOG.warning("the table refused a correction: %s", response.detail)
 
     async def _doubt(self, doubt: Doubt) -> None:
         """Asks what lies at a place."""

@@ -15,11 +15,15 @@ use super::display::Display;
 use super::line::{self, Command};
 
 /// Refusals of a report after which others can be made.
-const PASSING: [&str; 4] = [
+const PASSING: [&str; 7] = [
     "REPORT_REFUSED",
     "GAME_NOT_STARTED",
-    "TOO_MANY_REPORTS",
     "TOO_MANY_QUESTIONS",
+    "TOO_MANY_HELD_REPORTS",
+    "NO_SUCH_OPTION",
+    "NOT_CORRECTABLE",
+    // A remote seat ended the game meanwhile: the next state says so.
+    "GAME_OVER",
 ];
 
 /// Attends to a table until the game or the input is over.

@@ -1,10 +1,10 @@
 //! What happens before the first turn of a Shift, and hands that become known: hands, special
 //! actions, gifts, roles.
 
-use chefshat_engine::{Opening, Role, Seat, Viewer};
+use chefshat_engine::{DecisionKind, Opening, Role, Seat, Viewer};
 
 use super::{Judged, Referee};
-use crate::counts::{add_action, counts_of, size_of};
+use crate::counts::{Counts, NOTHING, add_action, counts_of, size_of};
 use crate::judge::as_cards;
 use crate::shift::Act;
 use crate::words::counts_text;
@@ -29,6 +29,17 @@ impl Referee {
         };
         let name = self.names.of(seat).to_owned();
         let count = size_of(&seen.counts);
+        let unlaid = self.unlaid(seat);
+        if self.hand_known(seat) && unlaid != NOTHING {
+            // What the seat has played may still be among its cards.
+            let mut with_unlaid = counts_of(self.game().hands()[seat], self.rules.faces());
+            for (sum, count) in with_unlaid.iter_mut().zip(unlaid) {
+                *sum += count;
+            }
+            if seen.counts == with_unlaid {
+                return Ok(Verdict::Known);
+            }
+        }
         if count != expected {
             return refuse(
                 ViolatedRule::Cards,
@@ -37,9 +48,7 @@ impl Referee {
                 ),
             );
         }
-        // Once the Shift is open, the Golden card is on the table.
-        let golden_is_out = self.shift().has_turns() && self.rules.opening() == Opening::Golden;
-        let cards = as_cards(&self.rules, seen, golden_is_out.then_some(false))
+        let cards = as_cards(&self.rules, seen, self.golden_of(seat))
             .map_err(|broken| (Some(seat), broken))?;
         if self.hand_known(seat) {
             let known = self.game().hands()[seat];
@@ -49,8 +58,7 @@ impl Referee {
             return refuse(
                 ViolatedRule::Cards,
                 format!(
-                    "{name}'s hand is known to be {}, but {} are seen. Look again, or correct the earlier report.",
-                    counts_text(&counts_of(known, self.rules.faces())),
+                    "{name}'s hand is known, and {} are not it. Look again, or correct the earlier report.",
                     counts_text(&seen.counts)
                 ),
             );
@@ -96,15 +104,12 @@ impl Referee {
                 let name = self.names.of(seat);
                 return refuse(format!("{name} decides about a special action itself."));
             }
+            // Nobody learns who has both jokers and keeps quiet (`docs/rules.md` §3.3).
             (Some(seat), Some(only)) if seat != only => {
-                return refuse(format!("{} has no two jokers.", self.names.of(seat)));
+                let name = self.names.of(seat);
+                return refuse(format!("{name} cannot declare a special action."));
             }
-            (None, Some(only)) if self.remote[only] => {
-                let name = self.names.of(only);
-                return refuse(format!(
-                    "{name} decides about a special action: wait for it."
-                ));
-            }
+            (None, Some(only)) if self.remote[only] => return Ok(Verdict::Known),
             _ => {}
         }
         let act = match (seat, only) {
@@ -178,13 +183,8 @@ impl Referee {
         let cards = match (decided, seen) {
             (Some(decided), _) => Some(decided),
             (None, Some(seen)) => {
-                let none_left = (0..self.rules.players()).map(Seat::new).any(|other| {
-                    other != seat
-                        && self.hand_known(other)
-                        && self.game().hands()[other].has_golden()
-                });
-                let golden = none_left.then_some(false).or(seen.golden);
-                Some(as_cards(&self.rules, seen, golden).map_err(|broken| (Some(seat), broken))?)
+                let cards = as_cards(&self.rules, seen, self.golden_of(seat));
+                Some(cards.map_err(|broken| (Some(seat), broken))?)
             }
             (None, None) => None,
         };
@@ -210,6 +210,30 @@ impl Referee {
         }
     }
 
+    /// Whether a seat has the Golden card, if that follows from what is known: it lies on the table
+    /// once the Shift is open, and nobody has it if somebody else does.
+    fn golden_of(&self, seat: Seat) -> Option<bool> {
+        let is_out = self.shift().has_turns() && self.rules.opening() == Opening::Golden;
+        let hands = self.game().hands();
+        let has = |other: Seat| self.hand_known(other) && hands[other].has_golden();
+        let is_elsewhere = hands.seats().any(|other| other != seat && has(other));
+        (is_out || is_elsewhere).then_some(false)
+    }
+
+    /// Cards that a remote seat has played and nobody has laid yet, by kind.
+    fn unlaid(&self, seat: Seat) -> Counts {
+        let shift = u32::try_from(self.shifts.len()).unwrap_or(u32::MAX);
+        let mut unlaid = NOTHING;
+        let turns = (self.to_lay.iter())
+            .filter(|it| (it.seat, it.kind, it.shift) == (seat, DecisionKind::Turn, shift));
+        for it in turns {
+            for (sum, count) in (unlaid.iter_mut()).zip(counts_of(it.cards, self.rules.faces())) {
+                *sum += count;
+            }
+        }
+        unlaid
+    }
+
     /// Marks a decision of a remote seat as carried out.
     pub(super) fn confirm(&mut self, shift: usize, index: usize) -> Verdict {
         let entry = &mut self.shifts[shift].entries[index];
@@ -222,8 +246,8 @@ impl Referee {
 }
 
 /// The cards of an action as counts.
-pub(super) fn counts_of_action(action: chefshat_engine::Action) -> crate::counts::Counts {
-    let mut counts = crate::counts::NOTHING;
+pub(super) fn counts_of_action(action: chefshat_engine::Action) -> Counts {
+    let mut counts = NOTHING;
     add_action(&mut counts, action);
     counts
 }

@@ -4,6 +4,7 @@
 
 mod before;
 mod corrections;
+mod refusal;
 mod state;
 mod turns;
 
@@ -13,6 +14,7 @@ use chefshat_engine::{
     Action, ActionId, BySeat, Event, Game, Observation, Opening, RuleSet, Seat, Viewer,
 };
 
+pub use refusal::Refusal;
 pub use state::ShiftStory;
 
 use crate::judge::Broken;
@@ -145,7 +147,7 @@ impl Referee {
         self.publish().1
     }
 
-    /// Judges a report. `number` identifies it.
+    /// Judges a report. `number` identifies it. One that [`Referee::check`] refuses is a violation.
     pub fn report(&mut self, number: u64, report: &Report) -> Ruling {
         let mut ruling = Ruling::default();
         ruling.verdict = self.judge(number, report, &mut ruling);

@@ -89,15 +89,12 @@ impl Referee {
         (self.game().decision()).filter(|open| open.seat == seat && self.remote[seat])
     }
 
-    /// For people: what the table waits for.
+    /// For people: what the table waits for. Not who has both jokers: nobody learns that.
     pub fn waiting_for(&self) -> String {
         let name = |seat: Seat| self.names.of(seat);
         let remote = |seat: Seat| self.remote[seat];
         match self.stage() {
             Stage::Hand(seat) => format!("Show the hand of {}.", name(seat)),
-            Stage::Special(Some(seat)) if remote(seat) => {
-                format!("{} decides about a special action.", name(seat))
-            }
             Stage::Special(_) => "Does anybody declare a special action?".into(),
             Stage::Gift(seat) if remote(seat) => {
                 format!("{} chooses what to give.", name(seat))
@@ -123,7 +120,7 @@ impl Referee {
             .filter_map(|entry| Some((entry.number, entry.report.as_ref()?)))
     }
 
-    /// For people: what a report says, "Bo laid two 9s".
+    /// For people: what a report says, "Bo laid two 9s". Names no cards of hands and gifts.
     pub fn describe(&self, report: &Report) -> String {
         let name = |seat: &Option<Seat>| match seat {
             Some(seat) => self.names.of(*seat).to_owned(),
@@ -141,13 +138,7 @@ impl Referee {
             Report::Cleared => "The board was cleared".into(),
             Report::Special { seat: None } => "Nobody declares a special action".into(),
             Report::Special { seat } => format!("{} declared a special action", name(seat)),
-            Report::Gift { seat, cards } => match cards {
-                Some(cards) => {
-                    let cards = counts_text(&cards.counts);
-                    format!("{} gave {cards}", self.names.of(*seat))
-                }
-                None => format!("{} gave cards", self.names.of(*seat)),
-            },
+            Report::Gift { seat, .. } => format!("{} gave cards", self.names.of(*seat)),
             Report::Role { seat, role } => format!("{} is {}", self.names.of(*seat), role.name()),
             Report::Correction { .. } => "A report was corrected".into(),
             Report::Question(question) => question.text.clone(),

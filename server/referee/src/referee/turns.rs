@@ -298,9 +298,8 @@ impl Referee {
         if shift.has_turns() || over {
             return Ok(());
         }
-        if let Some(remote) = special.flatten().filter(|seat| self.remote[*seat]) {
-            let name = self.names.of(remote);
-            let text = format!("{name} has not decided about a special action yet.");
+        if special.flatten().is_some_and(|seat| self.remote[seat]) {
+            let text = "A special action has not been decided yet: wait for it.".to_owned();
             return Err((seat, (ViolatedRule::Turn, text)));
         }
         let pairs = shift.pairs(&self.rules);
@@ -382,7 +381,7 @@ impl Referee {
         if certain && self.only_passes_fit(number, &missed, then) {
             for seat in &missed {
                 self.try_act(number, None, Act::Turn(*seat, Action::Pass))
-                    .map_err(|misfit| (Some(*seat), (ViolatedRule::Turn, misfit.text)))?;
+                    .map_err(|misfit| (Some(*seat), (ViolatedRule::Cards, misfit.text)))?;
             }
             return self.take_turn(number, report);
         }

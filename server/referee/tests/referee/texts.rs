@@ -178,7 +178,20 @@ fn a_remote_seat_decides_before_the_board_is_cleared() {
         (pass(2), "accepted"),
     ]);
     evening.decide(3, "C10;Q1;J0");
-    evening.check(&[(laid(3, &[10]), "accepted"), (pass(0), "accepted")]);
+    // The 10 is still among its cards.
+    let hand = Report::Hand {
+        seat: Seat::new(3),
+        cards: hand,
+    };
+    evening.check(&[
+        (hand.clone(), "known"),
+        (laid(3, &[10]), "accepted"),
+        (
+            hand,
+            "Di has 16 cards, but 17 are seen. Show all of them side by side.",
+        ),
+        (pass(0), "accepted"),
+    ]);
     evening.decide(3, "C7;Q2;J0");
     evening.check(&[
         (Report::Cleared, "known"),
@@ -355,4 +368,23 @@ fn passes_of_one_answer_are_taken_back_one_by_one() {
     ]);
     // Bo has passed; Di's cards wait again.
     assert_eq!(evening.referee.waiting_for(), "Did Cy pass?");
+}
+
+#[test]
+fn the_golden_card_in_a_known_hand_is_in_no_other() {
+    let mut evening = Evening::new();
+    let hand = |seat, faces: &[usize], golden| Report::Hand {
+        seat: Seat::new(seat),
+        cards: cards(faces, golden),
+    };
+    let bo = [11, 3, 5, 5, 6, 6, 8, 8, 8, 9, 9, 9, 10, 10, 10, 10, 10];
+    let ada = [11, 4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 9, 9, 9, 9, 10, 10];
+    evening.check(&[
+        (
+            hand(1, &bo, None),
+            "Say whether the Golden 11 is among these cards.",
+        ),
+        (hand(0, &ada, Some(true)), "accepted"),
+        (hand(1, &bo, None), "accepted"),
+    ]);
 }

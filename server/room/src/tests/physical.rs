@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_engine::{DecisionKind, Event, Seat};
-use chefshat_referee::{MAX_QUESTIONS, Question, Stage, ViolatedRule};
+use chefshat_referee::{MAX_QUESTIONS, Question, Refusal, Stage, ViolatedRule};
 
 use super::{Core, OPEN, ParticipantKind, Source, State, Table, ms};
-use crate::journal::{Report, ReportSource, Reported};
+use crate::journal::{AbortReason, Report, ReportSource, Reported};
 use crate::log::RoomEvent;
 use crate::testing::real_table::{MIXED, Mixed, PERSON, policy, shifts};
-use crate::{ReportError, ReportVerdict};
+use crate::{MAX_IDLE, MAX_REPORTS, ReportError, ReportVerdict};
 
 #[test]
 fn a_mixed_game_is_the_one_at_the_table() {
@@ -61,7 +61,7 @@ fn players_at_the_table_are_present_and_nobody_can_join_for_them() {
 fn all_at_the_table_start_at_once_and_no_clock_runs() {
     let mut mixed = Mixed::new([PERSON; 4], 1, 3);
     assert_eq!(mixed.table.core.state(), State::Playing);
-    assert_eq!(mixed.table.core.deadline(), None);
+    assert_eq!(mixed.table.core.deadline(), Some(MAX_IDLE));
     assert!(mixed.table.core.open().is_none());
     mixed.until(|it| it.table.core.state().is_over());
     let standings = mixed.table.core.game().expect("a game").standings();
@@ -153,7 +153,10 @@ fn a_pause_stops_the_clock_and_gives_the_full_time_again() {
     mixed.table.pass_time(ms(900));
     mixed.table.report(Report::Pause(true));
     assert!(mixed.table.core.is_paused());
-    assert_eq!(mixed.table.core.deadline(), None);
+    assert_eq!(
+        mixed.table.core.deadline(),
+        Some(mixed.table.now + MAX_IDLE)
+    );
     mixed.table.pass_time(Duration::from_secs(3_600));
     assert_eq!(mixed.table.open(), (seat, id));
     mixed.table.report(Report::Pause(false));
@@ -274,7 +277,7 @@ fn questions_are_bounded_and_answered() {
         report: question(MAX_QUESTIONS),
     };
     let refused = table.core.report(table.now, one_more);
-    assert_eq!(refused, Err(ReportError::TooManyQuestions));
+    assert_eq!(refused, Err(Refusal::TooManyQuestions.into()));
     table.report(Report::Answer {
         id: "question 3".into(),
         option: Some(1),
@@ -310,6 +313,68 @@ fn a_restart_resumes_the_table() {
         assert_eq!(standings, mixed.real.truth.standings());
         mixed.table.assert_replays();
     }
+}
+
+#[test]
+fn what_cannot_be_judged_is_no_violation() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+    mixed.until(|it| it.sources().len() == 2);
+    mixed.table.report(Report::Question(Question {
+        id: "camera".into(),
+        text: "7 or 9 at place 4?".into(),
+        options: vec!["7".into(), "9".into()],
+        seat: None,
+    }));
+    let changes = mixed.table.core.changes();
+    let no_option = Report::Answer {
+        id: "camera".into(),
+        option: Some(2),
+    };
+    let not_a_report = Report::Correction {
+        number: 99,
+        instead: None,
+    };
+    for (report, refusal) in [
+        (no_option, Refusal::NoSuchOption),
+        (not_a_report, Refusal::NotCorrectable),
+    ] {
+        let reported = Reported {
+            id: "refused".into(),
+            source: ReportSource::Camera,
+            age: Duration::ZERO,
+            report,
+        };
+        let refused = mixed.table.core.report(mixed.table.now, reported);
+        assert_eq!(refused, Err(refusal.into()));
+    }
+    assert_eq!(mixed.table.core.changes(), changes);
+}
+
+#[test]
+fn a_table_where_nothing_is_reported_is_given_up() {
+    let aborted = State::Aborted(AbortReason::ParticipantsLost);
+    for paused in [false, true] {
+        let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+        mixed.table.pass_time(MAX_IDLE - ms(1));
+        mixed.table.report(Report::Pause(paused));
+        mixed.table.pass_time(MAX_IDLE - ms(1));
+        assert_eq!(mixed.table.core.state(), State::Playing);
+        mixed.table.pass_time(ms(1));
+        assert_eq!(mixed.table.core.state(), aborted);
+        mixed.table.assert_replays();
+    }
+}
+
+#[test]
+fn a_table_with_too_many_reports_is_given_up() {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 2);
+    for number in 1..MAX_REPORTS {
+        mixed.table.report(Report::Pause(number % 2 == 0));
+    }
+    assert_eq!(mixed.table.core.state(), State::Playing);
+    mixed.table.report(Report::Pause(true));
+    let aborted = State::Aborted(AbortReason::TooLong);
+    assert_eq!(mixed.table.core.state(), aborted);
 }
 
 #[test]

@@ -13,7 +13,8 @@ export const faults = {
     GAME_STARTED: "The game has already started. You can watch it.",
     GAME_OVER: "The game is over.",
     GAME_NOT_STARTED: "The game has not started yet.",
-    TOO_MANY_REPORTS: "This game has as many reports as the server can store.",
+    TOO_MANY_HELD_REPORTS: "Wait: a question must be answered first. Its answer decides about the reports that wait.",
+    NOT_CORRECTABLE: "This report can no longer be corrected.",
     JOIN_CODE_WRONG:
       "This code does not belong to a room or tournament that you can join. Check it; the game may also be over.",
     TICKET_UNKNOWN: "This seat was given up. Join again with the code.",

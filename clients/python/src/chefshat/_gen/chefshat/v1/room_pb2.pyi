@@ -225,11 +225,13 @@ class _AbortReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_AbortReas
     ABORT_REASON_SHUTDOWN: _AbortReason.ValueType  # 2
     """The server was shut down."""
     ABORT_REASON_PARTICIPANTS_LOST: _AbortReason.ValueType  # 3
-    """Participants were lost, and the policy is to abort."""
+    """Participants were lost, and the policy is to abort; or nothing was reported from a physical table
+    for 12 hours.
+    """
     ABORT_REASON_NEVER_STARTED: _AbortReason.ValueType  # 4
     """The seats were not attached in time."""
     ABORT_REASON_TOO_LONG: _AbortReason.ValueType  # 5
-    """The game exceeded the server's limit of events."""
+    """The game exceeded the server's limit of events, or of 20000 reports from a physical table."""
 
 class AbortReason(_AbortReason, metaclass=_AbortReasonEnumTypeWrapper):
     """Why a game has no result."""
@@ -241,11 +243,13 @@ ABORT_REASON_CLOSED: AbortReason.ValueType  # 1
 ABORT_REASON_SHUTDOWN: AbortReason.ValueType  # 2
 """The server was shut down."""
 ABORT_REASON_PARTICIPANTS_LOST: AbortReason.ValueType  # 3
-"""Participants were lost, and the policy is to abort."""
+"""Participants were lost, and the policy is to abort; or nothing was reported from a physical table
+for 12 hours.
+"""
 ABORT_REASON_NEVER_STARTED: AbortReason.ValueType  # 4
 """The seats were not attached in time."""
 ABORT_REASON_TOO_LONG: AbortReason.ValueType  # 5
-"""The game exceeded the server's limit of events."""
+"""The game exceeded the server's limit of events, or of 20000 reports from a physical table."""
 Global___AbortReason: _TypeAlias = AbortReason  # noqa: Y015
 
 @_typing.final

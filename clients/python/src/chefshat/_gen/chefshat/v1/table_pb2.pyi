@@ -96,7 +96,9 @@ class Violation(_message.Message):
     rule: Global___ViolatedRule.ValueType
     """The rule."""
     text: _builtins.str
-    """For people at the table: "That pizza already shows 5s: a play must be 4 or lower." """
+    """For people at the table: "That pizza already shows 5s: a play must be 4 or lower." In events it
+    does not name cards of hands and gifts.
+    """
     report: _builtins.int
     """Number of the report."""
     def __init__(

@@ -648,7 +648,9 @@ class ReportResponse(_message.Message):
     verdict: Global___ReportVerdict.ValueType
     """The verdict."""
     detail: _builtins.str
-    """For people: why it is a violation, or what it waits for. Empty if accepted."""
+    """For people: why it is a violation, or what it waits for. Empty if accepted. It may name cards
+    that were reported, which the event of a violation does not.
+    """
     @_builtins.property
     def void_reports(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Of a correction: numbers of the reports that no longer fit and are void."""
@@ -747,7 +749,9 @@ class TableState(_message.Message):
     stage: Global___TableStage.ValueType
     """What the table waits for."""
     seat: _builtins.int
-    """The seat it waits for, if that is known."""
+    """The seat it waits for, if that is known. Unset for a special action: nobody learns who has both
+    jokers.
+    """
     waiting_for: _builtins.str
     """For people: what the table waits for."""
     paused: _builtins.bool
