@@ -9,8 +9,8 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
 - A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone, or if
-  only some are, when none of the others can be read as new cards come. If others stay for `TAKEN_SECONDS`, cards were taken back.
-  Cards on others were taken back when both tags of one beneath them are read again and none of theirs.
+  only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS`, cards
+  were taken back. Cards on others were taken back when a tag is read that they covered.
 """
 
 from __future__ import annotations
@@ -67,6 +67,16 @@ class _Track:
     ends: set[bool] = dataclass_field(default_factory=set)
     """Which of its two tags were read."""
 
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Its centre, mm on the field, and its angle in degrees."""
+        return (*_centre_of(self.x, self.y, self.angle), self.angle)
+
+    def tag(self, flipped: bool) -> tuple[float, float]:
+        """Where one of its tags lies, mm on the field."""
+        x, y, _ = self.pose
+        return (2 * x - self.x, 2 * y - self.y) if flipped else (self.x, self.y)
+
 
 @dataclass
 class _Known:
@@ -75,6 +85,16 @@ class _Known:
     spot: int
     told: bool = False
     """Whether it is the answer to a doubt, and was never read."""
+    pose: tuple[float, float, float] | None = None
+    """Its centre, mm on the field, and its angle in degrees; None if it was never read."""
+
+    def covers(self, x: float, y: float) -> bool:
+        """Whether a tag at a point lies beneath it, at least with its middle."""
+        centre_x, centre_y, angle = self.pose or (SPOTS[self.spot].x, SPOTS[self.spot].y, 0.0)
+        turn = math.radians(angle)
+        right = (x - centre_x) * math.cos(turn) + (y - centre_y) * math.sin(turn)
+        down = (y - centre_y) * math.cos(turn) - (x - centre_x) * math.sin(turn)
+        return abs(right) < field.CARD_WIDTH / 2 and abs(down) < field.CARD_HEIGHT / 2
 
 
 @dataclass(frozen=True)
@@ -354,13 +374,13 @@ class Decider:
                 continue
             known = self._known.get(track.piece)
             if known is not None:
-                known.spot, known.told = track.spot, False
+                known.spot, known.told, known.pose = track.spot, False, track.pose
                 self._spots[track.spot].gone_since = None
                 top = self._top(track.spot)
                 if top == track.piece and len(track.ends) == 2:
                     self._explained(track.spot, events)
             elif track.piece.card is None:
-                self._known[track.piece] = _Known(track.spot)
+                self._known[track.piece] = _Known(track.spot, pose=track.pose)
                 self._queue.append(_PassMoved(self._time, track.piece.number, True))
                 self._explained(track.spot, events)
             else:
@@ -375,13 +395,13 @@ class Decider:
             # The person who answered a doubt knew the face; this is the card.
             told = top.card
             del self._known[top]
-            self._known[track.piece] = _Known(track.spot)
+            self._known[track.piece] = _Known(track.spot, pose=track.pose)
             for entry in self._queue:
                 if isinstance(entry, _Play) and told in entry.cards:
                     entry.cards[card] = entry.cards.pop(told)
             self._explained(track.spot, events)
             return
-        self._known[track.piece] = _Known(track.spot)
+        self._known[track.piece] = _Known(track.spot, pose=track.pose)
         if spot.doubt is not None and self._doubts[spot.doubt].look == self._places[track.spot].look:
             self._doubts[spot.doubt].play.cards[card] = track.spot
             self._explained(track.spot, events)
@@ -490,20 +510,21 @@ class Decider:
     # Cards that are gone.
 
     def _notice_uncovered(self, events: list[Observed]) -> None:
-        """Notices cards that were taken from the top of others."""
+        """Notices cards that were taken from others: a tag is read that they covered."""
         for number in CARD_SPOTS:
-            lower, above = self._uncovered(number)
-            if above and lower is not None and len(lower.ends) == 2 and self._spots[number].frames >= SETTLE_READS:
+            pile = self._pile(number)
+            read = [place for place, piece in enumerate(pile) if piece in self._tracks]
+            if not read or self._spots[number].frames < SETTLE_READS:
+                continue
+            track = self._tracks[pile[read[-1]]]
+            above = pile[read[-1] + 1 :]
+            if above and track.readings >= SETTLE_READS and all(self._is_uncovered(track, piece) for piece in above):
                 self._explained(number, events)
                 self._queue.append(_Gone(self._time, self._forget(above)))
 
-    def _uncovered(self, number: int) -> tuple[_Track | None, list[Piece]]:
-        """The highest card of a place that is read now, and those that lay on top of it."""
-        pile = self._pile(number)
-        read = [place for place, piece in enumerate(pile) if piece in self._tracks]
-        if not read or self._tracks[pile[read[-1]]].readings < SETTLE_READS:
-            return None, []
-        return self._tracks[pile[read[-1]]], pile[read[-1] + 1 :]
+    def _is_uncovered(self, track: _Track, above: Piece) -> bool:
+        """Whether a tag of a card is read that a card on top of it covered."""
+        return any(self._known[above].covers(*track.tag(flipped)) for flipped in track.ends)
 
     def _notice_gone(self, events: list[Observed]) -> None:
         """Notices pieces that are no longer where they lay."""
@@ -520,7 +541,7 @@ class Decider:
         gone = self._gone_for(0.0)
         if gone and len(gone) == len(occupied):
             self._clear(events)
-        elif quiet and (gone := self._gone_for(TAKEN_SECONDS)):
+        elif quiet and (gone := self._gone_for(TAKEN_SECONDS)) and self._some_stayed(gone):
             self._queue.append(_Gone(self._time, self._remove(gone, events)))
 
     def _gone_for(self, seconds: float) -> list[int]:
@@ -531,14 +552,17 @@ class Decider:
             if (since := self._spots[number].gone_since) is not None and self._time - since >= seconds
         ]
 
+    def _some_stayed(self, gone: Iterable[int]) -> bool:
+        """Whether cards at other places can still be read, so that light or shadow does not only hide that these are empty too."""
+        rest = set(CARD_SPOTS) - set(gone)
+        return any(known.spot in rest and (piece in self._tracks or known.told) for piece, known in self._known.items())
+
     def _settle_gone(self, events: list[Observed]) -> None:
         """As new cards lie there, decides whether all cards are gone, or those that stayed can still be read."""
         gone = self._gone_for(0.0)
         if not gone:
             return
-        rest = {known.spot for piece, known in self._known.items() if known.spot in CARD_SPOTS} - set(gone)
-        stayed = {known.spot for piece, known in self._known.items() if piece in self._tracks or known.told} & rest
-        if stayed:
+        if self._some_stayed(gone):
             self._queue.append(_Gone(self._time, self._remove(gone, events)))
         else:
             self._clear(events)
