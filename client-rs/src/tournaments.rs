@@ -88,17 +88,22 @@ impl Client {
     }
 
     /// Adds a participant who plays at a physical table with real cards, and for whom nobody
-    /// connects. Returns the tournament and the participant's number.
+    /// connects. Returns the tournament and the participant's number. If the response is lost, the
+    /// call is repeated and adds no second participant.
     ///
     /// # Errors
     /// `OWNER_TOKEN_WRONG`, `NO_PHYSICAL_TABLES`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_REFUSED`,
     /// `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `TOURNAMENT_UNKNOWN`.
     pub async fn add_table_participant(
         &self,
-        request: v1::AddTableParticipantRequest,
+        mut request: v1::AddTableParticipantRequest,
     ) -> Result<v1::AddTableParticipantResponse, Error> {
-        let response = service(self).add_table_participant(request).await?;
-        Ok(response.into_inner())
+        identify(&mut request.request_id);
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.add_table_participant(request).await }
+        })
+        .await
     }
 
     /// The secrets of the physical table at which a game is being played.

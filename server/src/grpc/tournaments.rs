@@ -198,6 +198,7 @@ impl TournamentService for TournamentCalls {
             kind,
             max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
             stateless: request.stateless,
+            at_table: false,
             request_id: request_id(&request.request_id)?,
         };
         let (participant, ticket) = handle
@@ -223,8 +224,16 @@ impl TournamentService for TournamentCalls {
             .unwrap_or(ParticipantKind::Human);
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
-        let added = handle.add_at_table(name, kind).await.map_err(stopped)?;
-        let participant = added.map_err(join_problem)?;
+        let entry = Entry {
+            name,
+            kind,
+            max_games: 1,
+            stateless: false,
+            at_table: true,
+            request_id: request_id(&request.request_id)?,
+        };
+        let joined = handle.join(entry).await.map_err(stopped)?;
+        let (participant, _) = joined.map_err(join_refused)?;
         Ok(Response::new(v1::AddTableParticipantResponse {
             tournament: Some(handle.describe()),
             participant: convert::number(participant),

@@ -61,6 +61,8 @@ pub struct Entry {
     pub max_games: usize,
     /// Declares that it is stateless.
     pub stateless: bool,
+    /// Whether it plays at a physical table. Then nobody uses its ticket.
+    pub at_table: bool,
     /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
 }
@@ -74,7 +76,7 @@ impl Entry {
             filler: false,
             stateless: self.stateless,
             max_games: self.max_games,
-            at_table: false,
+            at_table: self.at_table,
         }
     }
 }
@@ -115,7 +117,6 @@ pub struct Stopped;
 
 pub(super) enum Message {
     Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
-    AddAtTable(Entrant, oneshot::Sender<Result<usize, JoinProblem>>),
     Begin(oneshot::Sender<Result<(), BeginProblem>>),
     Close(oneshot::Sender<()>),
     Enter(usize, u64, Connection),
@@ -254,30 +255,6 @@ impl TournamentHandle {
         match self.ask(|reply| Message::Join(entry, reply)).await {
             Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started.into())),
             joined => joined,
-        }
-    }
-
-    /// Adds a participant at a physical table; returns its number.
-    ///
-    /// # Errors
-    /// The server ends, or (inner result) the participant is refused.
-    pub async fn add_at_table(
-        &self,
-        name: String,
-        kind: ParticipantKind,
-    ) -> Result<Result<usize, JoinProblem>, Stopped> {
-        let entrant = Entrant {
-            name,
-            kind,
-            built_in: None,
-            filler: false,
-            stateless: false,
-            max_games: 1,
-            at_table: true,
-        };
-        match self.ask(|reply| Message::AddAtTable(entrant, reply)).await {
-            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started)),
-            added => added,
         }
     }
 

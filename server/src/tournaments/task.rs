@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_tournament::{Change, Entrant, JoinProblem, State, Tournament};
+use chefshat_tournament::{Change, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
@@ -172,12 +172,6 @@ impl Task {
                     let _ = reply.send(joined);
                 }));
             }
-            Message::AddAtTable(entrant, reply) => {
-                let added = self.add(entrant);
-                self.replies.push(Box::new(move || {
-                    let _ = reply.send(added);
-                }));
-            }
             Message::Begin(reply) => {
                 let started = self.off_thread(|core| core.begin()).await?;
                 let started = started.map(|changes| self.fold_all(changes));
@@ -205,22 +199,16 @@ impl Task {
         if let Some(answer) = self.state.joined_before(&entry, token) {
             return answer;
         }
-        let participant = self.add(entry.entrant())?;
+        let change = self.state.core.join(entry.entrant())?;
+        let participant = self.state.core.participants().len();
+        self.fold(change);
+        self.joined_at = Instant::now();
         let ticket = token.hash();
         self.push(TournamentEntry::Ticket {
             participant,
             ticket,
         });
         Ok((participant, token))
-    }
-
-    /// Adds a participant; returns its number.
-    fn add(&mut self, entrant: Entrant) -> Result<usize, JoinProblem> {
-        let change = self.state.core.join(entrant)?;
-        let participant = self.state.core.participants().len();
-        self.fold(change);
-        self.joined_at = Instant::now();
-        Ok(participant)
     }
 
     /// Closes the tournament; the rooms of its games are closed once that is committed.

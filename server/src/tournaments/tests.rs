@@ -67,6 +67,7 @@ fn entrant(name: &str) -> Entry {
         kind: chefshat_room::journal::ParticipantKind::Agent,
         max_games: 1,
         stateless: true,
+        at_table: false,
         request_id: None,
     }
 }

@@ -250,8 +250,15 @@ async fn invalid_requests_are_refused_with_the_field() {
         },
     )
     .await;
-    let added = service.add_table_participant(at_table(&with_tables, "Ada"));
+    let adding = v1::AddTableParticipantRequest {
+        request_id: vec![5; 32],
+        ..at_table(&with_tables, "Ada")
+    };
+    let added = service.add_table_participant(adding.clone());
     let added = added.await.expect("added").into_inner();
+    let again = service.add_table_participant(adding.clone());
+    let again = again.await.expect("added before").into_inner();
+    assert_eq!(again.participant, added.participant);
     let ada = &added.tournament.expect("a tournament").participants[0];
     assert!(ada.at_table && ada.connected && ada.kind() == v1::ParticipantKind::Human);
     let joined = service.join_tournament(v1::JoinTournamentRequest {
@@ -270,6 +277,13 @@ async fn invalid_requests_are_refused_with_the_field() {
         ..at_table(&with_tables, "Bo")
     };
     for (request, reason) in [
+        (
+            v1::AddTableParticipantRequest {
+                name: "Bo".into(),
+                ..adding
+            },
+            "REQUEST_ID_USED",
+        ),
         (at_table(&created, "Bo"), "NO_PHYSICAL_TABLES"),
         (at_table(&with_tables, "Ada"), "NAME_TAKEN"),
         (at_table(&with_tables, ""), "NAME_REFUSED"),

@@ -26,7 +26,13 @@ class Page(Protocol):
 
 
 # Requests that carry an id, by which the server answers a repeated one like the first.
-REPEATABLE = (pb.CreateRoomRequest, pb.JoinRoomRequest, pb.CreateTournamentRequest, pb.JoinTournamentRequest)
+REPEATABLE = (
+    pb.CreateRoomRequest,
+    pb.JoinRoomRequest,
+    pb.CreateTournamentRequest,
+    pb.JoinTournamentRequest,
+    pb.AddTableParticipantRequest,
+)
 REQUEST_ID_BYTES = 32
 # Seconds before each further attempt of a request whose response was lost.
 PAUSES_S = (0.1, 0.2, 0.4)

@@ -75,6 +75,7 @@ impl Add {
             owner_token: token,
             name: self.name,
             kind: v1::ParticipantKind::from(self.kind).into(),
+            ..v1::AddTableParticipantRequest::default()
         };
         let added = client.add_table_participant(request).await?;
         if self.owned.json {

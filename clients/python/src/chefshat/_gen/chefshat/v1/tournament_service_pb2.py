@@ -26,7 +26,7 @@ from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 from chefshat._gen.chefshat.v1 import tournament_pb2 as chefshat_dot_v1_dot_tournament__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/tournament_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x1c\x63hefshat/v1/tournament.proto\"`\n\x17\x43reateTournamentRequest\x12\x31\n\x08settings\x18\x01 \x01(\x0b\x32\x1f.chefshat.v1.TournamentSettings\x12\x12\n\nrequest_id\x18\x02 \x01(\x0c\"o\n\x18\x43reateTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"@\n\x14GetTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"D\n\x15GetTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"l\n\x16ListTournamentsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12+\n\x05state\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.TournamentState\"`\n\x17ListTournamentsResponse\x12,\n\x0btournaments\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.Tournament\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xb5\x01\n\x15JoinTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmax_games\x18\x05 \x01(\r\x12\x11\n\tstateless\x18\x06 \x01(\x08\x12\x12\n\nrequest_id\x18\x07 \x01(\x0c\"j\n\x16JoinTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\"\x82\x01\n\x1a\x41\x64\x64TableParticipantRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\"_\n\x1b\x41\x64\x64TableParticipantResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\"S\n\x17GetPhysicalTableRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x0c\n\x04game\x18\x03 \x01(\r\"V\n\x18GetPhysicalTableResponse\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x14\n\x0ctable_ticket\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"D\n\x16StartTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17StartTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"D\n\x16\x43loseTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17\x43loseTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"0\n\x17\x46ollowTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xa7\x01\n\x18\x46ollowTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12*\n\x05games\x18\x03 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\"4\n\x1bGetTournamentResultsRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xb1\x01\n\x1cGetTournamentResultsResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12\x30\n\nconfidence\x18\x03 \x03(\x0b\x32\x1c.chefshat.v1.OrderConfidence\"Z\n\x1aListTournamentGamesRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"b\n\x1bListTournamentGamesResponse\x12*\n\x05games\x18\x01 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"e\n\x15GetLeaderboardRequest\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmin_games\x18\x02 \x01(\r\x12\r\n\x05limit\x18\x03 \x01(\r\"J\n\x16GetLeaderboardResponse\x12!\n\x05rated\x18\x01 \x03(\x0b\x32\x12.chefshat.v1.Rated\x12\r\n\x05games\x18\x02 \x01(\x04\x32\xa1\t\n\x11TournamentService\x12_\n\x10\x43reateTournament\x12$.chefshat.v1.CreateTournamentRequest\x1a%.chefshat.v1.CreateTournamentResponse\x12V\n\rGetTournament\x12!.chefshat.v1.GetTournamentRequest\x1a\".chefshat.v1.GetTournamentResponse\x12\\\n\x0fListTournaments\x12#.chefshat.v1.ListTournamentsRequest\x1a$.chefshat.v1.ListTournamentsResponse\x12Y\n\x0eJoinTournament\x12\".chefshat.v1.JoinTournamentRequest\x1a#.chefshat.v1.JoinTournamentResponse\x12h\n\x13\x41\x64\x64TableParticipant\x12\'.chefshat.v1.AddTableParticipantRequest\x1a(.chefshat.v1.AddTableParticipantResponse\x12_\n\x10GetPhysicalTable\x12$.chefshat.v1.GetPhysicalTableRequest\x1a%.chefshat.v1.GetPhysicalTableResponse\x12\\\n\x0fStartTournament\x12#.chefshat.v1.StartTournamentRequest\x1a$.chefshat.v1.StartTournamentResponse\x12\\\n\x0f\x43loseTournament\x12#.chefshat.v1.CloseTournamentRequest\x1a$.chefshat.v1.CloseTournamentResponse\x12\x61\n\x10\x46ollowTournament\x12$.chefshat.v1.FollowTournamentRequest\x1a%.chefshat.v1.FollowTournamentResponse0\x01\x12k\n\x14GetTournamentResults\x12(.chefshat.v1.GetTournamentResultsRequest\x1a).chefshat.v1.GetTournamentResultsResponse\x12h\n\x13ListTournamentGames\x12\'.chefshat.v1.ListTournamentGamesRequest\x1a(.chefshat.v1.ListTournamentGamesResponse\x12Y\n\x0eGetLeaderboard\x12\".chefshat.v1.GetLeaderboardRequest\x1a#.chefshat.v1.GetLeaderboardResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/tournament_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x1c\x63hefshat/v1/tournament.proto\"`\n\x17\x43reateTournamentRequest\x12\x31\n\x08settings\x18\x01 \x01(\x0b\x32\x1f.chefshat.v1.TournamentSettings\x12\x12\n\nrequest_id\x18\x02 \x01(\x0c\"o\n\x18\x43reateTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"@\n\x14GetTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"D\n\x15GetTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"l\n\x16ListTournamentsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12+\n\x05state\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.TournamentState\"`\n\x17ListTournamentsResponse\x12,\n\x0btournaments\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.Tournament\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xb5\x01\n\x15JoinTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmax_games\x18\x05 \x01(\r\x12\x11\n\tstateless\x18\x06 \x01(\x08\x12\x12\n\nrequest_id\x18\x07 \x01(\x0c\"j\n\x16JoinTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\"\x96\x01\n\x1a\x41\x64\x64TableParticipantRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x12\n\nrequest_id\x18\x05 \x01(\x0c\"_\n\x1b\x41\x64\x64TableParticipantResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\"S\n\x17GetPhysicalTableRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x0c\n\x04game\x18\x03 \x01(\r\"V\n\x18GetPhysicalTableResponse\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x14\n\x0ctable_ticket\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"D\n\x16StartTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17StartTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"D\n\x16\x43loseTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17\x43loseTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"0\n\x17\x46ollowTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xa7\x01\n\x18\x46ollowTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12*\n\x05games\x18\x03 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\"4\n\x1bGetTournamentResultsRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xb1\x01\n\x1cGetTournamentResultsResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12\x30\n\nconfidence\x18\x03 \x03(\x0b\x32\x1c.chefshat.v1.OrderConfidence\"Z\n\x1aListTournamentGamesRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"b\n\x1bListTournamentGamesResponse\x12*\n\x05games\x18\x01 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"e\n\x15GetLeaderboardRequest\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmin_games\x18\x02 \x01(\r\x12\r\n\x05limit\x18\x03 \x01(\r\"J\n\x16GetLeaderboardResponse\x12!\n\x05rated\x18\x01 \x03(\x0b\x32\x12.chefshat.v1.Rated\x12\r\n\x05games\x18\x02 \x01(\x04\x32\xa1\t\n\x11TournamentService\x12_\n\x10\x43reateTournament\x12$.chefshat.v1.CreateTournamentRequest\x1a%.chefshat.v1.CreateTournamentResponse\x12V\n\rGetTournament\x12!.chefshat.v1.GetTournamentRequest\x1a\".chefshat.v1.GetTournamentResponse\x12\\\n\x0fListTournaments\x12#.chefshat.v1.ListTournamentsRequest\x1a$.chefshat.v1.ListTournamentsResponse\x12Y\n\x0eJoinTournament\x12\".chefshat.v1.JoinTournamentRequest\x1a#.chefshat.v1.JoinTournamentResponse\x12h\n\x13\x41\x64\x64TableParticipant\x12\'.chefshat.v1.AddTableParticipantRequest\x1a(.chefshat.v1.AddTableParticipantResponse\x12_\n\x10GetPhysicalTable\x12$.chefshat.v1.GetPhysicalTableRequest\x1a%.chefshat.v1.GetPhysicalTableResponse\x12\\\n\x0fStartTournament\x12#.chefshat.v1.StartTournamentRequest\x1a$.chefshat.v1.StartTournamentResponse\x12\\\n\x0f\x43loseTournament\x12#.chefshat.v1.CloseTournamentRequest\x1a$.chefshat.v1.CloseTournamentResponse\x12\x61\n\x10\x46ollowTournament\x12$.chefshat.v1.FollowTournamentRequest\x1a%.chefshat.v1.FollowTournamentResponse0\x01\x12k\n\x14GetTournamentResults\x12(.chefshat.v1.GetTournamentResultsRequest\x1a).chefshat.v1.GetTournamentResultsResponse\x12h\n\x13ListTournamentGames\x12\'.chefshat.v1.ListTournamentGamesRequest\x1a(.chefshat.v1.ListTournamentGamesResponse\x12Y\n\x0eGetLeaderboard\x12\".chefshat.v1.GetLeaderboardRequest\x1a#.chefshat.v1.GetLeaderboardResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -50,37 +50,37 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_JOINTOURNAMENTRESPONSE']._serialized_start=846
   _globals['_JOINTOURNAMENTRESPONSE']._serialized_end=952
   _globals['_ADDTABLEPARTICIPANTREQUEST']._serialized_start=955
-  _globals['_ADDTABLEPARTICIPANTREQUEST']._serialized_end=1085
-  _globals['_ADDTABLEPARTICIPANTRESPONSE']._serialized_start=1087
-  _globals['_ADDTABLEPARTICIPANTRESPONSE']._serialized_end=1182
-  _globals['_GETPHYSICALTABLEREQUEST']._serialized_start=1184
-  _globals['_GETPHYSICALTABLEREQUEST']._serialized_end=1267
-  _globals['_GETPHYSICALTABLERESPONSE']._serialized_start=1269
-  _globals['_GETPHYSICALTABLERESPONSE']._serialized_end=1355
-  _globals['_STARTTOURNAMENTREQUEST']._serialized_start=1357
-  _globals['_STARTTOURNAMENTREQUEST']._serialized_end=1425
-  _globals['_STARTTOURNAMENTRESPONSE']._serialized_start=1427
-  _globals['_STARTTOURNAMENTRESPONSE']._serialized_end=1497
-  _globals['_CLOSETOURNAMENTREQUEST']._serialized_start=1499
-  _globals['_CLOSETOURNAMENTREQUEST']._serialized_end=1567
-  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_start=1569
-  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_end=1639
-  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_start=1641
-  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_end=1689
-  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_start=1692
-  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_end=1859
-  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_start=1861
-  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_end=1913
-  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_start=1916
-  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_end=2093
-  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_start=2095
-  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_end=2185
-  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_start=2187
-  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_end=2285
-  _globals['_GETLEADERBOARDREQUEST']._serialized_start=2287
-  _globals['_GETLEADERBOARDREQUEST']._serialized_end=2388
-  _globals['_GETLEADERBOARDRESPONSE']._serialized_start=2390
-  _globals['_GETLEADERBOARDRESPONSE']._serialized_end=2464
-  _globals['_TOURNAMENTSERVICE']._serialized_start=2467
-  _globals['_TOURNAMENTSERVICE']._serialized_end=3652
+  _globals['_ADDTABLEPARTICIPANTREQUEST']._serialized_end=1105
+  _globals['_ADDTABLEPARTICIPANTRESPONSE']._serialized_start=1107
+  _globals['_ADDTABLEPARTICIPANTRESPONSE']._serialized_end=1202
+  _globals['_GETPHYSICALTABLEREQUEST']._serialized_start=1204
+  _globals['_GETPHYSICALTABLEREQUEST']._serialized_end=1287
+  _globals['_GETPHYSICALTABLERESPONSE']._serialized_start=1289
+  _globals['_GETPHYSICALTABLERESPONSE']._serialized_end=1375
+  _globals['_STARTTOURNAMENTREQUEST']._serialized_start=1377
+  _globals['_STARTTOURNAMENTREQUEST']._serialized_end=1445
+  _globals['_STARTTOURNAMENTRESPONSE']._serialized_start=1447
+  _globals['_STARTTOURNAMENTRESPONSE']._serialized_end=1517
+  _globals['_CLOSETOURNAMENTREQUEST']._serialized_start=1519
+  _globals['_CLOSETOURNAMENTREQUEST']._serialized_end=1587
+  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_start=1589
+  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_end=1659
+  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_start=1661
+  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_end=1709
+  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_start=1712
+  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_end=1879
+  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_start=1881
+  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_end=1933
+  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_start=1936
+  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_end=2113
+  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_start=2115
+  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_end=2205
+  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_start=2207
+  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_end=2305
+  _globals['_GETLEADERBOARDREQUEST']._serialized_start=2307
+  _globals['_GETLEADERBOARDREQUEST']._serialized_end=2408
+  _globals['_GETLEADERBOARDRESPONSE']._serialized_start=2410
+  _globals['_GETLEADERBOARDRESPONSE']._serialized_end=2484
+  _globals['_TOURNAMENTSERVICE']._serialized_start=2487
+  _globals['_TOURNAMENTSERVICE']._serialized_end=3672
 # @@protoc_insertion_point(module_scope)

@@ -289,6 +289,7 @@ class AddTableParticipantRequest(_message.Message):
     OWNER_TOKEN_FIELD_NUMBER: _builtins.int
     NAME_FIELD_NUMBER: _builtins.int
     KIND_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
     tournament_id: _builtins.str
     """Identifies the tournament."""
     owner_token: _builtins.str
@@ -297,6 +298,12 @@ class AddTableParticipantRequest(_message.Message):
     """Display name, 1..=64 characters, unique in the tournament."""
     kind: _room_pb2.ParticipantKind.ValueType
     """Kind of the participant; UNSPECIFIED means HUMAN. `kinds` of the settings does not limit it."""
+    request_id: _builtins.bytes
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, gets the same participant, even after the start of the tournament or a restart of
+    the server. The same id with another name or kind, or of a participant who joined: ALREADY_EXISTS
+    (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """
     def __init__(
         self,
         *,
@@ -304,10 +311,11 @@ class AddTableParticipantRequest(_message.Message):
         owner_token: _builtins.str = ...,
         name: _builtins.str = ...,
         kind: _room_pb2.ParticipantKind.ValueType = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["kind", b"kind", "name", b"name", "owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["kind", b"kind", "name", b"name", "owner_token", b"owner_token", "request_id", b"request_id", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -141,10 +141,10 @@ class TournamentServiceServicer:
 
     def AddTableParticipant(self, request, context):
         """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-        does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
-        and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
-        FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
-        (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+        INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -57,10 +57,10 @@ class TournamentServiceStub:
     """
     AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-    does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
-    and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
-    FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
-    (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+    INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     GetPhysicalTable: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]
     """Returns what the organiser needs for a physical game in progress: the table's ticket for an
@@ -126,10 +126,10 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """
     AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-    does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
-    and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
-    FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
-    (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+    INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     GetPhysicalTable: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]  # type: ignore[assignment]
     """Returns what the organiser needs for a physical game in progress: the table's ticket for an
@@ -222,10 +222,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.AddTableParticipantResponse, _abc.Awaitable[_tournament_service_pb2.AddTableParticipantResponse]]:
         """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-        does is reported (TableService). A call repeated after a lost response is refused with NAME_TAKEN
-        and adds nobody. PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL);
-        FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED); INVALID_ARGUMENT
-        (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+        INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
