@@ -23,7 +23,7 @@ asked on the page, in the terminal, or by a robot. Start while the field is empt
 
 Examples:
   chefshat-robot bridge 0 --ticket TICKET --camera camera.json --deck 0
-  chefshat-robot bridge 0 --ticket TICKET --hand 2=1 --record evening/
+  chefshat-robot bridge 0 --ticket TICKET --hand 2=1 --record recording/
 """
 
 

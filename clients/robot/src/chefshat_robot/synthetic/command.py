@@ -25,6 +25,8 @@ Write a video of a Shift at a synthetic table, as a camera above it would see it
   truth.jsonl        for each frame what lies where
   camera.json        the camera's calibration, for `chefshat-robot perceive --camera`
 
+A minute of video takes about 10 MB if easy, 200 MB if hard, because of the noise.
+
 Examples:
   chefshat-robot table evening/ --difficulty medium --seed 7
   chefshat-robot table evening/ --record records/GAME-ID.jsonl --shift 2
@@ -47,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs `table`."""
+    if arguments.seconds is not None and arguments.seconds <= 0:
+        raise CommandError("--seconds: give a time above 0")
     difficulty = DIFFICULTIES[arguments.difficulty]
     steps = random_shift(arguments.seed)
     try:
@@ -69,6 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.output / "events.jsonl", (asdict(true_event) for true_event in table.true_events if true_event.time < end)
     )
     _write_frames(table, arguments.output, end, arguments.pictures)
+    source = arguments.output / ("frames" if arguments.pictures else "video.mp4")
+    print(f"Read it with: chefshat-robot perceive {source} --camera {arguments.output / 'camera.json'}")
     return 0
 
 
@@ -85,9 +91,10 @@ def _write_frames(table: SyntheticTable, output: Path, end: float, pictures: boo
                 cv2.imwrite(str(output / "frames" / f"{frame.index:08}.png"), frame.image)
             lying = [{**asdict(piece), "piece": {**asdict(piece.piece), "kind": piece.piece.kind.value}} for piece in truth.lying]
             file.write(json.dumps({"frame": truth.index, "time": truth.time, "hands": truth.hands, "lying": lying}) + "\n")
-            if frame.index % 15 == 0:
+            if frame.index % 15 == 0 and sys.stderr.isatty():
                 print(f"\r{frame.time:.0f} of {end:.0f} s", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    if sys.stderr.isatty():
+        print(file=sys.stderr)
     if video is not None:
         video.release()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import cv2
@@ -26,17 +26,21 @@ from .events import (
     TakenBack,
     to_json,
 )
-from .frames import SourceError, open_source
+from .frames import Frame, SourceError, open_source
 from .perception import Perception
 from .recording import Recorder, replay
 
+PATIENCE_S = 5.0
+"""A doubt is left out after so long, in s."""
+
 _DESCRIPTION = """\
-Watch the table and print what happens. Start while the field is empty.
+Watch the table and print what happens, each event with the time at which it became certain. Start while the field is empty.
+A doubt is a place that cannot be read for sure; events after it wait until it can be read, at most 5 seconds.
 
 Examples:
   chefshat-robot perceive 0 --camera camera.json
-  chefshat-robot perceive evening.mp4 --record evening/ --json
-  chefshat-robot perceive --replay evening/
+  chefshat-robot perceive evening.mp4 --record recording/ --json
+  chefshat-robot perceive --replay recording/
 """
 
 
@@ -69,10 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.doubts is not None:
             arguments.doubts.mkdir(parents=True, exist_ok=True)
         if arguments.record is None:
-            _print_all(Perception(camera, arguments.deck).watch(frames), arguments.json, arguments.doubts)
+            _print_all(_watch(Perception(camera, arguments.deck), frames), arguments.json, arguments.doubts)
         else:
             with Recorder(arguments.record, arguments.deck, arguments.record_frames) as recorder:
-                _print_all(Perception(camera, arguments.deck, recorder).watch(frames), arguments.json, arguments.doubts)
+                _print_all(_watch(Perception(camera, arguments.deck, recorder), frames), arguments.json, arguments.doubts)
+    except FileNotFoundError as error:
+        raise CommandError(f"{error.filename} does not exist; give a folder that --record has written") from error
     except FileExistsError as error:
         raise CommandError(f"{error.filename} exists; give a folder without a recording") from error
     except (OSError, SourceError, ValueError) as error:
@@ -80,6 +86,23 @@ def run(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print(file=sys.stderr)
     return 0
+
+
+def _watch(perception: Perception, frames: Iterable[Frame]) -> Iterator[Observed]:
+    """The events of the frames. Nobody answers here, so what cannot be read in time is left out."""
+    asked: dict[int, float] = {}
+    for frame in frames:
+        events = perception.see(frame)
+        for number in [number for number, time in asked.items() if frame.time - time >= PATIENCE_S]:
+            print(f"doubt {number} is left out: nobody answers here, as people do with `chefshat-robot bridge`", file=sys.stderr)
+            events += perception.answer(number, False)
+        for event in events:
+            match event:
+                case Doubt(number=number):
+                    asked[number] = frame.time
+                case DoubtResolved(number=number):
+                    asked.pop(number, None)
+            yield event
 
 
 def _print_all(events: Iterable[Observed], as_json: bool, doubts: Path | None) -> None:
