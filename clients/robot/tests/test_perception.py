@@ -329,6 +329,7 @@ def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pyt
     evening, recording = tmp_path / "evening", tmp_path / "recording"
     assert cli.main(["table", str(evening), "--difficulty", "easy", "--seed", "2", "--seconds", "4"]) == 0
     camera = ["--camera", str(evening / "camera.json")]
+    assert f"perceive {evening / 'video.mp4'}" in capsys.readouterr().out
     assert cli.main(["perceive", str(evening / "video.mp4"), *camera, "--record", str(recording), "--json"]) == 0
     seen = capsys.readouterr().out
     assert cli.main(["perceive", "--replay", str(recording), "--json"]) == 0
@@ -337,3 +338,18 @@ def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pyt
     truth = [json.loads(line) for line in (evening / "events.jsonl").read_text().splitlines()]
     assert events
     assert [event[0] for event in events] == [true_event["kind"] for true_event in truth][: len(events)]
+
+
+def test_the_command_leaves_out_what_nobody_can_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stained = LayCards(1.0, 0, (Card(0, 20),), (1,), face_down=True)
+    later = ShowPass(8.5, 1)
+    table = SyntheticTable([stained, later], DIFFICULTIES["easy"], seed=2)
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    for frame, _ in table.frames():
+        cv2.imwrite(str(frames / f"{frame.index:05}.jpg"), frame.image)
+    assert cli.main(["perceive", str(frames), "--json"]) == 0
+    seen = capsys.readouterr()
+    kinds = [json.loads(line)["event"] for line in seen.out.splitlines()]
+    assert kinds == ["field_changed", "doubt", "doubt_resolved", "pass_shown"]
+    assert "doubt 1 is left out" in seen.err
