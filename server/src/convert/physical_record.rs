@@ -294,8 +294,13 @@ fn without_cards(mut shift: ShiftStory) -> ShiftStory {
 
 #[cfg(test)]
 mod tests {
-    use chefshat_engine::{ActionId, Cards, Seat};
+    use std::path::Path;
+
+    use chefshat_engine::{ActionId, Cards, DecisionKind, Seat};
+    use chefshat_record::jsonl;
     use chefshat_record::replay::replay;
+    use chefshat_referee::{Question, Stage};
+    use chefshat_room::ReportVerdict;
     use chefshat_room::journal::{AbortReason, Report};
     use chefshat_room::testing::OPEN;
     use chefshat_room::testing::real_table::{MIXED, Mixed, PERSON};
@@ -410,6 +415,97 @@ mod tests {
                     if matches!(&event.kind, Some(Kind::Correction(it)) if it.first_void == 0))
             });
             assert_eq!(corrections.count(), 1);
+        }
+    }
+
+    /// Lets the next thing happen. A pass at the table is reported only if it does not follow from
+    /// the turn after it. Returns whether it does.
+    fn step_without_passes(mixed: &mut Mixed) -> bool {
+        mixed.follow();
+        let at_table = |mixed: &Mixed| {
+            let open = mixed.real.truth.decision();
+            open.is_some_and(|open| {
+                let fill = mixed.table.core.standing(open.seat).fill;
+                open.kind == DecisionKind::Turn && matches!(fill, Fill::AtTable(_))
+            })
+        };
+        let stage = mixed.stage();
+        if !matches!(stage, Stage::Turn(_)) || !at_table(mixed) {
+            mixed.step();
+            return false;
+        }
+        let next = |mixed: &mut Mixed| {
+            let report = mixed.real.next_report(stage);
+            report.expect("a turn at the table")
+        };
+        let report = next(mixed);
+        if matches!(report, Report::Pass { .. }) && at_table(mixed) {
+            let after = next(mixed);
+            match mixed.table.report(after.clone()).verdict {
+                ReportVerdict::Accepted => return true,
+                ReportVerdict::Held { question } => {
+                    mixed.table.report(Report::Answer {
+                        id: question,
+                        option: Some(0),
+                    });
+                }
+                _ => {
+                    mixed.table.report(report);
+                    mixed.table.report(after);
+                }
+            }
+            return false;
+        }
+        mixed.table.report(report);
+        false
+    }
+
+    #[test]
+    fn the_record_of_a_game_stays_the_same() {
+        let mut mixed = Mixed::new([PERSON, PERSON, OPEN, PERSON], 2, 5);
+        let (number, right) = mixed.misread();
+        let question = Question {
+            id: "camera 1".into(),
+            text: "Were the cards misread?".into(),
+            options: vec!["Yes".into(), "No".into()],
+            seat: None,
+        };
+        for report in [
+            Report::Question(question),
+            Report::Answer {
+                id: "camera 1".into(),
+                option: Some(0),
+            },
+            Report::Correction {
+                number,
+                instead: Some(Box::new(right)),
+            },
+        ] {
+            assert_eq!(mixed.table.report(report).verdict, ReportVerdict::Accepted);
+        }
+        let mut passes = 0;
+        while !mixed.table.core.state().is_over() {
+            passes += u32::from(step_without_passes(&mut mixed));
+        }
+        let gifts = (mixed.table.journal.iter()).filter(|entry| {
+            matches!(&entry.change, Change::Reported(it) if matches!(it.report, Report::Gift { .. }))
+        });
+        assert!(passes > 0 && gifts.count() > 0, "{passes} passes followed");
+        let mut lines = record_of(&mixed);
+        if let Some(Line::Header(header)) = &mut lines[0].line {
+            header.server_version.clear();
+        }
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../tests/fixtures/records/physical.jsonl"
+        );
+        let folder = tempfile::tempdir().expect("a folder");
+        let made = folder.path().join("physical.jsonl");
+        jsonl::write(&made, &lines).expect("written");
+        let text = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
+        if text(&made) != text(Path::new(path)) {
+            let kept = folder.keep().join("physical.jsonl");
+            panic!("{path} has another record than {}", kept.display());
         }
     }
 
