@@ -1,7 +1,7 @@
 // Builds the page (into dist/, which the server embeds), serves it during development, and
 // configures the tests without a browser.
 
-import { readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { readdirSync, readFileSync, realpathSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { constants, gzipSync } from "node:zlib";
@@ -73,8 +73,12 @@ export default defineConfig({
       },
     },
   },
-  // The drawings of cards are outside this folder, with the server's pictures.
-  server: { fs: { allow: [repository] }, proxy: { "^/chefshat\\.v1\\.": { target: server } } },
+  server: {
+    // The drawings of cards are outside this folder, with the server's pictures. The folder may be a
+    // link.
+    fs: { allow: [repository, realpathSync(join(repository, "server"))] },
+    proxy: { "^/chefshat\\.v1\\.": { target: server } },
+  },
   test: {
     environment: "happy-dom",
     testTimeout: 60_000,
