@@ -14,7 +14,8 @@ export const faults: Texts["faults"] = {
     GAME_STARTED: "La partita è già iniziata. Puoi guardarla.",
     GAME_OVER: "La partita è finita.",
     GAME_NOT_STARTED: "La partita non è ancora iniziata.",
-    TOO_MANY_HELD_REPORTS: "Prima bisogna rispondere a una domanda: dalla risposta dipendono le segnalazioni in attesa.",
+    TOO_MANY_HELD_REPORTS:
+      "Prima bisogna rispondere a una domanda: dalla risposta dipendono le segnalazioni in attesa.",
     NOT_CORRECTABLE: "Questa segnalazione non si può più correggere.",
     JOIN_CODE_WRONG:
       "Questo codice non corrisponde a nessuna stanza e a nessun torneo in cui si possa entrare. Controllalo; può anche darsi che la partita sia finita.",
