@@ -497,7 +497,7 @@ mod tests {
         }
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../tests/fixtures/records/physical.jsonl"
+            "/../tests/fixtures/physical.jsonl"
         );
         let folder = tempfile::tempdir().expect("a folder");
         let made = folder.path().join("physical.jsonl");
