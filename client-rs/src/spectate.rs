@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 
 use futures::Stream;
-use tokio::time::{Instant, sleep};
+use tokio::time::Instant;
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
 use crate::connection::MAX_RESPONSE_BYTES;
-use crate::error::{Error, may_retry};
+use crate::error::Error;
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 
 /// A spectator of one room, created by [`Client::spectate`](crate::Client::spectate).
@@ -124,15 +124,7 @@ impl Spectator {
         if opened.is_some_and(|opened| opened.elapsed() >= self.backoff.max) {
             self.outage.over();
         }
-        let retry = may_retry(status.code())
-            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
-            .flatten();
-        let Some(delay) = retry else {
-            self.ended = true;
-            return Err(status.into());
-        };
-        tracing::info!(?delay, "connection lost: {status}");
-        sleep(delay).await;
-        Ok(())
+        let waited = self.outage.wait(&self.backoff, status).await;
+        waited.inspect_err(|_| self.ended = true)
     }
 }

@@ -2,23 +2,23 @@
 
 use futures::Stream;
 use rand::TryRng as _;
-use tokio::time::{Instant, sleep};
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
 use crate::client::Client;
 use crate::connection::MAX_RESPONSE_BYTES;
-use crate::error::{Error, may_retry};
+use crate::error::Error;
 use crate::repeat::repeated;
 use crate::v1::{self, table_service_client::TableServiceClient};
 
 impl Client {
     /// Reports something that happened at a physical table. `table_ticket` comes from
-    /// [`Client::create_room`], or from `GetPhysicalTable` of a tournament. If the response is lost, the call is repeated and reports nothing
-    /// twice.
+    /// [`Client::create_room`], or from `GetPhysicalTable` of a tournament. If the response is lost,
+    /// the call is repeated and reports nothing twice.
     ///
-    /// A report that the rules or the cards do not allow is no error: see `verdict` and `detail`.
+    /// If the rules or the cards do not allow a report, the call succeeds: see `verdict` and
+    /// `detail`.
     ///
     /// # Errors
     /// `TICKET_UNKNOWN`, `REPORT_REFUSED` with the malformed field in the metadata,
@@ -128,16 +128,8 @@ impl TableFollower {
 
     async fn lost(&mut self, status: Status) -> Result<(), Error> {
         self.stream = None;
-        let retry = may_retry(status.code())
-            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
-            .flatten();
-        let Some(delay) = retry else {
-            self.over = true;
-            return Err(status.into());
-        };
-        tracing::info!(?delay, "connection lost: {status}");
-        sleep(delay).await;
-        Ok(())
+        let waited = self.outage.wait(&self.backoff, status).await;
+        waited.inspect_err(|_| self.over = true)
     }
 }
 

@@ -2,13 +2,12 @@
 //! updates of a participant.
 
 use futures::Stream;
-use tokio::time::{Instant, sleep};
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
 use crate::connection::MAX_RESPONSE_BYTES;
-use crate::error::{Error, PlayError, may_retry};
+use crate::error::{Error, PlayError};
 use crate::participant::Participant;
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
@@ -319,16 +318,8 @@ impl TournamentFollower {
 
     async fn lost(&mut self, status: Status) -> Result<(), Error> {
         self.stream = None;
-        let retry = may_retry(status.code())
-            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
-            .flatten();
-        let Some(delay) = retry else {
-            self.over = true;
-            return Err(status.into());
-        };
-        tracing::info!(?delay, "connection lost: {status}");
-        sleep(delay).await;
-        Ok(())
+        let waited = self.outage.wait(&self.backoff, status).await;
+        waited.inspect_err(|_| self.over = true)
     }
 }
 

@@ -4,7 +4,7 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 import { AttendView, pictureSource } from "../src/attend/AttendView";
-import type { Happening, Outcome } from "../src/attend/attending";
+import type { Outcome, ReportKind } from "../src/attend/attending";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import { TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
@@ -12,7 +12,7 @@ import { setLanguage, startLanguage } from "../src/i18n";
 import { DEALT, OBSERVATION, stateOf } from "./table-state";
 
 let root: HTMLElement;
-let sent: Happening[];
+let sent: ReportKind[];
 let outcome: Outcome;
 
 beforeEach(async () => {
@@ -320,7 +320,7 @@ describe("a violation", () => {
 });
 
 describe("the reports of the Shift", () => {
-  const report = (number: bigint, kind: Happening) => ({ report: number, seat: 1, text: "…", content: { kind } });
+  const report = (number: bigint, kind: ReportKind) => ({ report: number, seat: 1, text: "…", content: { kind } });
   const reports = [
     { ...report(1n, { case: "hand", value: { seat: 2 } }), seat: 2 },
     report(2n, { case: "laid", value: { seat: 1, cards: { cards: [9, 9, 12], golden: false } } }),
@@ -414,7 +414,7 @@ test("before the game there is nothing to enter", async () => {
 
 test("a second press while a report is under way sends nothing", async () => {
   let answer = () => {};
-  const report = (what: Happening) => {
+  const report = (what: ReportKind) => {
     sent.push(what);
     return new Promise<Outcome>((resolve) => {
       answer = () => resolve({ kind: "accepted" });

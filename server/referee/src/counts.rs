@@ -1,7 +1,7 @@
 //! Counts of cards by kind. Unlike the engine's `Cards` they can exceed a deck, as stated facts
 //! may.
 
-use chefshat_engine::{Action, Cards, Face};
+use chefshat_engine::{Action, Cards, Face, RuleSet};
 
 /// Cards by kind: index f-1 counts face f, [`JOKER`] the jokers.
 pub type Counts = [u8; JOKER + 1];
@@ -30,6 +30,13 @@ pub(crate) fn add_action(counts: &mut Counts, cards: Action) {
     counts[JOKER] = counts[JOKER].saturating_add(jokers);
 }
 
+/// The cards of an action.
+pub(crate) fn counts_of_action(action: Action) -> Counts {
+    let mut counts = NOTHING;
+    add_action(&mut counts, action);
+    counts
+}
+
 /// The kind of a face.
 pub fn index(face: Face) -> usize {
     usize::from(face.get()) - 1
@@ -44,6 +51,14 @@ pub(crate) fn counts_of(cards: Cards, faces: u8) -> Counts {
     counts[usize::from(faces)..JOKER].fill(0);
     counts[JOKER] = cards.jokers();
     counts
+}
+
+/// Cards of a deck by kind; `None` if no deck has them.
+pub(crate) fn cards_of(rules: &RuleSet, counts: &Counts, golden: bool) -> Option<Cards> {
+    let faces = rules.faces();
+    let mut list = counts[..usize::from(faces)].to_vec();
+    list.push(counts[JOKER]);
+    Cards::from_counts(faces, &list, golden)
 }
 
 /// Whether `all` contains every card of `some`.

@@ -15,12 +15,17 @@ pub(crate) struct Gifts {
     pub(crate) short: bool,
 }
 
-/// The pairs that exchange cards in a Shift, given the order of the last one.
-pub(crate) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) -> Vec<ExchangePair> {
+/// The pairs that exchange cards in a Shift, given the order of the last one and who declared a
+/// special action; none in the first Shift.
+pub(crate) fn pairs(
+    rules: &RuleSet,
+    order: Option<SeatOrder>,
+    declared: Option<Seat>,
+) -> Vec<ExchangePair> {
     let Some(mut ranking) = order.filter(|_| rules.exchange()) else {
         return Vec::new();
     };
-    if let Some((seat, true)) = tally.special {
+    if let Some(seat) = declared {
         match SpecialAction::of_seat(seat, &ranking) {
             SpecialAction::FoodFight => ranking.reverse(),
             SpecialAction::DinnerIsServed => return Vec::new(),

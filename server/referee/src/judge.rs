@@ -3,8 +3,7 @@
 
 use chefshat_engine::{Action, Cards, Face, PlayRequirement, RuleSet};
 
-use crate::counts::{Counts, JOKER, size_of};
-use crate::shift::cards_of;
+use crate::counts::{Counts, JOKER, cards_of, size_of};
 use crate::words::kind_text;
 use crate::{SeenCards, ViolatedRule};
 

@@ -47,7 +47,10 @@ impl<'a> Puzzle<'a> {
             *count = face;
         }
         deck[JOKER] = rules.jokers();
-        let pairs = pairs(rules, order, &tally);
+        let declared = tally
+            .special
+            .and_then(|(seat, declared)| declared.then_some(seat));
+        let pairs = pairs(rules, order, declared);
         let top = usize::from(rules.faces()) - 1;
         Self {
             golden: golden_seats(rules, &tally, &pairs, top),

@@ -81,6 +81,21 @@ pub enum Report {
     Pause(bool),
 }
 
+impl Report {
+    /// The seat that it is about, if it names one.
+    pub fn seat(&self) -> Option<Seat> {
+        match self {
+            Self::Hand { seat, .. }
+            | Self::PassWithdrawn { seat }
+            | Self::Gift { seat, .. }
+            | Self::Role { seat, .. } => Some(*seat),
+            Self::Laid { seat, .. } | Self::Pass { seat } | Self::Special { seat } => *seat,
+            Self::Question(question) => question.seat,
+            Self::Cleared | Self::Correction { .. } | Self::Answer { .. } | Self::Pause(_) => None,
+        }
+    }
+}
+
 /// A question about the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {

@@ -5,7 +5,7 @@
 use chefshat_engine::{BySeat, Cards, Opening, Seat};
 
 use crate::candidates::{Candidate, Candidates, SearchBudget};
-use crate::counts::{Counts, JOKER, NOTHING, add, contains, counts_of, size_of, take};
+use crate::counts::{Counts, JOKER, NOTHING, add, cards_of, contains, counts_of, size_of, take};
 use crate::known::Known;
 use crate::puzzle::{Kept, Puzzle};
 
@@ -134,7 +134,7 @@ impl Puzzle<'_> {
         let dealt = BySeat::from_fn(players, |seat| {
             let mut counts = kept[seat].counts;
             add(&mut counts, &given[seat]);
-            self.cards(&counts, seat == golden)
+            cards_of(self.rules, &counts, seat == golden)
         });
         if dealt.values().any(Option::is_none) {
             return None;
@@ -153,13 +153,6 @@ impl Puzzle<'_> {
             held_known,
             given_known,
         })
-    }
-
-    fn cards(&self, counts: &Counts, golden: bool) -> Option<Cards> {
-        let faces = self.rules.faces();
-        let mut list = counts[..usize::from(faces)].to_vec();
-        list.push(counts[JOKER]);
-        Cards::from_counts(faces, &list, golden)
     }
 
     /// Finds the contradictions that have a simple explanation: too many cards of a kind, a hand

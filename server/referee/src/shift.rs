@@ -3,10 +3,11 @@
 
 use chefshat_engine::{
     Action, BySeat, Cards, Decision, DecisionKind, Event, ExchangePair, Face, Game, Observation,
-    Opening, RuleSet, Seat, SpecialAction,
+    Opening, RuleSet, Seat,
 };
 
-use crate::counts::{JOKER, NOTHING, add_action, counts_of};
+use crate::counts::{JOKER, NOTHING, add_action, cards_of, counts_of};
+use crate::gifts::pairs;
 use crate::{Fact, PhysicalGame, Report, ShiftFacts, StartState};
 
 /// Something that counts.
@@ -114,19 +115,11 @@ impl Shift {
 
     /// The pairs that exchange cards; none in the first Shift.
     pub(crate) fn pairs(&self, rules: &RuleSet) -> Vec<ExchangePair> {
-        let Some(mut ranking) = self.start.last_order.filter(|_| rules.exchange()) else {
-            return Vec::new();
-        };
         let declared = self.acts().find_map(|act| match act {
-            Act::Special(seat, true) => Some(SpecialAction::of_seat(seat, &ranking)),
+            Act::Special(seat, true) => Some(seat),
             _ => None,
         });
-        match declared {
-            Some(SpecialAction::DinnerIsServed) => return Vec::new(),
-            Some(SpecialAction::FoodFight) => ranking.reverse(),
-            None => {}
-        }
-        ExchangePair::all(&ranking).collect()
+        pairs(rules, self.start.last_order, declared)
     }
 
     /// Whether a seat that chooses its gift has given it.
@@ -296,14 +289,6 @@ impl Shift {
         let played_any = played.iter().any(|count| *count > 0);
         cards_of(rules, &counts, seen.has_golden() || (opened && played_any))
     }
-}
-
-/// Cards of a deck by kind; `None` if no deck has them.
-pub(crate) fn cards_of(rules: &RuleSet, counts: &[u8; JOKER + 1], golden: bool) -> Option<Cards> {
-    let faces = rules.faces();
-    let mut list = counts[..usize::from(faces)].to_vec();
-    list.push(counts[JOKER]);
-    Cards::from_counts(faces, &list, golden)
 }
 
 /// The single gifts of a gift.

@@ -2,7 +2,7 @@
 
 use chefshat_engine::{Action, Cards, RuleSet, Seat};
 
-use crate::counts::{Counts, JOKER, counts_of};
+use crate::counts::{Counts, JOKER, counts_of, counts_of_action};
 
 const NUMBERS: [&str; 13] = [
     "no", "a", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
@@ -75,12 +75,10 @@ pub(crate) fn cards_text(rules: &RuleSet, cards: Cards) -> String {
 
 /// What a turn puts on the board: "two 9s and a joker", or "a pass".
 pub(crate) fn turn_text(action: Action) -> String {
-    let mut counts = crate::counts::NOTHING;
     match action {
-        Action::Pass => return "a pass".to_owned(),
-        action => crate::counts::add_action(&mut counts, action),
+        Action::Pass => "a pass".to_owned(),
+        action => counts_text(&counts_of_action(action)),
     }
-    counts_text(&counts)
 }
 
 /// "5s", "jokers".

@@ -140,20 +140,12 @@ impl Core {
 
 /// The seats named in a report.
 fn seats_of(report: &Report) -> impl Iterator<Item = Seat> {
-    let (seat, instead) = match report {
-        Report::Hand { seat, .. }
-        | Report::PassWithdrawn { seat }
-        | Report::Gift { seat, .. }
-        | Report::Role { seat, .. } => (Some(*seat), None),
-        Report::Laid { seat, .. } | Report::Pass { seat } | Report::Special { seat } => {
-            (*seat, None)
-        }
-        Report::Question(question) => (question.seat, None),
-        Report::Correction { instead, .. } => (None, instead.as_deref()),
-        Report::Cleared | Report::Answer { .. } | Report::Pause(_) => (None, None),
+    let instead = match report {
+        Report::Correction { instead, .. } => instead.as_deref(),
+        _ => None,
     };
     let nested: Vec<Seat> = instead.map(|it| seats_of(it).collect()).unwrap_or_default();
-    seat.into_iter().chain(nested)
+    report.seat().into_iter().chain(nested)
 }
 
 fn check(holds: bool, problem: &'static str) -> Result<(), &'static str> {

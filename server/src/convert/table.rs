@@ -469,7 +469,7 @@ fn put_table(
             let elapsed = made.map_or(0, |made| made.at.as_millis());
             v1::AcceptedReport {
                 report: number,
-                seat: seat_of(report).map(seat_number),
+                seat: report.seat().map(seat_number),
                 text: referee.describe(report),
                 elapsed_ms: u64::try_from(elapsed).unwrap_or(u64::MAX),
                 content: Some(without_hand(table_report(report, source, age, deck))),
@@ -513,21 +513,6 @@ fn to_lay_to_proto(it: &ToLay, text: String, deck: Deck) -> v1::CardsToLay {
         receiver: it.receiver.map(seat_number),
         shift: it.shift,
         pizza: it.pizza,
-    }
-}
-
-/// The seat that a report is about.
-fn seat_of(report: &Report) -> Option<Seat> {
-    match report {
-        Report::Hand { seat, .. }
-        | Report::PassWithdrawn { seat }
-        | Report::Gift { seat, .. }
-        | Report::Role { seat, .. } => Some(*seat),
-        Report::Laid { seat, .. } | Report::Pass { seat } | Report::Special { seat } => *seat,
-        Report::Question(question) => question.seat,
-        Report::Cleared | Report::Correction { .. } | Report::Answer { .. } | Report::Pause(_) => {
-            None
-        }
     }
 }
 

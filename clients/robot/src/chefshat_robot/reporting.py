@@ -5,58 +5,34 @@ With them a table needs no camera for the robot's seat; with a camera they do no
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from typing import Self
 
-from chefshat import ChefsHatError, aio, pb
+from chefshat import ChefsHatError, pb
 
 from chefshat_robot import layout
 from chefshat_robot.drivers.driver import Pick
+from chefshat_robot.running import Sender
 from chefshat_robot.table import TableState
 
 LOG = logging.getLogger("chefshat_robot")
 
 
-class Reporter:
-    """Reports what a robot has carried, in order, in the background. An asynchronous context manager: leaving sends what waits."""
-
-    def __init__(self, client: aio.Client, table_ticket: str) -> None:
-        """Sets the table.
-
-        Args:
-            client: the connection to the server.
-            table_ticket: of the table, from creating the room.
-        """
-        self._client = client
-        self._ticket = table_ticket
-        # The last entry is None.
-        self._waiting: asyncio.Queue[pb.TableReport | None] = asyncio.Queue()
-        self._sender: asyncio.Task[None] | None = None
+class Reporter(Sender[pb.TableReport]):
+    """Reports what a robot has carried."""
 
     def carried(self, pick: Pick, state: TableState) -> None:
         """Queues the report for pieces that were carried, if they mean something in the game."""
         report = report_of(pick, state)
         if report is not None:
-            self._waiting.put_nowait(report)
+            self.send(report)
 
-    async def __aenter__(self) -> Self:
-        self._sender = asyncio.create_task(self._run(), name="robot reports")
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._waiting.put_nowait(None)
-        if self._sender is not None:
-            await self._sender
-
-    async def _run(self) -> None:
-        while (report := await self._waiting.get()) is not None:
-            try:
-                response = await self._client.report(self._ticket, report)
-                if response.verdict not in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN):
-                    LOG.warning("the referee did not accept what the robot did: %s", response.detail)
-            except ChefsHatError as error:
-                LOG.warning("what the robot did was not reported: %s", error)
+    async def _deliver(self, item: pb.TableReport) -> None:
+        try:
+            response = await self._client.report(self._ticket, item)
+            if response.verdict not in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN):
+                LOG.warning("the referee did not accept what the robot did: %s", response.detail)
+        except ChefsHatError as error:
+            LOG.warning("what the robot did was not reported: %s", error)
 
 
 def report_of(pick: Pick, state: TableState) -> pb.TableReport | None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Any, Generic, Self, TypeVar
 
 import grpc
 from chefshat import ChefsHatError, aio, pb
@@ -14,6 +15,8 @@ from chefshat.errors import INTERRUPTED, from_rpc_error
 
 from chefshat_robot.cli import CommandError
 from chefshat_robot.drivers.driver import LOG, RobotError
+
+Item = TypeVar("Item")
 
 
 def run_command(command: Callable[[], Coroutine[Any, Any, int]], *, quiet: bool = False) -> int:
@@ -39,6 +42,44 @@ def run_command(command: Callable[[], Coroutine[Any, Any, int]], *, quiet: bool 
         raise CommandError("; ".join(str(error) for error in known.exceptions)) from group
     except KeyboardInterrupt:
         return INTERRUPTED
+
+
+class Sender(ABC, Generic[Item]):
+    """Sends items, in order, in the background. An asynchronous context manager: leaving sends what waits."""
+
+    def __init__(self, client: aio.Client, ticket: str) -> None:
+        """Sets where to send.
+
+        Args:
+            client: the connection to the server.
+            ticket: authorises the sender.
+        """
+        self._client = client
+        self._ticket = ticket
+        # The last entry is None.
+        self._waiting: asyncio.Queue[Item | None] = asyncio.Queue()
+        self._task: asyncio.Task[None] | None = None
+
+    def send(self, item: Item) -> None:
+        """Queues an item."""
+        self._waiting.put_nowait(item)
+
+    @abstractmethod
+    async def _deliver(self, item: Item) -> None:
+        """Sends an item. Logs what goes wrong: the game is more important."""
+
+    async def __aenter__(self) -> Self:
+        self._task = asyncio.create_task(self._run(), name=type(self).__name__)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._waiting.put_nowait(None)
+        if self._task is not None:
+            await self._task
+
+    async def _run(self) -> None:
+        while (item := await self._waiting.get()) is not None:
+            await self._deliver(item)
 
 
 async def live_from(client: aio.Client, room_id: str) -> int:

@@ -8,12 +8,12 @@ form. All other labels are feelings to show.
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from typing import Self
 from urllib.parse import quote, unquote
 
-from chefshat import ChefsHatError, aio, pb
+from chefshat import ChefsHatError, pb
+
+from chefshat_robot.running import Sender
 
 LOG = logging.getLogger("chefshat_robot")
 SAY = "say"
@@ -49,41 +49,11 @@ def text_of(expression: pb.Expression) -> str | None:
     return unquote(expression.media.removeprefix(PREFIX))
 
 
-class Outbox:
-    """Sends the expressions of a seat, in order, in the background. An asynchronous context manager: leaving sends what waits.
+class Outbox(Sender[pb.Expression]):
+    """Sends the expressions of a seat. A refused expression is logged."""
 
-    A refused expression is logged: the game is more important.
-    """
-
-    def __init__(self, client: aio.Client, ticket: str) -> None:
-        """Sets the seat.
-
-        Args:
-            client: the connection to the server.
-            ticket: of the seat.
-        """
-        self._client = client
-        self._ticket = ticket
-        # The last entry is None.
-        self._waiting: asyncio.Queue[pb.Expression | None] = asyncio.Queue()
-        self._sender: asyncio.Task[None] | None = None
-
-    def send(self, expression: pb.Expression) -> None:
-        """Queues an expression."""
-        self._waiting.put_nowait(expression)
-
-    async def __aenter__(self) -> Self:
-        self._sender = asyncio.create_task(self._run(), name="expressions")
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        self._waiting.put_nowait(None)
-        if self._sender is not None:
-            await self._sender
-
-    async def _run(self) -> None:
-        while (expression := await self._waiting.get()) is not None:
-            try:
-                await self._client.express(self._ticket, expression)
-            except ChefsHatError as error:
-                LOG.info("an expression was not sent: %s", error)
+    async def _deliver(self, item: pb.Expression) -> None:
+        try:
+            await self._client.express(self._ticket, item)
+        except ChefsHatError as error:
+            LOG.info("an expression was not sent: %s", error)

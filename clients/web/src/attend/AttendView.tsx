@@ -16,7 +16,7 @@ import { Board } from "../table/view/Board";
 import { useKeptFocus } from "../table/view/kept-focus";
 import { Demands } from "../table/view/Now";
 import css from "./Attend.module.css";
-import type { Happening, Outcome, Report } from "./attending";
+import type { Outcome, Report, ReportKind } from "./attending";
 import { type Draft, Entry, NO_DRAFT } from "./Entry";
 import { cardsOfSeen, deckOf, NO_PLAY } from "./entries";
 import { Cards } from "./Picks";
@@ -44,7 +44,7 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
   useAnnouncedState(state, table);
 
   /** Sends a report unless one is under way. Returns whether it counts. */
-  const send = async (what: Happening): Promise<boolean> => {
+  const send = async (what: ReportKind): Promise<boolean> => {
     if (sending.current) return false;
     sending.current = true;
     setOutcome(undefined);
@@ -54,7 +54,7 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
     if (came.kind === "accepted") announce(words.outcome.accepted);
     return came.kind === "accepted" || came.kind === "void";
   };
-  const enter = async (what: Happening) => {
+  const enter = async (what: ReportKind) => {
     setDismissed(undefined);
     if (await send(what)) setDraft(NO_DRAFT);
   };
@@ -257,7 +257,7 @@ function ToLay({ table, one, onDone }: { table: Table; one: CardsToLay; onDone: 
 }
 
 /** The report that a decision was carried out. */
-export function doneOf({ seat, kind, cards }: CardsToLay): Happening {
+export function doneOf({ seat, kind, cards }: CardsToLay): ReportKind {
   const laid = cards && cards.cards.length > 0 ? cards : undefined;
   switch (kind) {
     case DecisionKind.EXCHANGE:

@@ -10,7 +10,7 @@ import { Notice } from "../parts/Notice";
 import type { TableState as Table } from "../table/model/state";
 import { distinctName, playWords, roleWord } from "../table/words";
 import css from "./Attend.module.css";
-import type { Happening, Outcome } from "./attending";
+import type { Outcome, ReportKind } from "./attending";
 import {
   awaitedEntry,
   cardsOfDraft,
@@ -57,7 +57,7 @@ interface FieldsProps {
   seat: number | undefined;
   change: (changed: Partial<Draft>) => void;
   /** Sends a report. */
-  send: (what: Happening) => void;
+  send: (what: ReportKind) => void;
 }
 
 interface EntryProps {
@@ -68,7 +68,7 @@ interface EntryProps {
   outcome: Outcome | undefined;
   onDraft: (draft: Draft) => void;
   /** Sends a report. */
-  onSend: (what: Happening) => void;
+  onSend: (what: ReportKind) => void;
 }
 
 /** The form. */

@@ -11,7 +11,7 @@ import { Notice } from "../parts/Notice";
 import { SeatNumber } from "../parts/SeatNumber";
 import type { TableState as Table } from "../table/model/state";
 import css from "./Attend.module.css";
-import type { Happening, Outcome, Report } from "./attending";
+import type { Outcome, Report, ReportKind } from "./attending";
 import { type Draft, GiftFields, HandFields, NO_DRAFT, OutcomeNotice, SpecialFields, TurnFields } from "./Entry";
 import { deckOf, draftOf, handText } from "./entries";
 import { reportWords } from "./words";
@@ -34,7 +34,7 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
   const [all, setAll] = useState(false);
   /** The report whose removal was refused. */
   const [refused, setRefused] = useState<bigint | undefined>(undefined);
-  const correct = async (number: bigint, instead: Happening | undefined): Promise<Outcome> => {
+  const correct = async (number: bigint, instead: ReportKind | undefined): Promise<Outcome> => {
     const outcome = await report({
       case: "correction",
       value: { report: number, ...(instead === undefined ? {} : { instead: { kind: instead } }) },
@@ -110,7 +110,7 @@ interface ChangeProps {
   state: TableState;
   table: Table;
   one: AcceptedReport;
-  onSend: (instead: Happening) => Promise<Outcome>;
+  onSend: (instead: ReportKind) => Promise<Outcome>;
   onClose: () => void;
 }
 
@@ -119,7 +119,7 @@ function Change({ state, table, one, onSend, onClose }: ChangeProps) {
   const words = t().attend;
   const [draft, setDraft] = useState<Draft>(() => draftBefore(table, one));
   const [outcome, setOutcome] = useState<Outcome | undefined>(undefined);
-  const send = async (instead: Happening) => {
+  const send = async (instead: ReportKind) => {
     const came = await onSend(instead);
     if (came.kind === "fault" || came.kind === "violation") setOutcome(came);
     else onClose();
@@ -130,7 +130,7 @@ function Change({ state, table, one, onSend, onClose }: ChangeProps) {
     draft,
     seat: one.seat,
     change: (changed: Partial<Draft>) => setDraft((before) => ({ ...before, ...changed })),
-    send: (what: Happening) => void send(what),
+    send: (what: ReportKind) => void send(what),
     fixed: true,
   };
   const kind = one.content?.kind.case;

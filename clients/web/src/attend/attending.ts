@@ -16,7 +16,7 @@ import {
 } from "../gen/chefshat/v1/table_service_pb";
 
 /** What happened, as it is reported. */
-export type Happening = NonNullable<MessageInitShape<typeof TableReportSchema>["kind"]> & { case: string };
+export type ReportKind = NonNullable<MessageInitShape<typeof TableReportSchema>["kind"]> & { case: string };
 
 /** What came of the last report, as far as the state of the table does not show it. */
 export type Outcome =
@@ -29,7 +29,7 @@ export type Outcome =
   | { readonly kind: "fault"; readonly words: string };
 
 /** Reports something; resolves to what came of it. */
-export type Report = (what: Happening) => Promise<Outcome>;
+export type Report = (what: ReportKind) => Promise<Outcome>;
 
 export interface Attending {
   /** Undefined before the first message. */

@@ -4,7 +4,7 @@
 use chefshat_engine::{DecisionKind, Opening, Role, Seat, Viewer};
 
 use super::{Judged, Referee};
-use crate::counts::{Counts, NOTHING, add_action, counts_of, size_of};
+use crate::counts::{Counts, NOTHING, counts_of, size_of};
 use crate::judge::as_cards;
 use crate::shift::Act;
 use crate::words::counts_text;
@@ -243,11 +243,4 @@ impl Referee {
         entry.confirmed = true;
         Verdict::Accepted
     }
-}
-
-/// The cards of an action as counts.
-pub(super) fn counts_of_action(action: chefshat_engine::Action) -> Counts {
-    let mut counts = NOTHING;
-    add_action(&mut counts, action);
-    counts
 }

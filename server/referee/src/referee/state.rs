@@ -6,8 +6,8 @@ use chefshat_engine::{
 };
 
 use super::Referee;
-use crate::counts::{NOTHING, add_action};
-use crate::shift::{Act, Played, Shift, cards_of, gifts_of};
+use crate::counts::{NOTHING, add_action, cards_of, counts_of_action};
+use crate::shift::{Act, Played, Shift, gifts_of};
 use crate::words::{cards_text, counts_text};
 use crate::{Report, Stage, ToLay};
 
@@ -323,8 +323,7 @@ fn rarest(hand: Cards, size: u8) -> Option<Cards> {
 }
 
 fn cards_of_action(rules: &RuleSet, action: Action, opening: bool) -> Cards {
-    let mut counts = NOTHING;
-    add_action(&mut counts, action);
+    let counts = counts_of_action(action);
     let golden =
         opening && rules.opening() == Opening::Golden && counts[usize::from(rules.faces()) - 1] > 0;
     cards_of(rules, &counts, golden).unwrap_or_default()

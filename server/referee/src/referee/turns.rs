@@ -4,8 +4,8 @@ use chefshat_engine::{
     Action, DecisionKind, Face, Game, PlayRequirement, Requirement, Seat, Viewer,
 };
 
-use super::before::counts_of_action;
 use super::{Answer, Asked, Doubt, Judged, MAX_ANSWERS, MAX_HELD, QUESTION_PREFIX, Referee};
+use crate::counts::counts_of_action;
 use crate::judge::{as_play, check_play};
 use crate::shift::{Act, Entry, Misfit, Shift, play};
 use crate::words::turn_text;
