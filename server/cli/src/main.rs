@@ -4,6 +4,7 @@ mod agent;
 mod board;
 mod check_agent;
 mod compare;
+mod config;
 mod conformance;
 mod connect;
 mod data_dir;
@@ -11,6 +12,7 @@ mod demo;
 mod error;
 mod experiment;
 mod export;
+mod generate;
 mod import;
 mod kind;
 mod leaderboard;
@@ -63,6 +65,8 @@ struct Cli {
 enum Command {
     /// Run a server that hosts rooms.
     Serve(serve::Serve),
+    /// Print the configuration of a server, with the source of each value.
+    Config(config::ConfigCommand),
     /// Run a server and agents over real connections, and watch their game.
     Demo(demo::Demo),
     /// Play on a server as a built-in agent.
@@ -103,13 +107,33 @@ enum Command {
     Import(import::Import),
     /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
+    /// Print a completion script for a shell.
+    Completions(generate::Completions),
+    /// Write manual pages.
+    Man(generate::Man),
 }
 
 /// Runs the command.
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let result = start_logging(&cli).and_then(|()| match cli.command {
+    let result = config::Parsed::from_process().and_then(|parsed| {
+        start_logging(&parsed.cli)?;
+        run(parsed)
+    });
+    match result {
+        Ok(code) => code,
+        // The reader of the output has closed the pipe, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            anstream::eprintln!("chefshat: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(parsed: config::Parsed) -> Result<ExitCode, CommandError> {
+    match parsed.cli.command {
         Command::Serve(command) => in_runtime(command.run()),
+        Command::Config(ref command) => parsed.print(command),
         Command::Demo(command) => in_runtime(command.run()),
         Command::Agent(command) => in_runtime(command.run()),
         Command::Play(command) => in_runtime(command.run()),
@@ -130,15 +154,8 @@ fn main() -> ExitCode {
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Participant(command) => in_runtime(command.run()),
-    });
-    match result {
-        Ok(code) => code,
-        // The reader of the output has closed the pipe, as `head` does.
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            anstream::eprintln!("chefshat: {error}");
-            ExitCode::FAILURE
-        }
+        Command::Completions(command) => command.run(),
+        Command::Man(command) => command.run(),
     }
 }
 

@@ -18,13 +18,14 @@ use chefshat_server::serve::Server;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_server::web;
 
-/// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the
-/// web page.
+/// The settings of a server. Each has a flag, an environment variable, a key in the file of
+/// `--config` and a default; see `config.rs`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
-)]
-pub(super) struct Serve {
+pub(super) struct Settings {
+    /// Read settings from a TOML file: its keys are the names of these flags, such as max-rooms = 100.
+    /// Flags and environment variables override it.
+    #[arg(long, env = "CHEFSHAT_CONFIG", value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
     /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 selects a
     /// free port.
     #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
@@ -58,6 +59,17 @@ pub(super) struct Serve {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
+}
+
+/// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the
+/// web page.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
+)]
+pub(super) struct Serve {
+    #[command(flatten)]
+    pub(super) settings: Settings,
     /// Stop when standard input ends: for a program that starts its own server and may die at any
     /// time.
     #[arg(long)]
@@ -69,18 +81,19 @@ pub(super) struct Serve {
 
 impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let settings = self.settings;
         // Not a clap conflict: clap would treat a variable that is set to false as present.
-        let data_dir = match (self.no_records, self.data_dir) {
+        let data_dir = match (settings.no_records, settings.data_dir) {
             (true, None) => None,
             (true, Some(_)) => {
                 return Err("--no-records and --data-dir cannot be used together".into());
             }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
-        let listener = TcpListener::bind(&self.listen).await.map_err(|error| {
+        let listener = TcpListener::bind(&settings.listen).await.map_err(|error| {
             format!(
                 "cannot listen on {}: {error}; choose another address with --listen",
-                self.listen
+                settings.listen
             )
         })?;
         let store: Arc<dyn Store> = match &data_dir {
@@ -92,14 +105,14 @@ impl Serve {
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
-        let grace = self.grace;
+        let grace = settings.grace;
         let config = ServerConfig {
             data_dir,
-            max_rooms: self.max_rooms,
-            vector_threads: self.vector_threads,
-            allow_import: self.allow_import,
-            grace: Duration::from_secs(self.grace),
-            allowed_origins: (self.allowed_origins.into_iter())
+            max_rooms: settings.max_rooms,
+            vector_threads: settings.vector_threads,
+            allow_import: settings.allow_import,
+            grace: Duration::from_secs(settings.grace),
+            allowed_origins: (settings.allowed_origins.into_iter())
                 .filter(|origin| !origin.is_empty())
                 .collect(),
             ..ServerConfig::default()

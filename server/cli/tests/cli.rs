@@ -10,6 +10,7 @@ mod cli {
     mod branching;
     mod check_agent;
     mod compare;
+    mod config;
     mod conformance;
     mod demo;
     mod experiment;

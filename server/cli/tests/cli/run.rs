@@ -19,7 +19,7 @@ pub(super) struct Ended {
 }
 
 impl Ended {
-    fn of(output: Output) -> Self {
+    pub(super) fn of(output: Output) -> Self {
         Self {
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),
