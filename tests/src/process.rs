@@ -29,6 +29,7 @@ pub fn set_up(name: &str) -> PathBuf {
 #[derive(Debug)]
 pub struct Launch {
     data_dir: PathBuf,
+    binary: Option<PathBuf>,
     listen: String,
     arguments: Vec<String>,
     through: Vec<OsString>,
@@ -39,10 +40,26 @@ impl Launch {
     pub fn new(data_dir: &Path) -> Self {
         Self {
             data_dir: data_dir.to_path_buf(),
+            binary: None,
             listen: format!("{}:0", own_address()),
             arguments: Vec::new(),
             through: Vec::new(),
         }
+    }
+
+    /// Starts this binary instead of the one that `cargo xtask test` builds.
+    #[must_use]
+    pub fn binary(mut self, binary: &Path) -> Self {
+        self.binary = Some(binary.to_path_buf());
+        self
+    }
+
+    /// Adds options of `chefshat serve` that have no value.
+    #[must_use]
+    pub fn flags(mut self, flags: &[&str]) -> Self {
+        self.arguments
+            .extend(flags.iter().map(|flag| (*flag).to_owned()));
+        self
     }
 
     /// Adds an option of `chefshat serve`.
@@ -77,7 +94,8 @@ impl Launch {
     /// Starts the process without waiting for it.
     pub fn spawn(&self) -> Process {
         let mut words = self.through.iter().cloned();
-        let binary = set_up("CHEFSHAT_BIN").into_os_string();
+        let binary = (self.binary.clone()).unwrap_or_else(|| set_up("CHEFSHAT_BIN"));
+        let binary = binary.into_os_string();
         let mut command = Command::new(words.next().unwrap_or_else(|| binary.clone()));
         if !self.through.is_empty() {
             command.args(words).arg(binary);

@@ -77,6 +77,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat", &["*"]),
     ("chefshat-tests", &["*"]),
     (
+        "chefshat-hostile",
+        &["chefshat-proto", "chefshat-client", "chefshat-tests"],
+    ),
+    (
         "chefshat-load",
         &["chefshat-proto", "chefshat-client", "chefshat-server"],
     ),

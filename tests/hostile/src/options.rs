@@ -1,0 +1,90 @@
+//! The command line. The README of this crate explains the figures.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Parser;
+
+use crate::attacks::{ATTACKS, Attack};
+use crate::error::HostileError;
+
+/// Maximum length of a phase, seconds.
+const MAX_SECONDS: f64 = 600.0;
+
+/// Attack a Chef's Hat server while an honest room of four agents plays on it. Each attack gets a
+/// server of its own on the loopback interface; nothing else is contacted.
+#[derive(Debug, Parser)]
+#[command(
+    name = "chefshat-hostile",
+    version,
+    after_help = "Examples:\n  chefshat-hostile                          all attacks, about eight minutes\n  chefshat-hostile --attack ping-flood      one of them\n  chefshat-hostile --list                   their names\n  chefshat-hostile --server old/chefshat --json > before.json"
+)]
+pub(crate) struct Options {
+    /// Run only this attack. Repeatable.
+    #[arg(long = "attack", value_name = "NAME", value_parser = attack)]
+    only: Vec<&'static Attack>,
+    /// The server: the binary chefshat. Default: the one beside this program.
+    #[arg(long, value_name = "PROGRAM")]
+    server: Option<PathBuf>,
+    /// List the attacks.
+    #[arg(long, exclusive = true)]
+    list: bool,
+    /// Seconds that the honest room plays before the attack.
+    #[arg(long, default_value = "5", value_parser = seconds)]
+    pub(crate) quiet: Duration,
+    /// Seconds of the attack.
+    #[arg(long, default_value = "12", value_parser = seconds)]
+    pub(crate) seconds: Duration,
+    /// Seconds between the end of the attack and the last measurement of the memory.
+    #[arg(long, default_value = "5", value_parser = seconds)]
+    pub(crate) rest: Duration,
+    /// Divide all counts of the attacks by this number, to test that the program works.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    pub(crate) divide: u32,
+    /// Print one JSON document instead of a Markdown table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Options {
+    /// The attacks to run.
+    pub(crate) fn attacks(&self) -> Vec<&'static Attack> {
+        if self.list {
+            for attack in ATTACKS {
+                println!("{:24} {}", attack.name, attack.what);
+            }
+            return Vec::new();
+        }
+        match self.only.is_empty() {
+            true => ATTACKS.iter().collect(),
+            false => self.only.clone(),
+        }
+    }
+
+    /// The binary of the server.
+    pub(crate) fn server(&self) -> Result<PathBuf, HostileError> {
+        let path = match &self.server {
+            Some(path) => path.clone(),
+            None => std::env::current_exe()
+                .map_err(HostileError::io("finding this program"))?
+                .with_file_name("chefshat"),
+        };
+        match path.is_file() {
+            true => Ok(path),
+            false => Err(HostileError::NoServer(path)),
+        }
+    }
+}
+
+fn attack(name: &str) -> Result<&'static Attack, String> {
+    (ATTACKS.iter().find(|attack| attack.name == name))
+        .ok_or_else(|| format!("there is no attack {name:?}; --list shows them"))
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .filter(|seconds| (0.0..=MAX_SECONDS).contains(seconds))
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| format!("{text:?} is not a number of seconds from 0 to {MAX_SECONDS}"))
+}
