@@ -3,12 +3,16 @@
 //!
 //! `cargo run --release -p chefshat-client --example many_games -- [SERVER]`
 
-use chefshat_client::{Client, RandomAgent, v1};
+use chefshat_client::{Client, ConnectOptions, RandomAgent, v1};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let server = std::env::args().nth(1);
-    let client = Client::connect(server.as_deref().unwrap_or("localhost:50051")).await?;
+    let client = Client::connect_with(
+        server.as_deref().unwrap_or("localhost:50051"),
+        &ConnectOptions::from_env(),
+    )
+    .await?;
     let setup = v1::VectorSetup {
         games: 256,
         client_seats: vec![0],

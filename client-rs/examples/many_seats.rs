@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p chefshat-client --example many_seats -- [SERVER]`
 
-use chefshat_client::{ActionId, Agent, Client, RandomAgent, legal_actions, v1};
+use chefshat_client::{ActionId, Agent, Client, ConnectOptions, RandomAgent, legal_actions, v1};
 
 /// Takes the first legal action: the rarest playable face with the fewest cards.
 struct First;
@@ -18,7 +18,11 @@ impl Agent for First {
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let server = std::env::args().nth(1);
-    let client = Client::connect(server.as_deref().unwrap_or("localhost:50051")).await?;
+    let client = Client::connect_with(
+        server.as_deref().unwrap_or("localhost:50051"),
+        &ConnectOptions::from_env(),
+    )
+    .await?;
 
     let request = v1::CreateRoomRequest {
         name: "many seats".to_owned(),

@@ -3,7 +3,7 @@
 //!
 //! `cargo run -p chefshat-client --example random_agent -- JOIN-CODE [SERVER]`
 
-use chefshat_client::{Client, RandomAgent};
+use chefshat_client::{Client, ConnectOptions, RandomAgent};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,7 +11,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let code = args.next().ok_or("give the room's join code")?;
     let server = args.next().unwrap_or_else(|| "localhost:50051".to_owned());
 
-    let client = Client::connect(server).await?;
+    let client = Client::connect_with(server, &ConnectOptions::from_env()).await?;
     let joined = client.join_with_code(code, "random").await?;
     println!("seat {}, waiting for the others", joined.seat);
 

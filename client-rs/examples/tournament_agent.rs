@@ -3,7 +3,7 @@
 //!
 //! `cargo run -p chefshat-client --example tournament_agent -- JOIN-CODE [NAME] [SERVER]`
 
-use chefshat_client::{Client, RandomAgent, v1};
+use chefshat_client::{Client, ConnectOptions, RandomAgent, v1};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -12,7 +12,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let name = args.next().unwrap_or_else(|| "random".to_owned());
     let server = args.next().unwrap_or_else(|| "localhost:50051".to_owned());
 
-    let client = Client::connect(server).await?;
+    let client = Client::connect_with(server, &ConnectOptions::from_env()).await?;
     let request = v1::JoinTournamentRequest {
         join_code,
         name,

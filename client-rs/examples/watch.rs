@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p chefshat-client --example watch -- ROOM-ID [SERVER]`
 
-use chefshat_client::{Client, v1::game_event::Kind};
+use chefshat_client::{Client, ConnectOptions, v1::game_event::Kind};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -10,7 +10,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let room_id = args.next().ok_or("give the room's id")?;
     let server = args.next().unwrap_or_else(|| "localhost:50051".to_owned());
 
-    let client = Client::connect(server).await?;
+    let client = Client::connect_with(server, &ConnectOptions::from_env()).await?;
     let mut spectator = client.spectate(room_id, 1);
     let mut texts = Vec::new();
     while let Some(event) = spectator.next().await? {

@@ -4,7 +4,7 @@
 
 use tonic::transport::Channel;
 
-use crate::connection::{self, MAX_RESPONSE_BYTES};
+use crate::connection::{self, ConnectOptions, Connection, MAX_RESPONSE_BYTES};
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
 use crate::v1::act_request::Command;
@@ -17,29 +17,42 @@ use crate::{Agent, Error, Outcome, PlayError, PlayOptions, Spectator, run, v1};
 /// A connection to a server, restored automatically when it is lost.
 #[derive(Clone, Debug)]
 pub struct Client {
-    channel: Channel,
+    connection: Connection,
 }
 
 impl Client {
-    /// Connects to a server at `http://host:port`, or `host:port`.
+    /// Connects to a server at `https://host`, `http://host:port` or `host:port`, without a token.
     ///
     /// # Errors
-    /// `ADDRESS_REFUSED` for an address without a port or with another scheme (for TLS, create a
-    /// channel and use [`from_channel`](Self::from_channel)); `CONNECT_FAILED` if no server answers
-    /// within five seconds.
+    /// `ADDRESS_REFUSED` for another scheme, or `http://` without a port; `CONNECT_FAILED` if no
+    /// server answers within five seconds; `TLS_FAILED` if the server's certificate is not trusted
+    /// or the server does not use TLS.
     pub async fn connect(url: impl AsRef<str>) -> Result<Self, Error> {
-        let channel = connection::connect(url.as_ref()).await?;
-        Ok(Self::from_channel(channel))
+        Self::connect_with(url, &ConnectOptions::default()).await
     }
 
-    /// Uses an existing channel: with TLS, over a Unix socket, on a simulated network.
+    /// [`connect`](Self::connect) with options.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect); `CA_REFUSED` if the file of certificate authorities cannot be
+    /// used, `TOKEN_REFUSED` for a token with characters that no token has.
+    pub async fn connect_with(
+        url: impl AsRef<str>,
+        options: &ConnectOptions,
+    ) -> Result<Self, Error> {
+        let connection = connection::connect(url.as_ref(), options).await?;
+        Ok(Self { connection })
+    }
+
+    /// Uses an existing channel, without a token: over a Unix socket, on a simulated network.
     pub fn from_channel(channel: Channel) -> Self {
-        Self { channel }
+        let connection = Connection::without_token(channel);
+        Self { connection }
     }
 
-    /// The channel, for calls of the protocol without a method here.
-    pub fn channel(&self) -> Channel {
-        self.channel.clone()
+    /// The connection, for calls of the protocol without a method here.
+    pub fn channel(&self) -> Connection {
+        self.connection.clone()
     }
 
     /// The server's version, limits and features.

@@ -1,18 +1,27 @@
-//! Opening a connection: address, keepalive and limits.
+//! Opening a connection: address, TLS, token, keepalive and limits.
 
+use std::error::Error as _;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::task::{Context, Poll};
 use std::time::Duration;
 
-use tonic::transport::{Channel, Endpoint};
+use tonic::body::Body;
+use tonic::codegen::{Service, http};
+use tonic::transport::channel::ResponseFuture;
+use tonic::transport::{Certificate, Channel, ClientTlsConfig, Endpoint};
 
 use crate::Error;
 use crate::error::with_causes;
 
 /// Time limit for connecting.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Silence after which a connection is probed.
-const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(20);
-/// Time limit for the answer to a probe; after it the connection is closed.
-const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Silence on open streams after which a connection is probed. Together with the timeout it is
+/// shorter than the default time for a decision: ten seconds.
+const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(3);
+/// Time limit for the answer to a probe; after it the connection is closed. Longer than a round
+/// trip on a bad network.
+const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Bytes that the server may send on a stream before the client reads them: enough for messages to
 /// hundreds of seats.
 const STREAM_WINDOW_BYTES: u32 = 1 << 20;
@@ -20,9 +29,86 @@ const STREAM_WINDOW_BYTES: u32 = 1 << 20;
 const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
 /// Maximum size of a response: enough for the history of hundreds of seats in one message.
 pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;
+/// First line of each certificate in a PEM file.
+const PEM_CERTIFICATE: &[u8] = b"-----BEGIN CERTIFICATE-----";
 
-/// Connects to `http://host:port` or `host:port`.
-pub(crate) async fn connect(url: &str) -> Result<Channel, Error> {
+/// How to connect to a server.
+#[derive(Clone, Default)]
+pub struct ConnectOptions {
+    /// Token sent with every call, from `chefshat token create`. Over `http://` it is readable on
+    /// the way.
+    pub token: Option<String>,
+    /// PEM file of the certificate authorities to trust with `https://`, instead of the system's.
+    pub ca: Option<PathBuf>,
+}
+
+impl ConnectOptions {
+    /// The token from `CHEFSHAT_TOKEN` and the authorities from `CHEFSHAT_CA`, where set.
+    pub fn from_env() -> Self {
+        let set = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+        Self {
+            token: set("CHEFSHAT_TOKEN").map(|token| token.to_string_lossy().into_owned()),
+            ca: set("CHEFSHAT_CA").map(PathBuf::from),
+        }
+    }
+}
+
+impl fmt::Debug for ConnectOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let token = self.token.as_ref().map(|_| "hidden");
+        f.debug_struct("ConnectOptions")
+            .field("token", &token)
+            .field("ca", &self.ca)
+            .finish()
+    }
+}
+
+/// A channel that sends a token with every call, if there is one. For the clients generated from
+/// the protocol.
+#[derive(Clone, Debug)]
+pub struct Connection {
+    channel: Channel,
+    /// Marked as sensitive: never printed.
+    authorization: Option<http::HeaderValue>,
+}
+
+impl Connection {
+    pub(crate) fn without_token(channel: Channel) -> Self {
+        Self {
+            channel,
+            authorization: None,
+        }
+    }
+}
+
+fn authorization(token: &str) -> Result<http::HeaderValue, Error> {
+    let mut value = http::HeaderValue::try_from(format!("Bearer {}", token.trim()))
+        .map_err(|_| Error::token())?;
+    value.set_sensitive(true);
+    Ok(value)
+}
+
+impl Service<http::Request<Body>> for Connection {
+    type Response = http::Response<Body>;
+    type Error = tonic::transport::Error;
+    type Future = ResponseFuture;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        Service::poll_ready(&mut self.channel, context)
+    }
+
+    fn call(&mut self, mut request: http::Request<Body>) -> Self::Future {
+        if let Some(value) = &self.authorization {
+            let headers = request.headers_mut();
+            headers.insert(http::header::AUTHORIZATION, value.clone());
+        }
+        self.channel.call(request)
+    }
+}
+
+/// Connects to `https://host`, `http://host:port` or `host:port`.
+pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Connection, Error> {
+    let authorization = (options.token.as_deref()).map(authorization).transpose()?;
     let address = if url.contains("://") {
         url.to_owned()
     } else {
@@ -30,21 +116,65 @@ pub(crate) async fn connect(url: &str) -> Result<Channel, Error> {
     };
     let endpoint = Endpoint::from_shared(address)
         .map_err(|cause| Error::address(url, &with_causes(&cause)))?;
-    if endpoint.uri().scheme_str() != Some("http") {
-        return Err(Error::address(url, "only plain http:// is spoken here"));
-    }
-    if endpoint.uri().port().is_none() {
-        return Err(Error::address(url, "the port is missing"));
-    }
-    endpoint
+    let endpoint = match endpoint.uri().scheme_str() {
+        Some("https") => endpoint
+            .tls_config(trust(options.ca.as_deref())?)
+            .map_err(|cause| Error::tls(url, &with_causes(&cause)))?,
+        Some("http") if endpoint.uri().port().is_none() => {
+            return Err(Error::address(url, "the port is missing"));
+        }
+        Some("http") => endpoint,
+        _ => return Err(Error::address(url, "the scheme is unknown")),
+    };
+    let channel = endpoint
         .connect_timeout(CONNECT_TIMEOUT)
         .tcp_nodelay(true)
         .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
         .keep_alive_timeout(KEEPALIVE_TIMEOUT)
-        .keep_alive_while_idle(true)
         .initial_stream_window_size(STREAM_WINDOW_BYTES)
         .initial_connection_window_size(CONNECTION_WINDOW_BYTES)
         .connect()
         .await
-        .map_err(|cause| Error::connect(url, &cause))
+        .map_err(|cause| {
+            if is_tls(&cause) {
+                Error::tls(url, &with_causes(&cause))
+            } else {
+                Error::connect(url, &cause)
+            }
+        })?;
+    Ok(Connection {
+        channel,
+        authorization,
+    })
+}
+
+/// The authorities of a PEM file, or those of the system.
+fn trust(ca: Option<&Path>) -> Result<ClientTlsConfig, Error> {
+    let tls = ClientTlsConfig::new();
+    let Some(file) = ca else {
+        return Ok(tls.with_native_roots());
+    };
+    let pem = std::fs::read(file).map_err(|cause| Error::ca(file, &cause.to_string()))?;
+    let has_certificate = pem
+        .windows(PEM_CERTIFICATE.len())
+        .any(|bytes| bytes == PEM_CERTIFICATE);
+    if !has_certificate {
+        return Err(Error::ca(file, "it contains no certificate in PEM form"));
+    }
+    Ok(tls.ca_certificate(Certificate::from_pem(pem)))
+}
+
+/// Whether TLS failed, rather than the connection below it.
+fn is_tls(error: &tonic::transport::Error) -> bool {
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let inside = error
+            .downcast_ref::<std::io::Error>()
+            .and_then(std::io::Error::get_ref);
+        if error.is::<rustls::Error>() || inside.is_some_and(|it| it.is::<rustls::Error>()) {
+            return true;
+        }
+        cause = error.source();
+    }
+    false
 }

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::error::Error as _;
 use std::fmt;
+use std::path::Path;
 use std::time::Duration;
 
 use tonic::{Code, Status};
@@ -15,6 +16,12 @@ use crate::v1;
 const ADDRESS_REFUSED: &str = "ADDRESS_REFUSED";
 /// Reason of a failed connection; set by the client.
 const CONNECT_FAILED: &str = "CONNECT_FAILED";
+/// Reason of a connection on which TLS failed; set by the client.
+const TLS_FAILED: &str = "TLS_FAILED";
+/// Reason of an unusable file of certificate authorities; set by the client.
+const CA_REFUSED: &str = "CA_REFUSED";
+/// Reason of a malformed token; set by the client.
+const TOKEN_REFUSED: &str = "TOKEN_REFUSED";
 /// Reason of a response without a required part; set by the client.
 const RESPONSE_INCOMPLETE: &str = "RESPONSE_INCOMPLETE";
 
@@ -37,8 +44,8 @@ impl Error {
     }
 
     /// The reason in UPPER_SNAKE, for example `JOIN_CODE_WRONG`; `None` if there is none, as after
-    /// a lost connection. The client itself sets `ADDRESS_REFUSED`, `CONNECT_FAILED`,
-    /// `RESPONSE_INCOMPLETE` and `STEP_GIVEN_UP`.
+    /// a lost connection. The client itself sets `ADDRESS_REFUSED`, `CA_REFUSED`,
+    /// `CONNECT_FAILED`, `RESPONSE_INCOMPLETE`, `STEP_GIVEN_UP`, `TLS_FAILED` and `TOKEN_REFUSED`.
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
@@ -63,14 +70,32 @@ impl Error {
     }
 
     pub(crate) fn address(url: &str, cause: &str) -> Self {
-        let message =
-            format!("{url:?} is not the address of a server, give http://HOST:PORT: {cause}");
+        let message = format!(
+            "{url:?} is not the address of a server, give http://HOST:PORT or https://HOST: {cause}"
+        );
         Self::own(Code::InvalidArgument, ADDRESS_REFUSED, message)
     }
 
     pub(crate) fn connect(url: &str, cause: &tonic::transport::Error) -> Self {
         let message = format!("cannot connect to {url}: {}", with_causes(cause));
         Self::own(Code::Unavailable, CONNECT_FAILED, message)
+    }
+
+    pub(crate) fn tls(url: &str, cause: &str) -> Self {
+        let message = format!(
+            "no secure connection to {url}: {cause}; for a certificate of a private authority, give the authority's file (--ca or CHEFSHAT_CA)"
+        );
+        Self::own(Code::Unavailable, TLS_FAILED, message)
+    }
+
+    pub(crate) fn ca(file: &Path, cause: &str) -> Self {
+        let message = format!("cannot use the authorities of {}: {cause}", file.display());
+        Self::own(Code::InvalidArgument, CA_REFUSED, message)
+    }
+
+    pub(crate) fn token() -> Self {
+        let message = "the token is malformed; copy it as `chefshat token create` printed it";
+        Self::own(Code::InvalidArgument, TOKEN_REFUSED, message.to_owned())
     }
 
     pub(crate) fn incomplete(part: &str) -> Self {

@@ -6,11 +6,10 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::connection::MAX_RESPONSE_BYTES;
+use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::{PlayError, may_retry};
 use crate::session::Session;
 use crate::v1::{self, play_service_client::PlayServiceClient};
@@ -32,7 +31,7 @@ struct Lost {
 
 /// Plays until every seat of the session is settled.
 pub(crate) async fn run<A: Agent>(
-    channel: Channel,
+    channel: Connection,
     session: &mut Session<'_, A>,
     backoff: &Backoff,
 ) {
@@ -69,7 +68,7 @@ pub(crate) async fn run<A: Agent>(
 
 /// Runs one stream, until the session is over or the stream breaks.
 async fn converse<A: Agent>(
-    client: &mut PlayServiceClient<Channel>,
+    client: &mut PlayServiceClient<Connection>,
     session: &mut Session<'_, A>,
 ) -> Result<(), Lost> {
     let attach = session.attach();
@@ -109,7 +108,7 @@ async fn converse<A: Agent>(
 }
 
 async fn open(
-    client: &mut PlayServiceClient<Channel>,
+    client: &mut PlayServiceClient<Connection>,
     queue: mpsc::Receiver<v1::PlayRequest>,
 ) -> Result<Streaming<v1::PlayResponse>, Status> {
     let call = client.play(ReceiverStream::new(queue));

@@ -4,18 +4,17 @@ use std::collections::VecDeque;
 
 use futures::Stream;
 use tokio::time::Instant;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::connection::MAX_RESPONSE_BYTES;
+use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 
 /// A spectator of one room, created by [`Client::spectate`](crate::Client::spectate).
 #[derive(Debug)]
 pub struct Spectator {
-    client: SpectatorServiceClient<Channel>,
+    client: SpectatorServiceClient<Connection>,
     room_id: String,
     next_event: u64,
     backoff: Backoff,
@@ -27,7 +26,7 @@ pub struct Spectator {
 }
 
 impl Spectator {
-    pub(crate) fn new(channel: Channel, room_id: String, from_sequence: u64) -> Self {
+    pub(crate) fn new(channel: Connection, room_id: String, from_sequence: u64) -> Self {
         Self {
             client: SpectatorServiceClient::new(channel)
                 .max_decoding_message_size(MAX_RESPONSE_BYTES),

@@ -2,12 +2,11 @@
 
 use futures::Stream;
 use rand::TryRng as _;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
 use crate::client::Client;
-use crate::connection::MAX_RESPONSE_BYTES;
+use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
 use crate::repeat::repeated;
 use crate::v1::{self, table_service_client::TableServiceClient};
@@ -65,7 +64,7 @@ impl Client {
 /// Follows one table across lost connections; created by [`Client::follow_table`].
 #[derive(Debug)]
 pub struct TableFollower {
-    service: TableServiceClient<Channel>,
+    service: TableServiceClient<Connection>,
     table_ticket: String,
     backoff: Backoff,
     outage: Outage,
@@ -133,6 +132,6 @@ impl TableFollower {
     }
 }
 
-fn service(client: &Client) -> TableServiceClient<Channel> {
+fn service(client: &Client) -> TableServiceClient<Connection> {
     TableServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
 }

@@ -2,11 +2,10 @@
 //! updates of a participant.
 
 use futures::Stream;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::connection::MAX_RESPONSE_BYTES;
+use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::{Error, PlayError};
 use crate::participant::Participant;
 use crate::repeat::{identify, repeated};
@@ -253,7 +252,7 @@ impl Client {
 /// Follows one tournament across lost connections; created by [`Client::follow_tournament`].
 #[derive(Debug)]
 pub struct TournamentFollower {
-    service: TournamentServiceClient<Channel>,
+    service: TournamentServiceClient<Connection>,
     tournament_id: String,
     backoff: Backoff,
     outage: Outage,
@@ -323,7 +322,7 @@ impl TournamentFollower {
     }
 }
 
-fn service(client: &Client) -> TournamentServiceClient<Channel> {
+fn service(client: &Client) -> TournamentServiceClient<Connection> {
     TournamentServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
 }
 

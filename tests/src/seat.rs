@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
+use chefshat_client::Connection;
 use chefshat_proto::v1::{
     self, play_service_client::PlayServiceClient, seat_command::Command, seat_update::Update,
 };
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::TestServer;
@@ -26,7 +26,7 @@ pub struct StreamSeat {
 
 impl StreamSeat {
     /// A stream without attached seats.
-    pub async fn open(channel: Channel) -> Self {
+    pub async fn open(channel: Connection) -> Self {
         let (requests, receiver) = mpsc::channel(64);
         let responses = PlayServiceClient::new(channel)
             .play(ReceiverStream::new(receiver))
@@ -43,12 +43,12 @@ impl StreamSeat {
     }
 
     /// A stream with a seat attached from its first event on.
-    pub async fn attached(channel: Channel, ticket: &str) -> Self {
+    pub async fn attached(channel: Connection, ticket: &str) -> Self {
         Self::attached_from(channel, ticket, 0).await
     }
 
     /// A stream with a seat attached from this event on.
-    pub async fn attached_from(channel: Channel, ticket: &str, from_sequence: u64) -> Self {
+    pub async fn attached_from(channel: Connection, ticket: &str, from_sequence: u64) -> Self {
         let mut seat = Self::open(channel).await;
         seat.last_event = from_sequence.saturating_sub(1);
         seat.attach(v1::Attach {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_client::{Client, RandomAgent};
+use chefshat_client::{Client, Connection, RandomAgent};
 use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::{Host, HostError};
@@ -58,12 +58,13 @@ impl TestServer {
     }
 
     /// A separate connection to the server.
-    pub async fn channel(&self) -> Channel {
-        Channel::from_shared(self.url())
+    pub async fn channel(&self) -> Connection {
+        let channel = Channel::from_shared(self.url())
             .expect("a URL")
             .connect()
             .await
-            .expect("the server listens")
+            .expect("the server listens");
+        Client::from_channel(channel).channel()
     }
 
     /// An SDK client with a separate connection.

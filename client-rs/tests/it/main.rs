@@ -3,4 +3,5 @@
 
 mod fake;
 mod play;
+mod tls;
 mod watch;

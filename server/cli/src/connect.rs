@@ -1,10 +1,11 @@
 //! Connecting to a server: its address, waiting for a server that is starting or for a file with a
 //! join code.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use chefshat_client::{Client, v1};
+use chefshat_client::{Client, ConnectOptions, v1};
 use clap::Args;
 use tokio::time::{Instant, sleep};
 
@@ -15,10 +16,10 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(30);
 /// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// The server.
-#[derive(Debug, Clone, Args)]
+/// The server, and what it takes to be let in.
+#[derive(Clone, Args)]
 pub(super) struct ServerArg {
-    /// Address of the server.
+    /// Address of the server, https:// for TLS.
     #[arg(
         long,
         env = "CHEFSHAT_SERVER",
@@ -26,6 +27,19 @@ pub(super) struct ServerArg {
         default_value = "http://127.0.0.1:50051"
     )]
     server: String,
+    /// Token of the server's operator, from `chefshat token create`.
+    #[arg(long, env = "CHEFSHAT_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    /// PEM file of the certificate authorities to trust, instead of the system's.
+    #[arg(long, env = "CHEFSHAT_CA", value_name = "FILE")]
+    ca: Option<PathBuf>,
+}
+
+/// Leaves out the token.
+impl fmt::Debug for ServerArg {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("ServerArg").field(&self.server).finish()
+    }
 }
 
 impl ServerArg {
@@ -34,14 +48,25 @@ impl ServerArg {
         &self.server
     }
 
+    async fn attempt(&self) -> Result<Client, chefshat_client::Error> {
+        let options = ConnectOptions {
+            token: self.token.clone().filter(|token| !token.is_empty()),
+            ca: self.ca.clone(),
+        };
+        Client::connect_with(&self.server, &options).await
+    }
+
     /// Connects without a retry.
     ///
     /// # Errors
-    /// The server does not answer, or the address is invalid.
+    /// The server does not answer or is not trusted, or an argument is invalid.
     pub(super) async fn connect(&self) -> Result<Client, CommandError> {
-        Client::connect(&self.server).await.map_err(|error| {
-            let hint = "start one there with `chefshat serve`, or name another with --server";
-            format!("{}; {hint}", error.message()).into()
+        self.attempt().await.map_err(|error| match error.reason() {
+            Some("CONNECT_FAILED") => {
+                let hint = "start one there with `chefshat serve`, or name another with --server";
+                format!("{}; {hint}", error.message()).into()
+            }
+            _ => error.message().into(),
         })
     }
 
@@ -53,7 +78,7 @@ impl ServerArg {
         let give_up_at = Instant::now() + PATIENCE;
         let mut announced = false;
         loop {
-            match Client::connect(&self.server).await {
+            match self.attempt().await {
                 Ok(client) => return Ok(client),
                 Err(error) if error.reason() == Some("CONNECT_FAILED") => {
                     if Instant::now() + PAUSE > give_up_at {

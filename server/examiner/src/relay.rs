@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use chefshat_client::Connection;
 use chefshat_proto::v1::{
     self,
     play_service_client::PlayServiceClient,
@@ -17,7 +18,7 @@ use tokio::sync::{Notify, mpsc};
 use tokio::time::{Instant, timeout};
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
 use tonic::service::Routes;
-use tonic::transport::{Channel, Server};
+use tonic::transport::Server;
 use tonic::{Request, Response, Status, Streaming};
 use tower::{Service as _, ServiceExt as _};
 
@@ -80,7 +81,7 @@ impl Desk {
 /// Serves the examiner on a socket, in front of a server, until the future is dropped.
 pub(super) async fn serve(
     listener: TcpListener,
-    server: Channel,
+    server: Connection,
     desk: Arc<Desk>,
 ) -> Result<(), tonic::transport::Error> {
     let play = PlayServiceServer::new(Play {
@@ -105,7 +106,7 @@ pub(super) async fn serve(
 
 /// Forwards a call unchanged.
 async fn through(
-    mut server: Channel,
+    mut server: Connection,
     request: http::Request<axum::body::Body>,
 ) -> Result<http::Response<tonic::body::Body>, Infallible> {
     let request = request.map(tonic::body::Body::new);
@@ -117,7 +118,7 @@ async fn through(
 }
 
 struct Rooms {
-    server: RoomServiceClient<Channel>,
+    server: RoomServiceClient<Connection>,
     desk: Arc<Desk>,
 }
 
@@ -172,12 +173,12 @@ impl RoomService for Rooms {
 }
 
 struct Play {
-    server: Channel,
+    server: Connection,
     desk: Arc<Desk>,
 }
 
 impl Play {
-    fn server(&self) -> PlayServiceClient<Channel> {
+    fn server(&self) -> PlayServiceClient<Connection> {
         PlayServiceClient::new(self.server.clone()).max_decoding_message_size(MAX_RESPONSE_BYTES)
     }
 }

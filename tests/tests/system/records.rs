@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_client::Connection;
 use chefshat_proto::v1::{
     self, record_line::Line, record_service_client::RecordServiceClient,
     tournament_service_client::TournamentServiceClient,
@@ -12,7 +13,6 @@ use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
 use futures::TryStreamExt as _;
 use tempfile::TempDir;
-use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
@@ -52,12 +52,12 @@ async fn stores() -> Vec<(Arc<dyn Store>, Option<TempDir>)> {
     ]
 }
 
-async fn service(server: &TestServer) -> RecordServiceClient<Channel> {
+async fn service(server: &TestServer) -> RecordServiceClient<Connection> {
     RecordServiceClient::new(server.channel().await)
 }
 
 async fn record(
-    service: &mut RecordServiceClient<Channel>,
+    service: &mut RecordServiceClient<Connection>,
     game_id: &str,
 ) -> Result<Vec<v1::RecordLine>, Status> {
     let request = v1::GetRecordRequest {
@@ -73,7 +73,7 @@ async fn record(
 }
 
 async fn import(
-    service: &mut RecordServiceClient<Channel>,
+    service: &mut RecordServiceClient<Connection>,
     lines: &[v1::RecordLine],
 ) -> Result<v1::RecordSummary, Status> {
     let parts: Vec<_> = lines
@@ -98,7 +98,7 @@ pub(crate) fn reason(status: &Status) -> String {
 
 /// All records, page by page.
 async fn listed(
-    service: &mut RecordServiceClient<Channel>,
+    service: &mut RecordServiceClient<Connection>,
     newest_first: bool,
 ) -> Vec<v1::RecordSummary> {
     let mut listed = Vec::new();

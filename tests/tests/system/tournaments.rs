@@ -1,15 +1,14 @@
 //! Tournaments from the view of participants, over real connections: seated by the server, placed
 //! last if absent. `tournament_deals` tests withheld deals, `tournament_refusals` refusals.
 
-use chefshat_client::Client;
+use chefshat_client::{Client, Connection};
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
 use chefshat_proto::v1::{
     self, Answer, game_event::Kind, record_line::Line, seat_command::Command, seat_update::Update,
 };
 use chefshat_tests::{StreamSeat, TestServer, first_legal, one_shift, patiently};
-use tonic::transport::Channel;
 
-pub(crate) type Tournaments = TournamentServiceClient<Channel>;
+pub(crate) type Tournaments = TournamentServiceClient<Connection>;
 
 pub(crate) async fn create(
     service: &mut Tournaments,

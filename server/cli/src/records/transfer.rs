@@ -7,12 +7,11 @@ use std::process::ExitCode;
 
 use chefshat_client::v1::record_service_client::RecordServiceClient;
 use chefshat_client::v1::{self, RecordLine, record_line::Line};
-use chefshat_client::{Client, Error};
+use chefshat_client::{Client, Connection, Error};
 use chefshat_record::jsonl;
 use clap::Args;
 use indicatif::ProgressBar;
 use prost::Message as _;
-use tonic::transport::Channel;
 
 use super::super::connect::ServerArg;
 use super::super::{CommandError, progress, say};
@@ -162,7 +161,7 @@ impl Import {
     }
 }
 
-fn service(client: &Client) -> RecordServiceClient<Channel> {
+fn service(client: &Client) -> RecordServiceClient<Connection> {
     RecordServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
 }
 
