@@ -7,8 +7,8 @@ use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, Seat, Viewer};
 
 use super::{
-    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, MAX_IDLE, RECALL_TIME, RECHECK_INTERVAL,
-    REPLAY_COST, State,
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, MAX_IDLE, OpenDecision, RECALL_TIME,
+    RECHECK_INTERVAL, REPLAY_COST, State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
@@ -38,7 +38,7 @@ impl Core {
         }
         let seat = open.decision.seat;
         Some(if self.is_automatic(seat) {
-            open.released + self.pace()
+            open.released + self.wait_of(open)
         } else {
             let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
             deadline.max(open.recheck_at)
@@ -95,7 +95,7 @@ impl Core {
                 budget -= 1;
                 continue;
             }
-            if !self.is_automatic(open.decision.seat) || open.released + self.pace() > now {
+            if !self.is_automatic(open.decision.seat) || open.released + self.wait_of(open) > now {
                 return;
             }
             budget = budget.saturating_sub(self.cost_of_open());
@@ -132,6 +132,15 @@ impl Core {
         self.header.policy.pace_of(with_people)
     }
 
+    /// How long a built-in agent or substitute waits before it takes this decision. It takes a
+    /// silent one at once: otherwise the time of the next event would reveal it.
+    fn wait_of(&self, open: &OpenDecision) -> Duration {
+        match open.is_silent() {
+            true => Duration::ZERO,
+            false => self.pace(),
+        }
+    }
+
     /// Cost of the open decision of a built-in agent, in decisions.
     fn cost_of_open(&self) -> usize {
         let replayed = self.open.as_ref().is_some_and(|open| {
@@ -140,22 +149,47 @@ impl Core {
         if replayed { REPLAY_COST } else { 1 }
     }
 
-    /// Time for a decision of a seat before its bank is used.
+    /// Time for the open decision of a seat before its bank is used. A silent decision has the
+    /// longest time of any seat that participants can take, whoever takes it.
     fn decision_time(&self, seat: Seat) -> Duration {
+        match self.is_silent() {
+            true => (self.all_seats())
+                .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
+                .map(|seat| self.usual_decision_time(seat))
+                .max()
+                .unwrap_or_else(|| self.usual_decision_time(seat)),
+            false => self.usual_decision_time(seat),
+        }
+    }
+
+    fn usual_decision_time(&self, seat: Seat) -> Duration {
         let participant = self.seats[seat.index()].participant.as_ref();
         let policy = &self.header.policy;
         policy.decision_time_of(participant.map(|participant| participant.kind))
     }
 
-    /// Time a seat has for a decision, including its bank.
+    /// Time a seat has for the open decision, including its bank. A silent decision does not use
+    /// the bank, because what is left of it shows at the seat's later decisions.
     pub(super) fn time_allowed(&self, seat: Seat) -> Duration {
-        self.decision_time(seat) + self.seats[seat.index()].bank_left
+        let bank = match self.is_silent() {
+            true => Duration::ZERO,
+            false => self.seats[seat.index()].bank_left,
+        };
+        self.decision_time(seat) + bank
     }
 
-    /// The rest of a seat's bank after a decision that took `time`.
+    /// The rest of a seat's bank after the open decision, if it took `time`.
     pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
-        let beyond = time.saturating_sub(self.decision_time(seat));
-        self.seats[seat.index()].bank_left.saturating_sub(beyond)
+        let bank_left = self.seats[seat.index()].bank_left;
+        if self.is_silent() {
+            return bank_left;
+        }
+        bank_left.saturating_sub(time.saturating_sub(self.decision_time(seat)))
+    }
+
+    /// Whether the open decision is one that nobody else may learn of.
+    fn is_silent(&self) -> bool {
+        self.open.as_ref().is_some_and(OpenDecision::is_silent)
     }
 
     /// Time left for the open decision: before the bank is used, and in the bank.
@@ -165,9 +199,13 @@ impl Core {
         };
         let now = self.paused_since().map_or(now, |since| since.min(now));
         let used = now.saturating_sub(open.start.unwrap_or(now));
+        let bank_left = match open.is_silent() {
+            true => Duration::ZERO,
+            false => self.bank_after(open.decision.seat, used),
+        };
         (
             self.decision_time(open.decision.seat).saturating_sub(used),
-            self.bank_after(open.decision.seat, used),
+            bank_left,
         )
     }
 
@@ -276,10 +314,10 @@ impl Core {
     }
 
     /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a
-    /// substitute.
+    /// substitute, but never for a silent decision, which the substitution would reveal.
     fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
-        let seat = open.decision.seat;
+        let (seat, silent) = (open.decision.seat, open.is_silent());
         let time = now.saturating_sub(open.start.unwrap_or(open.released));
         let source = if self.seats[seat.index()].connection.is_some() {
             Source::Timeout
@@ -288,6 +326,7 @@ impl Core {
         };
         self.take_default(now, seat, source, time);
         if self.state == State::Playing
+            && !silent
             && self.seats[seat.index()].timeouts >= self.header.policy.max_timeouts
         {
             self.lose(now, seat);

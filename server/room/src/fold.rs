@@ -42,7 +42,6 @@ impl Core {
                 let state = &mut self.seats[seat.index()];
                 state.away = false;
                 state.substituted = false;
-                state.timeouts = 0;
                 self.log.push(at, RoomEvent::Returned(*seat));
                 if let Some(open) = &mut self.open
                     && open.decision.seat == *seat
@@ -142,6 +141,10 @@ impl Core {
 
     fn decide(&mut self, at: Duration, decided: &Decided) {
         let number = self.changes;
+        // What is not published must not show later either: not in when the seat is substituted,
+        // nor in how far delayed spectators see.
+        let offered = self.open.as_ref().is_some_and(OpenDecision::is_silent);
+        let declined = offered && Some(decided.action) == self.default_action();
         let mut events = std::mem::take(&mut self.events);
         let game = self.game.as_mut();
         let ruling = match game.expect("a decision is taken in a game that has started") {
@@ -158,7 +161,9 @@ impl Core {
         seat.annotation_bytes += decided.annotations.as_ref().map_or(0, |bytes| bytes.len());
         match decided.source {
             Source::Agent => {
-                seat.timeouts = 0;
+                if !declined {
+                    seat.timeouts = 0;
+                }
                 seat.last_answer = Some(LastAnswer {
                     decision_id: seat.decisions,
                     action: decided.action.index().into(),
@@ -169,7 +174,7 @@ impl Core {
                     },
                 });
             }
-            Source::Timeout | Source::Disconnected => seat.timeouts += 1,
+            Source::Timeout | Source::Disconnected => seat.timeouts += u32::from(!declined),
             Source::Invalid | Source::Substitute | Source::Recorded | Source::Table => {}
         }
         let taken = (decided.source, decided.time_us);
@@ -187,7 +192,9 @@ impl Core {
         if decided.source == Source::Recorded {
             self.reseed();
         }
-        self.note_decision();
+        if !declined {
+            self.note_decision();
+        }
         self.open_next(at);
     }
 

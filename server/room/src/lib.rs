@@ -28,7 +28,7 @@ use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{
-    ActionId, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
+    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
 
 pub use answers::{
@@ -118,6 +118,7 @@ struct SeatState {
     substituted: bool,
     ever_substituted: bool,
     decisions: u64,
+    /// Timeouts since the agent's last valid answer in time. Silent decisions do not count.
     timeouts: u32,
     bank_left: Duration,
     annotation_bytes: usize,
@@ -156,6 +157,12 @@ pub struct OpenDecision {
 }
 
 impl OpenDecision {
+    /// Whether nobody but its seat may learn that it is taken: a special action, which only the
+    /// seat with both jokers is offered. Only a declared one becomes public.
+    fn is_silent(&self) -> bool {
+        self.decision.kind == DecisionKind::SpecialAction
+    }
+
     /// Opens the decision again, with its full time.
     fn reopen(&mut self, at: Duration) {
         self.released = at;

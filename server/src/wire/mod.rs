@@ -7,6 +7,8 @@ mod decision;
 mod field;
 #[cfg(test)]
 mod hidden_tests;
+#[cfg(test)]
+mod silent_tests;
 
 use std::marker::PhantomData;
 

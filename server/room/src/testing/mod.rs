@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_engine::{
-    ActionId, BySeat, Cards, Game, RULES_VERSION, RuleSetSpec, Seat, SeedPlan, Stop,
+    ActionId, BySeat, Cards, Deal, Game, RULES_VERSION, RuleSet, RuleSetSpec, Script, Seat,
+    SeatOrder, Seed, SeedPlan, Stop,
 };
 
 use crate::ids::{Id, SecretHash};
@@ -91,6 +92,15 @@ impl Table {
         }
         table.core.begin_if_all_built_in(table.now);
         table.commit();
+        table
+    }
+
+    /// Starts the game from a script. The seats are free.
+    pub fn scripted(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec, script: Script) -> Self {
+        let mut table = Self::with_rules(policy, fills, rules);
+        let mut header = GameHeader::clone(table.core.header());
+        header.start.script = Some(script);
+        table.core = Core::new(Arc::new(header));
         table
     }
 
@@ -250,6 +260,54 @@ impl Table {
             self.core.open().map(|open| (open.decision, open.id))
         );
     }
+}
+
+/// The second Shift of a game, in which the seats were ranked by their numbers.
+pub fn second_shift(hands: BySeat<Cards>) -> Script {
+    let seats: Vec<Seat> = hands.seats().collect();
+    Script {
+        shift: 2,
+        last_order: SeatOrder::from_slice(&seats),
+        ..Script::first_shift(hands)
+    }
+}
+
+/// The hands dealt from a seed, with the jokers moved to these seats.
+pub fn dealt(rules: &RuleSet, seed: u8, jokers: [Seat; 2]) -> Option<BySeat<Cards>> {
+    let hands = Deal::new(rules, Seed([seed; 32]), 2).hands();
+    with_jokers_at(jokers, &hands, rules.faces())
+}
+
+/// The hands after the jokers were exchanged for cards of these seats: for those of the highest
+/// face below the top face, so that neither forced gifts nor the holder of the Golden card change.
+pub fn with_jokers_at(
+    holders: [Seat; 2],
+    hands: &BySeat<Cards>,
+    faces: u8,
+) -> Option<BySeat<Cards>> {
+    let joker = usize::from(faces);
+    let mut counts: Vec<Vec<u8>> = (hands.seats())
+        .map(|seat| hands[seat].counts(faces).collect())
+        .collect();
+    let wanted = |seat| holders.iter().filter(|it| it.index() == seat).count();
+    loop {
+        let held = |seat: usize| usize::from(counts[seat][joker]);
+        let mut seats = 0..hands.len();
+        let Some(to) = seats.clone().find(|seat| held(*seat) < wanted(*seat)) else {
+            break;
+        };
+        let from = seats.find(|seat| held(*seat) > wanted(*seat))?;
+        let face = (0..joker - 1).rev().find(|face| counts[to][*face] > 0)?;
+        for (seat, gets, gives) in [(to, joker, face), (from, face, joker)] {
+            counts[seat][gets] += 1;
+            counts[seat][gives] -= 1;
+        }
+    }
+    let mut changed = *hands;
+    for (seat, counts) in hands.seats().zip(&counts) {
+        changed[seat] = Cards::from_counts(faces, counts, hands[seat].has_golden())?;
+    }
+    Some(changed)
 }
 
 /// Rules for games of one Shift.

@@ -446,3 +446,78 @@ fn an_answer_is_closed_only_if_its_decision_is() {
             .is_none_or(|open| open.decision.seat != seat || open.id != id)
     );
 }
+
+#[test]
+fn attaching_again_does_not_forgive_timeouts() {
+    let mut table = Table::playing(Policy {
+        max_timeouts: 3,
+        bank: ms(0),
+        abort: AbortPolicy::Never,
+        ..quick()
+    });
+    let seat = table.open().0;
+    let connection = |table: &Table, seat: Seat| match table.connections {
+        4 => ConnectionId(u64::try_from(seat.index()).expect("small") + 1),
+        last => ConnectionId(last),
+    };
+    // It crashes whenever it is asked, and attaches again when its time is up.
+    for crash in 1..=3 {
+        while table.open().0 != seat {
+            table.play_one();
+        }
+        assert!(!table.core.standing(seat).substituted, "crash {crash}");
+        let lost = connection(&table, seat);
+        table.lost(seat, lost);
+        table.pass_time(ms(1000));
+        if crash < 3 {
+            table.attach(seat);
+        }
+    }
+    assert!(table.core.standing(seat).substituted);
+    // It gets its seat back, but loses it at the next timeout, unless it answers in time.
+    for answers in [false, true] {
+        table.attach(seat);
+        while table.open().0 != seat {
+            table.play_one();
+        }
+        if answers {
+            table.play_one();
+            while table.open().0 != seat {
+                table.play_one();
+            }
+        }
+        table.pass_time(ms(1000));
+        assert_eq!(table.core.standing(seat).substituted, !answers);
+    }
+    table.assert_replays();
+}
+
+#[test]
+fn invalid_answers_do_not_forgive_timeouts() {
+    let mut table = Table::playing(Policy {
+        max_timeouts: 2,
+        max_invalid_attempts: Some(2),
+        bank: ms(0),
+        abort: AbortPolicy::Never,
+        ..quick()
+    });
+    let seat = table.open().0;
+    table.pass_time(ms(1000));
+    // The next decision ends with too many invalid answers, the one after that with one and a
+    // timeout.
+    for attempts in [2, 1] {
+        assert!(!table.core.standing(seat).substituted);
+        while table.open().0 != seat {
+            table.play_one();
+        }
+        let id = table.open().1;
+        for _ in 0..attempts {
+            let wrong = table.illegal();
+            table.answer(seat, id, wrong);
+        }
+    }
+    table.pass_time(ms(1000));
+    assert_eq!(table.last_decision().source, Source::Timeout);
+    assert!(table.core.standing(seat).substituted);
+    table.assert_replays();
+}

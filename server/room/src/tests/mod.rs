@@ -4,6 +4,7 @@ mod clocks;
 mod physical;
 mod revival;
 mod seats;
+mod silent;
 mod strange;
 
 use std::time::Duration;

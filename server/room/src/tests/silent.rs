@@ -1,0 +1,153 @@
+//! Silent decisions: nothing that others can see depends on a special action that is declined or
+//! that runs out. `server/src/wire/silent_tests.rs` compares the messages of many such games.
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec};
+
+use super::*;
+use crate::policy::{AbortPolicy, KindClock};
+use crate::testing::{dealt, second_shift};
+
+/// A table at the start of its second Shift, where seat 2 holds both jokers.
+fn offered(policy: Policy, fills: Vec<Fill>) -> Table {
+    let rules = RuleSetSpec::default();
+    let valid = rules.validate().expect("a valid rule set");
+    let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
+    Table::scripted(policy, fills, rules, second_shift(hands))
+}
+
+fn policy() -> Policy {
+    Policy {
+        decision_time: ms(1000),
+        bank: ms(500),
+        max_timeouts: 2,
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    }
+}
+
+fn substituted(table: &Table) -> usize {
+    table.happened(|event| matches!(event, RoomEvent::Substituted(_)))
+}
+
+/// Plays for the other seats and lets this one run out its next decision.
+fn run_out(table: &mut Table, seat: Seat) {
+    while table.open().0 != seat {
+        table.play_one();
+    }
+    let decisions = table.core.decisions();
+    let (left, bank) = table.core.time_left(table.now);
+    table.pass_time(left + bank);
+    assert_eq!(table.core.decisions(), decisions + 1);
+    assert_eq!(table.last_decision().source, Source::Timeout);
+}
+
+#[test]
+fn a_special_action_that_runs_out_counts_for_nothing() {
+    let mut table = offered(policy(), vec![OPEN; 4]);
+    table.fill();
+    let (seat, _) = table.open();
+    assert_eq!(seat, Seat::new(2));
+    assert_eq!(
+        table.core.time_left(table.now),
+        (ms(1000), ms(0)),
+        "the bank does not pay for it"
+    );
+    run_out(&mut table, seat);
+    assert_eq!(table.last_decision().bank_left_ms, 500);
+    run_out(&mut table, seat);
+    assert_eq!(
+        substituted(&table),
+        0,
+        "only one public decision ran out so far"
+    );
+    run_out(&mut table, seat);
+    assert_eq!(substituted(&table), 1);
+    table.assert_replays();
+}
+
+#[test]
+fn declining_does_not_forgive_earlier_timeouts() {
+    for declares in [false, true] {
+        let mut table = offered(policy(), vec![OPEN; 4]);
+        table.fill();
+        let seat = Seat::new(2);
+        table.core.seats[2].timeouts = 1;
+        let actions = table.core.header().rules.actions();
+        let action = match declares {
+            true => actions.declare(),
+            false => actions.decline(),
+        };
+        let (_, id) = table.open();
+        table.answer(seat, id, action.index().into());
+        run_out(&mut table, seat);
+        assert_eq!(substituted(&table), usize::from(!declares));
+    }
+}
+
+#[test]
+fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
+    let with_people = Policy {
+        clocks: vec![KindClock {
+            kind: ParticipantKind::Human,
+            decision_time: Some(ms(5000)),
+            bank: None,
+        }],
+        ..policy()
+    };
+    for holder in [ParticipantKind::Agent, ParticipantKind::Human] {
+        let mut table = offered(with_people.clone(), vec![OPEN; 4]);
+        for seat in 0..4 {
+            let other = match holder {
+                ParticipantKind::Agent => ParticipantKind::Human,
+                _ => ParticipantKind::Agent,
+            };
+            let kind = if seat == 2 { holder } else { other };
+            table.join(kind).expect("a seat is free");
+        }
+        for seat in table.core.all_seats() {
+            table.attach(seat);
+        }
+        assert_eq!(table.core.time_left(table.now), (ms(5000), ms(0)));
+        let deadline = table.core.deadline().expect("a decision is open");
+        table.pass_time(ms(5000));
+        assert_eq!(deadline, table.now);
+        assert_eq!(table.last_decision().seat, Seat::new(2));
+    }
+}
+
+#[test]
+fn a_built_in_agent_takes_no_time_for_a_special_action() {
+    let mut fills = vec![OPEN; 4];
+    fills[2] = Fill::BuiltIn(AgentKind::Greedy);
+    let mut table = offered(
+        Policy {
+            pace: Some(ms(300)),
+            ..policy()
+        },
+        fills,
+    );
+    table.fill();
+    assert_eq!(table.core.decisions(), 1);
+    let open = table.core.open().expect("a decision is open");
+    assert_ne!(open.decision.kind, DecisionKind::SpecialAction);
+    assert_eq!(table.now, ms(0));
+    table.assert_replays();
+}
+
+#[test]
+fn delayed_spectators_do_not_see_further_because_of_a_silent_decision() {
+    let mut table = offered(
+        Policy {
+            spectator_delay_decisions: 1,
+            ..policy()
+        },
+        vec![OPEN; 4],
+    );
+    table.fill();
+    let visible = table.core.visible_to_spectators();
+    let decline: ActionId = table.core.header().rules.actions().decline();
+    let (seat, id) = table.open();
+    table.answer(seat, id, decline.index().into());
+    assert_eq!(table.core.visible_to_spectators(), visible);
+}

@@ -1,0 +1,448 @@
+//! Pairs of games that differ only in which seats hold the jokers, and so in who may declare a
+//! special action and keeps quiet or lets it run out. Random policies, clocks, paces, answers and
+//! faults, the same in both games: everything sent to a viewer who holds no joker must be the same,
+//! to the byte, and sent at the same time. The same comparison detects deliberate leaks.
+
+use std::time::Duration;
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{
+    ActionId, BySeat, Cards, DecisionKind, PassScope, RuleSet, RuleSetSpec, Seat, Viewer,
+};
+use chefshat_room::journal::{Change, Fill, ParticipantKind};
+use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
+use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, with_jokers_at};
+use chefshat_room::{ConnectionId, Core};
+use prost::Message as _;
+
+use crate::convert;
+
+/// How many pairs are played, unless `CHEFSHAT_PAIRS` says another number.
+const PAIRS: u64 = 10_000;
+
+/// A small generator of random numbers (SplitMix64).
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    fn below(&mut self, bound: u64) -> u64 {
+        self.next() % bound
+    }
+
+    fn index(&mut self, length: usize) -> usize {
+        usize::try_from(self.below(length as u64)).expect("below the length")
+    }
+
+    fn pick<T: Clone>(&mut self, values: &[T]) -> T {
+        values[self.index(values.len())].clone()
+    }
+}
+
+/// One of the two games, with what was compared so far.
+struct World {
+    table: Table,
+    connections: Vec<ConnectionId>,
+    /// Events compared.
+    seen: usize,
+    /// Entries of the journal read for `choices`.
+    read: usize,
+    /// The decisions whose actions others may learn, in order.
+    choices: Vec<(Seat, ActionId)>,
+}
+
+impl World {
+    fn new(table: Table) -> Self {
+        Self {
+            table,
+            connections: Vec::new(),
+            seen: 0,
+            read: 0,
+            choices: Vec::new(),
+        }
+    }
+
+    fn start(&mut self, kinds: &[ParticipantKind]) {
+        for kind in kinds {
+            let _ = self.table.join(*kind);
+        }
+        for seat in self.table.core.all_seats() {
+            let connection = match self.table.core.standing(seat).participant {
+                Some(_) => self.table.attach(seat),
+                None => ConnectionId(0),
+            };
+            self.connections.push(connection);
+        }
+        self.table.core.begin_if_all_built_in(self.table.now);
+        self.table.commit();
+    }
+
+    /// Reads the new decisions from the journal. A declined special action is none.
+    fn read_choices(&mut self) {
+        let decline = self.table.core.header().rules.actions().decline();
+        for entry in &self.table.journal[self.read..] {
+            if let Change::Decided(decided) = &entry.change
+                && decided.action != decline
+            {
+                self.choices.push((decided.seat, decided.action));
+            }
+        }
+        self.read = self.table.journal.len();
+    }
+
+    /// The seat and kind of the decision that a participant is asked for.
+    fn asked(&self) -> Option<(Seat, DecisionKind)> {
+        let open = self.table.core.awaited()?;
+        Some((open.decision.seat, open.decision.kind))
+    }
+
+    fn is_silent(&self) -> bool {
+        matches!(self.asked(), Some((_, DecisionKind::SpecialAction)))
+    }
+
+    /// Answers after a time, unless the decision runs out before.
+    fn answer_after(&mut self, time: Duration, action: u32) {
+        let (seat, id) = self.table.open();
+        self.table.pass_time(time);
+        self.table.answer(seat, id, action);
+    }
+
+    /// Lets the open decision run out.
+    fn run_out(&mut self) {
+        let (left, bank) = self.table.core.time_left(self.table.now);
+        self.table.pass_time(left + bank);
+    }
+
+    fn lose(&mut self, seat: Seat) {
+        self.table.lost(seat, self.connections[seat.index()]);
+    }
+
+    fn attach(&mut self, seat: Seat) {
+        self.connections[seat.index()] = self.table.attach(seat);
+    }
+
+    /// Everything sent to a viewer since the last comparison, with its time.
+    fn sent_to(&self, see: Viewer, leak: Leak) -> Vec<Vec<u8>> {
+        let core = &self.table.core;
+        let mut messages: Vec<Vec<u8>> = (self.seen..core.log().len())
+            .filter_map(|position| convert::event_to_proto(core, position, see))
+            .map(|event| event.encode_to_vec())
+            .collect();
+        let own = core
+            .awaited()
+            .filter(|open| see == Viewer::Seat(open.decision.seat));
+        if let Some(open) = own {
+            let mut written = Vec::new();
+            crate::wire::encode_decision(core, open, self.table.now, true, &mut written);
+            messages.push(written);
+        }
+        messages.push(core.visible_to_spectators().to_be_bytes().to_vec());
+        messages.push(leak(core).to_be_bytes().to_vec());
+        messages
+    }
+}
+
+/// Something of a room that every viewer would learn.
+type Leak = fn(&Core) -> u128;
+
+fn no_leak(_: &Core) -> u128 {
+    0
+}
+
+/// What to play: everything that both games have in common.
+struct Plan {
+    rules: RuleSetSpec,
+    policy: Policy,
+    fills: Vec<Fill>,
+    kinds: Vec<ParticipantKind>,
+    /// The seats whose cards differ. Nobody else may notice.
+    holders: [Seat; 2],
+}
+
+impl Plan {
+    fn random(chance: &mut Chance) -> Self {
+        let players = chance.pick(&[3, 4, 4, 4, 6]);
+        let first = chance.index(players);
+        let second = (first + 1 + chance.index(players - 1)) % players;
+        let built_in = [
+            Fill::BuiltIn(AgentKind::Greedy),
+            Fill::BuiltIn(AgentKind::Random),
+        ];
+        let fills: Vec<Fill> = (0..players)
+            .map(|_| match chance.below(4) {
+                0 => chance.pick(&built_in),
+                _ => OPEN,
+            })
+            .collect();
+        let kinds = [
+            ParticipantKind::Agent,
+            ParticipantKind::Human,
+            ParticipantKind::Robot,
+        ];
+        let clocks = match chance.below(2) {
+            0 => Vec::new(),
+            _ => vec![KindClock {
+                kind: ParticipantKind::Human,
+                decision_time: Some(ms(3000)),
+                bank: Some(ms(chance.below(3) * 700)),
+            }],
+        };
+        Self {
+            rules: RuleSetSpec {
+                players: u8::try_from(players).expect("few players"),
+                exchange: chance.below(4) > 0,
+                pass_scope: chance.pick(&[PassScope::Pizza, PassScope::Turn]),
+                ..RuleSetSpec::default()
+            },
+            policy: Policy {
+                decision_time: ms(1000),
+                bank: ms(chance.below(3) * 500),
+                max_invalid_attempts: chance.pick(&[Some(1), Some(3), None]),
+                max_timeouts: chance.pick(&[1, 2, 3]),
+                substitute: chance.pick(&[AgentKind::Greedy, AgentKind::Random]),
+                abort: chance.pick(&[
+                    AbortPolicy::Never,
+                    AbortPolicy::Never,
+                    AbortPolicy::AllLost,
+                    AbortPolicy::AnyLost,
+                ]),
+                reward_scheme: chance.pick(&[None, Some(chefshat_engine::RewardScheme::Paper)]),
+                pace: chance.pick(&[None, Some(ms(0)), Some(ms(300))]),
+                spectator_delay_decisions: chance.index(4),
+                clocks,
+                ..Policy::default()
+            },
+            kinds: fills
+                .iter()
+                .filter(|fill| **fill == OPEN)
+                .map(|_| chance.pick(&kinds))
+                .collect(),
+            fills,
+            holders: [Seat::new(first), Seat::new(second)],
+        }
+    }
+
+    fn world(&self, hands: BySeat<Cards>) -> World {
+        let mut world = World::new(Table::scripted(
+            self.policy.clone(),
+            self.fills.clone(),
+            self.rules.clone(),
+            second_shift(hands),
+        ));
+        world.start(&self.kinds);
+        world
+    }
+
+    /// Two games: in one the first seat holds both jokers, in the other the second seat holds them
+    /// or each holds one. `None` if the deal has no such cards, or if forced gifts, which their
+    /// receivers see, would differ.
+    fn worlds(&self, rules: &RuleSet, chance: &mut Chance) -> Option<[World; 2]> {
+        let [first, second] = self.holders;
+        let seed = u8::try_from(chance.below(256)).expect("below 256");
+        let hands = dealt(rules, seed, [first; 2])?;
+        let others = chance.pick(&[[second; 2], [second; 2], [first, second]]);
+        let twin = with_jokers_at(others, &hands, rules.faces())?;
+        let rarest = |hands: &BySeat<Cards>| {
+            let two = |seat| {
+                hands[seat]
+                    .ascending(rules.faces())
+                    .take(2)
+                    .collect::<Vec<_>>()
+            };
+            hands.seats().map(two).collect::<Vec<_>>()
+        };
+        (rarest(&hands) == rarest(&twin)).then(|| [self.world(hands), self.world(twin)])
+    }
+
+    fn viewers(&self) -> impl Iterator<Item = Viewer> + '_ {
+        (0..self.fills.len())
+            .map(Seat::new)
+            .filter(|seat| !self.holders.contains(seat))
+            .map(Viewer::Seat)
+            .chain([Viewer::Spectator])
+    }
+}
+
+/// Whether both games have made the same choices so far, as far as both have gone. Nobody has
+/// declared a special action, which is public.
+fn agree(worlds: &mut [World; 2]) -> bool {
+    worlds.iter_mut().for_each(World::read_choices);
+    let [one, other] = &*worlds;
+    let declare = one.table.core.header().rules.actions().declare();
+    let mut choices = one.choices.iter().chain(&other.choices);
+    choices.all(|(_, action)| *action != declare)
+        && one.choices.iter().zip(&other.choices).all(|(a, b)| a == b)
+}
+
+/// Compares what was sent since the last comparison.
+fn compare(plan: &Plan, worlds: &mut [World; 2], leak: Leak) -> Result<usize, String> {
+    let mut messages = 0;
+    for see in plan.viewers() {
+        let [one, other] = [&worlds[0], &worlds[1]].map(|world| world.sent_to(see, leak));
+        if one != other {
+            let differing = one.iter().zip(&other).position(|(one, other)| one != other);
+            let states = [&worlds[0], &worlds[1]].map(|world| {
+                let log = world.table.core.log();
+                let events: Vec<_> = log.since(world.seen).collect();
+                format!(
+                    "{:?} asks {:?} after {events:?}",
+                    world.table.now,
+                    world.asked()
+                )
+            });
+            return Err(format!(
+                "{see:?} sees a difference in message {differing:?} of {} or {}:\n{}",
+                one.len(),
+                other.len(),
+                states.join("\n")
+            ));
+        }
+        messages += one.len();
+    }
+    for world in worlds {
+        world.seen = world.table.core.log().len();
+    }
+    Ok(messages)
+}
+
+/// Plays a pair until it ends, the choices of built-in agents differ, or another Shift starts.
+/// Returns the number of messages compared.
+fn play_pair(number: u64, leak: Leak) -> Result<usize, String> {
+    let mut chance = Chance(number);
+    let plan = Plan::random(&mut chance);
+    let rules = plan.rules.validate().expect("a valid rule set");
+    let Some(mut worlds) = plan.worlds(&rules, &mut chance) else {
+        return Ok(0);
+    };
+    let mut messages = 0;
+    let decisions = chance.below(40);
+    for _ in 0..decisions {
+        if !agree(&mut worlds) {
+            break;
+        }
+        // A silent decision in one game alone is taken in no time.
+        if worlds[0].is_silent() == worlds[1].is_silent() {
+            messages += compare(&plan, &mut worlds, leak)
+                .map_err(|problem| format!("pair {number}: {problem}"))?;
+        }
+        let ended = |world: &World| {
+            let core = &world.table.core;
+            core.state().is_over() || core.game().is_none_or(|game| game.shift() > 2)
+        };
+        if worlds.iter().any(ended) {
+            break;
+        }
+        step(&mut worlds, &mut chance);
+    }
+    Ok(messages)
+}
+
+/// Advances both games by the same inputs.
+fn step(worlds: &mut [World; 2], chance: &mut Chance) {
+    match [worlds[0].is_silent(), worlds[1].is_silent()] {
+        [false, false] => {}
+        // A silent decision takes time only if there is one in both games.
+        [one, other] => {
+            let (runs_out, time) = (one && other && chance.below(2) == 0, chance.below(900));
+            for world in worlds.iter_mut().filter(|world| world.is_silent()) {
+                if runs_out {
+                    world.run_out();
+                } else {
+                    let thinks = if one && other { ms(time) } else { ms(0) };
+                    let decline = world.table.core.header().rules.actions().decline();
+                    world.answer_after(thinks, decline.index().into());
+                }
+            }
+            return;
+        }
+    }
+    let asked = worlds[0].asked();
+    if asked.is_none() || asked != worlds[1].asked() {
+        // Built-in agents are next. Whatever happens first happens in both.
+        let deadline = |world: &World| world.table.core.deadline();
+        let next = worlds.iter().filter_map(deadline).min();
+        for world in worlds {
+            let left = next.map_or(ms(0), |next| next.saturating_sub(world.table.now));
+            world.table.pass_time(left);
+        }
+        return;
+    }
+    let (seat, _) = asked.expect("a decision is open");
+    let common: Vec<u32> = (worlds[0].table.core.legal_actions().iter())
+        .filter(|action| worlds[1].table.core.legal_actions().contains(*action))
+        .map(|action| action.index().into())
+        .collect();
+    let illegal = u32::from(worlds[0].table.core.header().rules.actions().size());
+    let (what, time, pick) = (chance.below(12), ms(chance.below(900)), chance.next());
+    let other = Seat::new(chance.index(worlds[0].connections.len()));
+    for world in worlds {
+        match what {
+            0 => world.run_out(),
+            1 => {
+                let attempts = world.table.core.attempts_left().unwrap_or(2);
+                for _ in 0..attempts {
+                    world.answer_after(ms(0), illegal);
+                }
+            }
+            2 => {
+                world.lose(seat);
+                world.run_out();
+                world.attach(seat);
+            }
+            3 => {
+                world.lose(seat);
+                world.table.pass_time(time);
+                world.attach(seat);
+            }
+            4 if world.connections[other.index()] != ConnectionId(0) => {
+                world.lose(other);
+                world.attach(other);
+            }
+            _ => {
+                match usize::try_from(pick)
+                    .unwrap_or_default()
+                    .checked_rem(common.len())
+                {
+                    Some(index) => world.answer_after(time, common[index]),
+                    None => world.run_out(),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_that_is_sent_depends_on_a_silent_decision() {
+    let pairs = std::env::var("CHEFSHAT_PAIRS")
+        .map_or(PAIRS, |pairs| pairs.parse().expect("a number of pairs"));
+    let messages: usize = (0..pairs)
+        .map(|pair| play_pair(pair, no_leak).unwrap_or_else(|leak| panic!("{leak}")))
+        .sum();
+    let least = usize::try_from(pairs).expect("a number that fits") * 10;
+    assert!(messages > least, "only {messages} messages were compared");
+    println!("{pairs} pairs, {messages} messages");
+}
+
+#[test]
+fn deliberate_leaks_are_detected() {
+    let leaks: [(&str, Leak); 3] = [
+        ("how many decisions were taken", |core| {
+            core.decisions().into()
+        }),
+        ("who is asked now", |core| {
+            core.open()
+                .map_or(0, |open| 1 + open.decision.seat.index() as u128)
+        }),
+        ("how much is in the journal", |core| core.changes().into()),
+    ];
+    for (name, leak) in leaks {
+        let detected = (0..200).any(|pair| play_pair(pair, leak).is_err());
+        assert!(detected, "{name}");
+    }
+}
