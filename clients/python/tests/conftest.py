@@ -11,6 +11,7 @@ from fake_vector import FakeVector
 from real_server import RealServer
 from stage import Stage, attached
 
+from chefshat.channels import CA, TOKEN
 from chefshat.join_options import TICKET
 from chefshat.local_server import BINARY
 
@@ -24,9 +25,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.fixture(autouse=True)
-def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Removes a ticket from the environment."""
-    monkeypatch.delenv(TICKET, raising=False)
+def no_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Removes a ticket, a token and authorities from the environment."""
+    for name in (TICKET, TOKEN, CA):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture

@@ -4,13 +4,14 @@ import queue
 import threading
 from collections.abc import Callable, Iterator
 from concurrent import futures
+from pathlib import Path
 from typing import NoReturn, Self
 
 import grpc
 from fake_game import QUESTIONS, SIZE, FakeGame, FakeSeat, Outbox
 from fake_tournament import FakeTournaments, Stream
 from fake_vector import ToyVector
-from refusing import Context, refuse
+from refusing import Context, Guard, refuse
 
 from chefshat import pb
 from chefshat._gen.chefshat.v1 import play_service_pb2_grpc as play_grpc
@@ -23,6 +24,8 @@ from chefshat._gen.chefshat.v1 import vector_service_pb2_grpc as vector_grpc
 
 # Maximum size of a message, bytes, as on the real server.
 MAX_MESSAGE_BYTES = 64 * 1024
+#: A certificate for this machine, which is its own authority.
+TLS = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "tls"
 
 
 class FakeServer(
@@ -35,16 +38,24 @@ class FakeServer(
 
     `fault` is called with a game, a seat and an answer before the answer is taken. If it returns "before", the stream breaks
     without the answer having been taken; if "after", the answer is taken and the stream breaks before the acknowledgement.
+
+    With a `token` it uses TLS and refuses every call without this token.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, token: str = "") -> None:
         self.games: list[FakeGame] = []
         self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
         self.questions = QUESTIONS
         self.fault: Callable[[FakeGame, FakeSeat, pb.Answer], str] = lambda game, seat, answer: ""
-        options = [("grpc.max_receive_message_length", MAX_MESSAGE_BYTES)]
-        self._server = grpc.server(futures.ThreadPoolExecutor(max_workers=32), options=options)
+        self.guard = Guard(token)
+        options = [
+            ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
+            # Answers any number of pings, as the real server does.
+            ("grpc.http2.max_ping_strikes", 0),
+        ]
+        interceptors = [self.guard] if token else []
+        self._server = grpc.server(futures.ThreadPoolExecutor(max_workers=32), options=options, interceptors=interceptors)
         play_grpc.add_PlayServiceServicer_to_server(self, self._server)
         room_grpc.add_RoomServiceServicer_to_server(self, self._server)
         server_grpc.add_ServerServiceServicer_to_server(self, self._server)
@@ -53,7 +64,12 @@ class FakeServer(
         self.tournaments = FakeTournaments(self._tournament_game)
         tournament_grpc.add_TournamentServiceServicer_to_server(self.tournaments, self._server)
         vector_grpc.add_VectorServiceServicer_to_server(ToyVector(), self._server)
-        self.address = f"127.0.0.1:{self._server.add_insecure_port('127.0.0.1:0')}"
+        if token:
+            files = ((TLS / "localhost.key").read_bytes(), (TLS / "localhost.pem").read_bytes())
+            port = self._server.add_secure_port("127.0.0.1:0", grpc.ssl_server_credentials([files]))
+            self.address = f"https://127.0.0.1:{port}"
+        else:
+            self.address = f"127.0.0.1:{self._server.add_insecure_port('127.0.0.1:0')}"
 
     def __enter__(self) -> Self:
         self._server.start()

@@ -1,4 +1,4 @@
-"""A TCP proxy whose connections a test can cut."""
+"""A TCP proxy whose connections a test can cut or silence."""
 
 import contextlib
 import socket
@@ -17,6 +17,7 @@ class Proxy:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._lock = threading.Lock()
         self._sockets: list[socket.socket] = []
+        self._silent: set[socket.socket] = set()
         self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
         self.cuts = 0
 
@@ -41,6 +42,11 @@ class Proxy:
                     end.shutdown(socket.SHUT_RDWR)
             self._sockets.clear()
 
+    def silence(self) -> None:
+        """Forwards nothing more on the current connections, which stay open. New ones are forwarded."""
+        with self._lock:
+            self._silent.update(self._sockets)
+
     def _accept(self) -> None:
         while True:
             try:
@@ -51,24 +57,23 @@ class Proxy:
                 return
             with self._lock:
                 self._sockets += [near, far]
-            threading.Thread(target=_serve, args=(near, far), daemon=True).start()
+            threading.Thread(target=self._serve, args=(near, far), daemon=True).start()
 
+    def _serve(self, near: socket.socket, far: socket.socket) -> None:
+        """Forwards one connection both ways until it ends."""
+        with near, far:
+            back = threading.Thread(target=self._forward, args=(far, near), daemon=True)
+            back.start()
+            self._forward(near, far)
+            back.join()
 
-def _serve(near: socket.socket, far: socket.socket) -> None:
-    """Forwards one connection both ways until it ends."""
-    with near, far:
-        back = threading.Thread(target=_forward, args=(far, near), daemon=True)
-        back.start()
-        _forward(near, far)
-        back.join()
-
-
-def _forward(source: socket.socket, sink: socket.socket) -> None:
-    """Copies until one side ends, then ends the other."""
-    with contextlib.suppress(OSError):
-        source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        while data := source.recv(65536):
-            sink.sendall(data)
-    for end in (source, sink):
+    def _forward(self, source: socket.socket, sink: socket.socket) -> None:
+        """Copies until one side ends, then ends the other."""
         with contextlib.suppress(OSError):
-            end.shutdown(socket.SHUT_RDWR)
+            source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            while data := source.recv(65536):
+                if source not in self._silent:
+                    sink.sendall(data)
+        for end in (source, sink):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)

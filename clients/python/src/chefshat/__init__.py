@@ -8,9 +8,12 @@ To learn, `make` an environment: `VectorEnv` steps many games at once in columns
 PettingZoo, `replay` learns from recorded games.
 """
 
+from pathlib import Path
+
 from chefshat import aio, pb
 from chefshat.agents import Agent, RandomAgent
 from chefshat.backoff import Backoff
+from chefshat.channels import ServerAddress
 from chefshat.client import Client
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError
@@ -33,6 +36,7 @@ __all__ = [
     "RandomAgent",
     "SeatInfo",
     "SeatResult",
+    "ServerAddress",
     "Standing",
     "Transitions",
     "VectorEnv",
@@ -44,7 +48,16 @@ __all__ = [
 ]
 
 
-def play(agent: Agent, address: str, *, join_code: str, name: str, seat: int | None = None) -> SeatResult:
+def play(
+    agent: Agent,
+    address: str | ServerAddress,
+    *,
+    join_code: str,
+    name: str,
+    seat: int | None = None,
+    token: str | None = None,
+    ca: Path | str | None = None,
+) -> SeatResult:
     """Joins a room, plays its game to the end and returns the result.
 
     Args:
@@ -53,9 +66,11 @@ def play(agent: Agent, address: str, *, join_code: str, name: str, seat: int | N
         join_code: the room's join code.
         name: display name, 1..=64 characters.
         seat: the seat; None: the first free one.
+        token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
+        ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
 
     Raises:
         ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.
     """
-    with Client(address) as client:
+    with Client(address, token=token, ca=ca) as client:
         return client.play(agent, client.join_room(join_code, name, seat=seat).ticket)

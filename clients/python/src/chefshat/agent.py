@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--address", required=True, help="the server, HOST:PORT")
+    join_options.add_server_options(parser, required=True)
     join_options.add_options(parser)
     parser.add_argument("--name", help="display name, 1 to 64 characters; not needed with a ticket")
     parser.add_argument(
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return agents.pop() if agents else make_agent(options.agent, seed)
 
     def play() -> int:
-        with chefshat.Client(options.address) as client:
+        with chefshat.Client(join_options.server_of(options)) as client:
             return outcome.report(join_options.take_part(client, way, make), as_json=options.json)
 
     return exit_code(play, as_json=options.json)

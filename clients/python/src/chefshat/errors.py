@@ -13,6 +13,18 @@ from google.rpc import error_details_pb2, status_pb2
 from chefshat import pb
 
 DETAILS_KEY = "grpc-status-details-bin"
+#: Reason of a connection whose server is not trusted or does not use TLS.
+TLS_FAILED = "TLS_FAILED"
+# What gRPC writes into the message of such a connection.
+_TLS_MARKS = ("SSL_ERROR_SSL", "Verification Check failed")
+#: What to do about a refused token.
+_TOKEN_HINTS = {
+    "TOKEN_MISSING": "give the token you received from the host as token=, --token or CHEFSHAT_TOKEN",
+    "TOKEN_UNKNOWN": "check that you copied the token completely, or ask the host for another one",
+    "TOKEN_EXPIRED": "ask the host for another one",
+    "ROLE_TOO_LOW": "ask the host for a token with another role",
+    "OUT_OF_SCOPE": "the token is for another room or tournament",
+}
 #: Exit code of a command ended by Ctrl-C, by the convention of shells.
 INTERRUPTED = 130
 
@@ -61,7 +73,7 @@ class ChefsHatError(Exception):
     @property
     def retryable(self) -> bool:
         """Whether the same attempt may succeed later (a lost connection, a restarting server)."""
-        return self.code is not None and self.code not in _FINAL_CODES
+        return self.code is not None and self.code not in _FINAL_CODES and self.reason != TLS_FAILED
 
 
 def connection_lost(message: str = "the server ended the stream before the game was over") -> ChefsHatError:
@@ -83,7 +95,12 @@ def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
     message = getattr(error, "details", lambda: None)() or ""
     trailers = getattr(error, "trailing_metadata", lambda: None)() or ()
     reason, metadata = _error_info(trailers)
-    if code is grpc.StatusCode.UNAVAILABLE and not reason:
+    if code is grpc.StatusCode.UNAVAILABLE and any(mark in message for mark in _TLS_MARKS):
+        how = "for a certificate of a private authority, give the authority's file as ca=, --ca or CHEFSHAT_CA"
+        return ChefsHatError(TLS_FAILED, f"no secure connection ({message}); {how}", code=code)
+    if reason in _TOKEN_HINTS:
+        message = f"{message}; {_TOKEN_HINTS[reason]}"
+    elif code is grpc.StatusCode.UNAVAILABLE and not reason:
         # gRPC's message includes the address.
         message = f"no server answers ({message}): check that `chefshat serve` runs there, and give its address as HOST:PORT"
     return ChefsHatError(reason or code.name, message, metadata, code)

@@ -1,4 +1,4 @@
-"""The options by which a command joins a room or a tournament, or resumes its place after its process died; and playing there.
+"""The options by which a command reaches a server and joins a room or a tournament, or resumes its place there; and playing.
 
 The commands are `agent`, `learn.play` and `players_club`; their output is in `outcome`, the protocol of a game in `session`, the
 file of a ticket in `ticket_file`.
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from chefshat import pb
 from chefshat.agents import Agent
+from chefshat.channels import CA, TOKEN, ServerAddress
 from chefshat.client import Client
 from chefshat.decision import SeatInfo
 from chefshat.errors import ChefsHatError
@@ -49,6 +50,35 @@ class JoinOptions:
     seat: int | None = None
     games: int = 1
     stateless: bool = False
+
+
+def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False) -> None:
+    """Adds --address (and other `flags` for the same), --token and --ca."""
+    what = "the server" if required else "a running server"
+    parser.add_argument(
+        *flags, "--address", dest="address", required=required, metavar="ADDRESS", help=f"{what}, HOST:PORT or https://HOST:PORT"
+    )
+    parser.add_argument(
+        "--token",
+        help=f"the token that the server requires. The environment variable {TOKEN} does the same and, unlike this option, does "
+        "not show in lists of processes",
+    )
+    parser.add_argument(
+        "--ca",
+        type=Path,
+        metavar="FILE",
+        help=f"PEM file of the certificate authorities to trust with https:// (default: that of {CA}, or else the system's)",
+    )
+
+
+def server_of(options: argparse.Namespace) -> ServerAddress:
+    """Returns the server that the options name."""
+    return ServerAddress(options.address, options.token, options.ca)
+
+
+def server_if_any(options: argparse.Namespace) -> ServerAddress | None:
+    """Returns the server that the options name; None without --address."""
+    return None if options.address is None else server_of(options)
 
 
 def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False) -> None:

@@ -35,7 +35,7 @@ def make(kind: str = "gymnasium", **options: Any) -> Any:
     Args:
         kind: "gymnasium": `envs.ChefsHatEnv`, one seat against built-in agents; "gymnasium_vector": `envs.ChefsHatVectorEnv`, the
             same many times; "vector": `VectorEnv`, columns of any seats of many games; "pettingzoo": `envs.chefshat_v1`, all seats.
-        options: arguments of that environment, for example `address`, `opponents`, `rewards`, `observation`, `rules`, `seed`.
+        options: arguments of that environment, for example `address`, `token`, `ca`, `opponents`, `rewards`, `observation`, `seed`.
 
     Raises:
         ImportError: the kind needs the extra `envs`.

@@ -1,13 +1,12 @@
-"""What both clients share around a call: addresses, channel options, building requests, paging and errors."""
+"""What both clients share around a call: building requests, paging and errors. Channels are in `channels`."""
 
 import asyncio
 import secrets
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Protocol, TypeAlias, TypeVar
 
 import grpc
-import grpc.aio
 
 from chefshat import pb
 from chefshat.errors import from_rpc_error
@@ -43,54 +42,9 @@ AskedPage = TypeVar("AskedPage", bound=PageRequest)
 AnsweredPage = TypeVar("AnsweredPage", bound=Page)
 Item = TypeVar("Item")
 
-# Times in milliseconds. The channel's own delays between connection attempts are short, because `Backoff` adds its own. (Except for
-# "grpc.min_reconnect_backoff_ms", which despite its name limits the duration of one attempt.) Pings detect a dead peer.
-CHANNEL_OPTIONS: list[tuple[str, int]] = [
-    ("grpc.initial_reconnect_backoff_ms", 100),
-    ("grpc.max_reconnect_backoff_ms", 1000),
-    ("grpc.keepalive_time_ms", 30_000),
-    ("grpc.keepalive_timeout_ms", 10_000),
-    # Gives every client of a process its own connection.
-    ("grpc.use_local_subchannel_pool", 1),
-]
-
 SeatSpec: TypeAlias = "pb.SeatConfig | pb.RecordedPlayer | pb.ParticipantKind.ValueType | str | None"
 """How to fill a seat: a built-in agent's name, a recorded player to imitate, the kind it is reserved for, None (open to all), or
 the message itself."""
-
-
-class Target(NamedTuple):
-    """The address of a server: gRPC's authority, and whether to use TLS."""
-
-    authority: str
-    tls: bool
-
-
-def target(address: str) -> Target:
-    """Parses "host:port", "http://host:port" (the same) or "https://host:port" (TLS)."""
-    scheme, separator, rest = address.partition("://")
-    if not separator:
-        return Target(address, tls=False)
-    if scheme not in ("http", "https"):
-        raise ValueError(f"the address {address!r} must begin with http:// or https://")
-    return Target(rest.rstrip("/"), tls=scheme == "https")
-
-
-def channel(address: str, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
-    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`."""
-    where = target(address)
-    together = [*CHANNEL_OPTIONS, *options]
-    if where.tls:
-        return grpc.secure_channel(where.authority, grpc.ssl_channel_credentials(), together)
-    return grpc.insecure_channel(where.authority, together)
-
-
-def async_channel(address: str) -> grpc.aio.Channel:
-    """Opens a channel of asyncio. Call it where the event loop runs."""
-    where = target(address)
-    if where.tls:
-        return grpc.aio.secure_channel(where.authority, grpc.ssl_channel_credentials(), CHANNEL_OPTIONS)
-    return grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
 
 
 def create_room(

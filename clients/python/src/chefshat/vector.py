@@ -7,15 +7,17 @@ transitions in `transitions`, and environments with the interfaces of Gymnasium 
 import queue
 import weakref
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Self, TypeAlias, Unpack
 
 import grpc
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chefshat import local_server, pb, requests
+from chefshat import channels, local_server, pb
 from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
 from chefshat.batch import Batch, GameRecord
+from chefshat.channels import ServerAddress, server_address
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.masks import sample_legal
@@ -58,7 +60,7 @@ class VectorEnv:
     further call raises an error: create a new one.
 
     Attributes:
-        address: the server.
+        server: the server.
         sizes: the numbers that determine the widths of columns; some of them are attributes, too.
         games: n, the number of parallel games.
         client_seats: the seats that the client plays, ascending.
@@ -70,9 +72,11 @@ class VectorEnv:
 
     def __init__(
         self,
-        address: str | None = None,
+        address: str | ServerAddress | None = None,
         games: int = 1,
         *,
+        token: str | None = None,
+        ca: Path | str | None = None,
         transitions: bool = False,
         reward_function: RewardFunction | None = None,
         **options: Unpack[VectorOptions],
@@ -82,6 +86,8 @@ class VectorEnv:
         Args:
             address: "host:port", "http://host:port" or, for TLS, "https://host:port"; None: the server shared by this process,
                 which is started on demand (see `LocalServer`).
+            token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
+            ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
             games: n. Games times client seats is limited by the server (`max_vector_seats`).
             transitions: whether batches have `transitions`. They take some 200 bytes for each seat of each game.
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
@@ -90,8 +96,10 @@ class VectorEnv:
         setup = vector_setup(games, options)
         self._ended: ChefsHatError | None = None
         self._parts: list[pb.RecordLine] = []
-        self.address = local_server.shared_address() if address is None else address
-        channel = requests.channel(self.address, [("grpc.max_receive_message_length", MAX_BATCH_BYTES)])
+        # A server of this process knows no tokens.
+        own = ServerAddress(local_server.shared_address(), token="") if address is None else address
+        self.server = server_address(own, token, ca)
+        channel = channels.channel(self.server, [("grpc.max_receive_message_length", MAX_BATCH_BYTES)])
         # gRPC takes requests from the queue in a thread of its own.
         outbox: Requests = queue.SimpleQueue()
         self._outbox = outbox

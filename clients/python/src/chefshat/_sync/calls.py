@@ -9,6 +9,7 @@ import secrets
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Self
 
 import grpc
@@ -23,9 +24,10 @@ from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
 from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
+from chefshat.channels import ServerAddress, channel, server_address
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.participant import MakeAgent, OnEntered
-from chefshat.requests import called, channel, pages
+from chefshat.requests import called, pages
 from chefshat.result import SeatResult
 from chefshat.session import PlayOptions, PlaySession
 
@@ -39,14 +41,23 @@ class Calls(ABC):
     Every method raises `ChefsHatError`: with the server's reason if the server refuses, with "UNAVAILABLE" if it cannot be reached.
     """
 
-    def __init__(self, address: str, *, backoff: Backoff | None = None) -> None:
+    def __init__(
+        self,
+        address: str | ServerAddress,
+        *,
+        token: str | None = None,
+        ca: Path | str | None = None,
+        backoff: Backoff | None = None,
+    ) -> None:
         """Sets the server.
 
         Args:
             address: "host:port", "http://host:port" or, for TLS, "https://host:port".
+            token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
+            ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
             backoff: delays between connection attempts while playing or watching.
         """
-        self._channel = channel(address)
+        self._channel = channel(server_address(address, token, ca))
         self._backoff = backoff or Backoff()
         self._rng = random.Random()
         self._rooms = RoomServiceStub(self._channel)

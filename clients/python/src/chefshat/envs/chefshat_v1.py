@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
+from chefshat.channels import ServerAddress
+
 try:
     from pettingzoo import AECEnv
     from pettingzoo.utils import wrappers
@@ -23,7 +25,7 @@ from chefshat.vector import Batch, VectorEnv
 __all__ = ["env", "raw_env"]
 
 
-def env(address: str | None = None, **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401 - Those of `raw_env`.
+def env(address: str | ServerAddress | None = None, **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401 - Those of `raw_env`.
     """Creates the environment with PettingZoo's checks of the order of calls and of actions. Arguments: see `raw_env`."""
     checked: AECEnv[str, Any, Any] = wrappers.AssertOutOfBoundsWrapper(raw_env(address, **options))
     return wrappers.OrderEnforcingWrapper(checked)
@@ -51,7 +53,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
 
     def __init__(
         self,
-        address: str | None = None,
+        address: str | ServerAddress | None = None,
         *,
         observation: str | ObservationFunction = "classic",
         rewards: str | None = "winning",
@@ -142,7 +144,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         situations: Situations = self.vector.batch
         if self.agents and (any(self.terminations.values()) or any(self.truncations.values())):
             situations = self.vector.batch.endings
-        text = as_text(situations, 0, action_texts(self.vector.address, self.vector.faces))
+        text = as_text(situations, 0, action_texts(self.vector.server, self.vector.faces))
         if self.render_mode == "human":
             print(text)
             return None

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from chefshat.channels import ServerAddress
 from chefshat.columns import Situations
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode
@@ -52,7 +53,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
 
     def __init__(
         self,
-        address: str | None = None,
+        address: str | ServerAddress | None = None,
         *,
         seat: int = 0,
         observation: str | ObservationFunction = "classic",
@@ -70,7 +71,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
             rewards: the scheme; see `VectorOptions`. With "winning", 1 for finishing first, else -0.001 for each turn.
             invalid: effect of an illegal action; see `VectorOptions`.
             render_mode: "ansi": `render()` returns a text; "human": each step prints it.
-            options: further arguments of `VectorEnv`: `opponents`, `episode`, `decisions`, `rules`, `reward_function` and so on.
+            options: further arguments of `VectorEnv`: `token`, `opponents`, `episode`, `decisions`, `rules`, `reward_function`.
         """
         check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
@@ -133,7 +134,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         if self.render_mode is None:
             gymnasium.logger.warn('render needs an environment made with render_mode="ansi" or "human"')
             return None
-        text = as_text(self._now, 0, action_texts(self.vector.address, self.vector.faces))
+        text = as_text(self._now, 0, action_texts(self.vector.server, self.vector.faces))
         if self.render_mode == "ansi":
             return text
         print(text)

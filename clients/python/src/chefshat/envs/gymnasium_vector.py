@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from chefshat.channels import ServerAddress
 from chefshat.columns import Endings
 from chefshat.envs.gymnasium_env import check_open
 from chefshat.envs.observing import Form, ObservationFunction, Observed
@@ -39,7 +40,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     def __init__(
         self,
-        address: str | None = None,
+        address: str | ServerAddress | None = None,
         num_envs: int = 1,
         *,
         seat: int = 0,

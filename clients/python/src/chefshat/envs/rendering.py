@@ -5,6 +5,7 @@ import functools
 import numpy as np
 
 from chefshat import pb
+from chefshat.channels import ServerAddress
 from chefshat.client import Client
 from chefshat.columns import Situations
 
@@ -20,9 +21,9 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 @functools.cache
-def action_texts(address: str, faces: int) -> tuple[str, ...]:
+def action_texts(server: ServerAddress, faces: int) -> tuple[str, ...]:
     """Fetches the texts of all actions."""
-    with Client(address) as client:
+    with Client(server) as client:
         return tuple(client.action_table(faces).texts)
 
 

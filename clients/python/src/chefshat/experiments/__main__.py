@@ -8,6 +8,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from chefshat import join_options
+
 EXAMPLES = """examples:
   python -m chefshat.experiments all --quick
   python -m chefshat.experiments mechanics --seed 1 --out results
@@ -63,7 +65,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="DIR",
         help="folder for results, plots and networks, created if missing (default: %(default)s)",
     )
-    running.add_argument("--address", metavar="HOST:PORT", help="a running server")
+    join_options.add_server_options(running)
     running.add_argument("--json", action="store_true", help="print one object of JSON: the results without the plots")
     commands = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     summaries = {

@@ -15,6 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import chefshat
+from chefshat import join_options
+from chefshat.channels import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.experiments import page, plots, results, tables
 from chefshat.experiments.progress import Progress
@@ -41,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         folder = _folder(options.out)
         for name in names:
             _keep_full_runs(results_file(folder, name), quick=options.quick)
-        with _server(options.address) as address:
+        with _server(join_options.server_if_any(options)) as address:
             with chefshat.Client(address) as client:
                 server_version = client.server_info().server_version
             seeds = tuple(range(options.seed, options.seed + options.seeds))
@@ -148,13 +150,13 @@ def _keep_full_runs(path: Path, *, quick: bool) -> None:
 
 
 @contextlib.contextmanager
-def _server(address: str | None) -> Iterator[str]:
+def _server(address: ServerAddress | None) -> Iterator[ServerAddress]:
     """Yields the given server's address, or that of a new server, which stops at the end."""
     if address is not None:
         yield address
         return
     with LocalServer() as server:
-        yield server.address
+        yield ServerAddress(server.address, token="")
 
 
 def _command(result: Result) -> str:

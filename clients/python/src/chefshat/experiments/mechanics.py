@@ -16,6 +16,7 @@ import numpy.typing as npt
 from google.protobuf.json_format import MessageToDict
 
 from chefshat import pb
+from chefshat.channels import ServerAddress
 from chefshat.experiments import paper, stats
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Points, Result, Table
@@ -135,7 +136,14 @@ def run(config: Config, progress: Progress) -> Result:
 
 
 def play(
-    address: str, preset: str, condition: str, size: Size, seed: int, advance: Callable[[int], object], *, defaults: bool = False
+    address: ServerAddress,
+    preset: str,
+    condition: str,
+    size: Size,
+    seed: int,
+    advance: Callable[[int], object],
+    *,
+    defaults: bool = False,
 ) -> Counted:
     """Plays games under a preset without the mechanic of the condition.
 

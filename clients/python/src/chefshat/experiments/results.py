@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from chefshat.channels import ServerAddress
 from chefshat.files import write_atomically
 
 FORMAT = "chefshat-experiment-1"
@@ -26,13 +27,13 @@ class Config:
     """The settings of a run.
 
     Attributes:
-        address: the server, "host:port".
+        address: the server.
         seeds: one for each repetition, ascending. Experiments without repetitions use the first.
         quick: whether to only test that everything works, in seconds.
         out: an existing folder for trained networks. Experiment 3 reads those of Experiment 2 there.
     """
 
-    address: str
+    address: ServerAddress
     seeds: tuple[int, ...]
     quick: bool
     out: Path

@@ -119,7 +119,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
 
 def _common(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=_natural, default=1, help="seed of deals and of random choices")
-    command.add_argument("--address", metavar="HOST:PORT", help="a running server")
+    join_options.add_server_options(command)
 
 
 def _evaluate(command: argparse.ArgumentParser) -> None:
@@ -172,7 +172,7 @@ def _deep_q_games(command: argparse.ArgumentParser) -> None:
 
 def _play(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", type=Path, help="the network")
-    command.add_argument("--address", required=True, metavar="HOST:PORT", help="the server")
+    join_options.add_server_options(command, required=True)
     join_options.add_options(command)
     command.add_argument("--name", help="display name, 1 to 64 characters; not needed with a ticket")
     # Conflicts between options are checked after parsing.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from chefshat import pb
+from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
 from chefshat.files import check_readable
 from chefshat.learn import checkpoint, deep_q, deep_q_training, features, network, runs
@@ -82,7 +82,7 @@ def _train(options: argparse.Namespace, state: Path) -> Played:
     rules.ClearField("target_points")
     rules.target_shifts = options.shifts - shifts
     env = VectorEnv(
-        options.address,
+        join_options.server_if_any(options),
         1,
         client_seats=[0],
         opponents=opponents,
@@ -168,7 +168,7 @@ def _resumed(options: argparse.Namespace, state: Path) -> Training:
         asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, **{**_parameters(options), "mask": config.mask})
         runs.refuse_contradictions(dataclasses.asdict(asked), dataclasses.asdict(config))
     if "rules" in options.given:
-        runs.refuse_other_rules(runs.full_rules(options.rules, options.address), before.rules)
+        runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), before.rules)
     if before.shifts >= options.shifts:
         raise ValueError(f"the training has played {before.shifts:,} Shifts already: give more than that with --shifts")
     return before

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from chefshat import join_options
+from chefshat.channels import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
@@ -56,7 +58,7 @@ def evaluate(
     games: int,
     seed: Seed = None,
     rules: Rules = None,
-    address: str | None = None,
+    address: str | ServerAddress | None = None,
 ) -> Evaluation:
     """Plays games with the network on seat 0; random deals make all seats equal.
 
@@ -114,7 +116,12 @@ def run(options: argparse.Namespace) -> int:
     try:
         trained = network_file.load(options.file)
         found = evaluate(
-            trained, options.opponents, games=options.games, seed=options.seed, rules=options.rules, address=options.address
+            trained,
+            options.opponents,
+            games=options.games,
+            seed=options.seed,
+            rules=options.rules,
+            address=join_options.server_if_any(options),
         )
     except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)

@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
 
     def play() -> int:
         net = network.load(options.file)
-        with Client(options.address) as client:
+        with Client(join_options.server_of(options)) as client:
             played = join_options.take_part(client, way, lambda seat: NetworkAgent(net), check_rules=NetworkAgent(net).check_rules)
             return outcome.report(played, as_json=options.json)
 

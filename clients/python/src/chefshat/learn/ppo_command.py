@@ -19,6 +19,7 @@ import numpy as np
 from google.protobuf import json_format
 from tqdm import tqdm
 
+from chefshat import join_options
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
@@ -40,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         if not out.parent.is_dir():
             raise ValueError(f"there is no folder {out.parent} to write {out.name} to")
         training = _resume(state, options) if options.resume else _start(options)
-        with Trainer(training, address=options.address) as trainer, _log_file(log, append=options.resume):
+        with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
             LOG.info(json.dumps(_setup(trainer.training)))
             evaluations = _train(trainer, options, state)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
@@ -76,7 +77,7 @@ def _start(options: argparse.Namespace) -> Training:
         raise ValueError(
             f"{plan.steps} steps of {plan.games + plan.opponent_games} games do not split into {plan.hyper.minibatches} parts"
         )
-    rules = runs.full_rules(options.rules, options.address)
+    rules = runs.full_rules(options.rules, join_options.server_if_any(options))
     return ppo_checkpoint.begin(plan, options.seed, rules, runs.trained_by("", options.trained_by))
 
 
@@ -86,7 +87,7 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     fixed = {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
     runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
     if "rules" in options.given:
-        runs.refuse_other_rules(runs.full_rules(options.rules, options.address), training.rules)
+        runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), training.rules)
     return dataclasses.replace(training, trained_by=runs.trained_by(training.trained_by, options.trained_by))
 
 
@@ -125,7 +126,14 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     current = training.network(options.name)
     games = training.plan.evaluation_games
     evaluations = [
-        evaluate(current, opponents, games=games, seed=runs.EVALUATION_SEED, rules=training.rules, address=options.address)
+        evaluate(
+            current,
+            opponents,
+            games=games,
+            seed=runs.EVALUATION_SEED,
+            rules=training.rules,
+            address=join_options.server_if_any(options),
+        )
         for opponents in OPPONENTS
     ]
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)

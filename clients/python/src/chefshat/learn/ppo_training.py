@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
 
+from chefshat.channels import ServerAddress
 from chefshat.learn import ppo
 from chefshat.learn.ppo import Params, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
@@ -26,7 +27,7 @@ from chefshat.vector import VectorEnv
 class Trainer:
     """A running training; a context manager that ends its games."""
 
-    def __init__(self, training: Training, *, address: str | None = None) -> None:
+    def __init__(self, training: Training, *, address: str | ServerAddress | None = None) -> None:
         """Starts the games. Raises `ChefsHatError` if there is no server or it refuses."""
         plan = training.plan
         runs = training.progress.runs + 1

@@ -13,6 +13,7 @@ from typing import Any, Self
 from google.protobuf.json_format import MessageToDict
 
 from chefshat import pb
+from chefshat.channels import ServerAddress
 from chefshat.vector import Rules, VectorEnv
 
 # Seeds given by users are below 2^31. Adding multiples of this gives other games.
@@ -26,7 +27,7 @@ LEFT_OUT = " [...] "
 INTERRUPTED = 130
 
 
-def full_rules(rules: Rules, address: str | None) -> pb.RuleSet:
+def full_rules(rules: Rules, address: str | ServerAddress | None) -> pb.RuleSet:
     """Returns a rule set with every field set by the server."""
     with VectorEnv(address, 1, rules=rules, seed=0) as env:
         return env.rules

@@ -19,6 +19,7 @@ import numpy as np
 import optuna
 from tqdm import tqdm
 
+from chefshat import join_options
 from chefshat.errors import ChefsHatError, failed
 from chefshat.files import write_atomically
 from chefshat.learn import deep_q, deep_q_training, runs
@@ -98,7 +99,7 @@ def evaluate(options: argparse.Namespace, config: DeepQConfig, *, afresh: bool =
     first = options.seed + options.agents * afresh
     seeds = [first + number for number in range(options.agents)]
     env = VectorEnv(
-        options.address,
+        join_options.server_if_any(options),
         len(seeds),
         client_seats=[0],
         opponents=options.opponents,

@@ -58,7 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def play_all() -> int:
         # Starts the player before joining, so that nobody waits for a player that fails to start.
-        with Players(spec, options.games or 1, attempts=options.attempts) as players, Client(options.address) as client:
+        with (
+            Players(spec, options.games or 1, attempts=options.attempts) as players,
+            Client(join_options.server_of(options)) as client,
+        ):
             codes = [play(client, players, way, as_json=options.json) for way in options.ways]
             return max(*codes, int(players.given_up))
 
@@ -91,7 +94,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--server", "--address", dest="address", required=True, help="the server, HOST:PORT")
+    join_options.add_server_options(parser, "--server", required=True)
     join_options.add_options(parser, several_codes=True)
     parser.add_argument("--agent", required=True, type=class_name, help="the player, module.path:Class")
     parser.add_argument("--python", default=sys.executable, help="the Python with the player's dependencies (default: this one)")

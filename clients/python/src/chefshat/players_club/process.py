@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Self
 
+from chefshat.channels import TOKEN
 from chefshat.join_options import TICKET
 
 LOG = logging.getLogger("chefshat")
@@ -175,7 +176,7 @@ class _Running:
                 stderr=subprocess.PIPE,
                 start_new_session=True,
                 # The agent must not see the ticket.
-                env={name: value for name, value in os.environ.items() if name != TICKET},
+                env={name: value for name, value in os.environ.items() if name not in (TICKET, TOKEN)},
             )
         except OSError as error:
             raise AgentLost(f"{python} cannot be started: {error.strerror or error}") from error

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chefshat import pb
+from chefshat.channels import ServerAddress
 from chefshat.client import Client
 from chefshat.columns import Sizes
 from chefshat.errors import ChefsHatError
@@ -100,7 +101,7 @@ def from_records(paths: Path | str | Sequence[Path | str], **options: Any) -> Tr
         return from_dataset(made, **options)
 
 
-def from_server(address: str, wanted: pb.RecordFilter | None = None, **options: Any) -> Transitions:  # noqa: ANN401 - See from_dataset.
+def from_server(address: str | ServerAddress, wanted: pb.RecordFilter | None = None, **options: Any) -> Transitions:  # noqa: ANN401 - See from_dataset.
     """Returns the transitions of a server's recorded games, optionally those that match a filter.
 
     Downloads the records and replays them by the program chefshat on this machine. `options` are those of `from_dataset`.

@@ -1,0 +1,154 @@
+"""Opening channels: addresses, TLS, tokens, and the options of connections."""
+
+import os
+import ssl
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import grpc
+import grpc.aio
+
+#: Environment variable that may contain a token.
+TOKEN = "CHEFSHAT_TOKEN"
+#: Environment variable that may name a file of certificate authorities.
+CA = "CHEFSHAT_CA"
+
+# First line of each certificate in a PEM file.
+_CERTIFICATE = b"-----BEGIN CERTIFICATE-----"
+
+# Times in milliseconds. The channel's own delays between connection attempts are short, because `Backoff` adds its own. (Except for
+# "grpc.min_reconnect_backoff_ms", which despite its name limits the duration of one attempt.) While a stream is open and silent,
+# pings detect a dead peer, in less than the default time for a decision: 10 s.
+CHANNEL_OPTIONS: list[tuple[str, int]] = [
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+    ("grpc.keepalive_time_ms", 3_000),
+    ("grpc.keepalive_timeout_ms", 5_000),
+    # Limits the wait for the answer to any ping, 60 s otherwise.
+    ("grpc.http2.ping_timeout_ms", 5_000),
+    # By default a silent connection is only pinged twice.
+    ("grpc.http2.max_pings_without_data", 0),
+    # Gives every client of a process its own connection.
+    ("grpc.use_local_subchannel_pool", 1),
+]
+
+
+@dataclass(frozen=True)
+class ServerAddress:
+    """A server, and what it requires from a client. Accepted wherever an address is.
+
+    Attributes:
+        address: "host:port", "http://host:port" or, for TLS, "https://host:port".
+        token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set; empty: none.
+        ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
+    """
+
+    address: str
+    # Left out of the representation, which may be logged.
+    token: str | None = field(default=None, repr=False)
+    ca: Path | str | None = None
+
+    def __str__(self) -> str:
+        return self.address
+
+
+def server_address(address: str | ServerAddress, token: str | None = None, ca: Path | str | None = None) -> ServerAddress:
+    """Adds a token and authorities to an address, where they are not None."""
+    server = address if isinstance(address, ServerAddress) else ServerAddress(address)
+    return ServerAddress(server.address, server.token if token is None else token, server.ca if ca is None else ca)
+
+
+class Target(NamedTuple):
+    """The address of a server: gRPC's authority, and whether to use TLS."""
+
+    authority: str
+    tls: bool
+
+
+def target(address: str) -> Target:
+    """Parses "host:port", "http://host:port" (the same) or "https://host:port" (TLS)."""
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        return Target(address, tls=False)
+    if scheme not in ("http", "https"):
+        raise ValueError(f"the address {address!r} must begin with http:// or https://")
+    return Target(rest.rstrip("/"), tls=scheme == "https")
+
+
+def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
+    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`."""
+    where = target(server.address)
+    together = [*CHANNEL_OPTIONS, *options]
+    if where.tls:
+        opened = grpc.secure_channel(where.authority, _credentials(server.ca), together)
+    else:
+        opened = grpc.insecure_channel(where.authority, together)
+    token = _token(server)
+    return cast(grpc.Channel, _Authorized(opened, token)) if token else opened
+
+
+def async_channel(server: ServerAddress) -> grpc.aio.Channel:
+    """Opens a channel of asyncio. Call it where the event loop runs."""
+    where = target(server.address)
+    if where.tls:
+        opened = grpc.aio.secure_channel(where.authority, _credentials(server.ca), CHANNEL_OPTIONS)
+    else:
+        opened = grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
+    token = _token(server)
+    return cast(grpc.aio.Channel, _Authorized(opened, token)) if token else opened
+
+
+def _token(server: ServerAddress) -> str:
+    """Returns the token to send; empty if there is none."""
+    token = os.environ.get(TOKEN, "") if server.token is None else server.token
+    token = token.strip()
+    if not (token.isascii() and token.isprintable()):
+        raise ValueError("the token is malformed: copy it as `chefshat token create` printed it")
+    return token
+
+
+def _credentials(ca: Path | str | None) -> grpc.ChannelCredentials:
+    """Returns the authorities of a file, of the environment, or of the system."""
+    ca = ca or os.environ.get(CA)
+    if ca:
+        roots = Path(ca).read_bytes()
+        if _CERTIFICATE not in roots:
+            raise ValueError(f"{ca} contains no certificate in PEM form")
+        return grpc.ssl_channel_credentials(roots)
+    # gRPC has authorities of its own, for systems without such a file.
+    system = ssl.get_default_verify_paths().cafile
+    return grpc.ssl_channel_credentials(Path(system).read_bytes() if system else None)
+
+
+class _Authorized:
+    """A channel that sends a token with every call.
+
+    Unlike interceptors it leaves the call objects of asyncio as they are, and unlike call credentials it does not need TLS.
+    """
+
+    def __init__(self, opened: grpc.Channel | grpc.aio.Channel, token: str) -> None:
+        self._channel = opened
+        self._metadata = (("authorization", f"Bearer {token}"),)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the channel has.
+        return getattr(self._channel, name)
+
+    def unary_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
+        return self._with_token(self._channel.unary_unary(*arguments, **options))
+
+    def unary_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
+        return self._with_token(self._channel.unary_stream(*arguments, **options))
+
+    def stream_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
+        return self._with_token(self._channel.stream_unary(*arguments, **options))
+
+    def stream_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
+        return self._with_token(self._channel.stream_stream(*arguments, **options))
+
+    def _with_token(self, method: Callable[..., object]) -> Callable[..., object]:
+        def call(*inputs: object) -> object:
+            return method(*inputs, metadata=self._metadata)
+
+        return call

@@ -1,0 +1,164 @@
+"""TLS and tokens, with both clients, environments and the command; and connections that go silent."""
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import grpc
+import pytest
+from fake_server import TLS, FakeServer
+from proxy import Proxy
+
+import chefshat
+from chefshat import Backoff, ChefsHatError, Decision, SeatResult, ServerAddress, aio, pb
+from chefshat import agent as command
+from chefshat.channels import CA, TOKEN, channel
+
+SECRET = "chefshat_0badcafe_c2VjcmV0"
+AUTHORITY = TLS / "localhost.pem"
+SEATS = [None, "random", "random", "random"]
+# The default time for a decision, 10 s, and no more.
+POLICY = pb.RoomPolicy(bank_ms=0)
+
+
+@pytest.fixture
+def guarded() -> Iterator[FakeServer]:
+    """A fake server with TLS that requires a token."""
+    with FakeServer(SECRET) as server:
+        yield server
+
+
+def play_blocking(server: str | ServerAddress, agent: chefshat.Agent) -> SeatResult:
+    with chefshat.Client(server) as client:
+        room = client.create_room("tea", seats=SEATS, policy=POLICY)
+        return client.play(agent, client.join_room(room.join_code, "Ada").ticket)
+
+
+def play_asyncio(server: str | ServerAddress, agent: chefshat.Agent) -> SeatResult:
+    async def run() -> SeatResult:
+        async with aio.Client(server) as client:
+            room = await client.create_room("tea", seats=SEATS, policy=POLICY)
+            joined = await client.join_room(room.join_code, "Ada")
+            return await client.play(agent, joined.ticket)
+
+    return asyncio.run(run())
+
+
+Player = Callable[[str | ServerAddress, chefshat.Agent], SeatResult]
+
+
+@pytest.fixture(params=[play_blocking, play_asyncio], ids=["blocking", "asyncio"])
+def play(request: pytest.FixtureRequest) -> Player:
+    """The test runs once with each client."""
+    player: Player = request.param
+    return player
+
+
+def test_a_game_is_played_with_tls_and_a_token(guarded: FakeServer, play: Player) -> None:
+    assert play(ServerAddress(guarded.address, SECRET, AUTHORITY), chefshat.RandomAgent(1)).finished
+
+
+def test_token_and_authorities_come_from_the_environment(
+    guarded: FakeServer, play: Player, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(TOKEN, f" {SECRET}\n")
+    monkeypatch.setenv(CA, str(AUTHORITY))
+    assert play(guarded.address, chefshat.RandomAgent(1)).finished
+    with pytest.raises(ChefsHatError, match="TOKEN_MISSING"):
+        play(ServerAddress(guarded.address, token=""), chefshat.RandomAgent(1))
+
+
+def test_arguments_of_clients_and_environments(guarded: FakeServer) -> None:
+    with chefshat.Client(guarded.address, token=SECRET, ca=AUTHORITY) as client:
+        room = client.create_room("tea", seats=SEATS)
+    result = chefshat.play(
+        chefshat.RandomAgent(1), guarded.address, join_code=room.join_code, name="Ada", token=SECRET, ca=AUTHORITY
+    )
+    assert result.finished
+    env = chefshat.make("vector", address=guarded.address, token=SECRET, ca=AUTHORITY, games=2)
+    assert env.games == 2
+    env.close()
+
+
+def test_the_command_takes_a_token_and_authorities(
+    guarded: FakeServer, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with chefshat.Client(guarded.address, token=SECRET, ca=AUTHORITY) as client:
+        code = client.create_room("tea", seats=SEATS).join_code
+    arguments = ["--address", guarded.address, "--ca", str(AUTHORITY), "--code", code, "--name", "Ada", "--json"]
+    assert command.main(arguments) == 1
+    assert json.loads(capsys.readouterr().out)["reason"] == "TOKEN_MISSING"
+    assert command.main([*arguments, "--token", "chefshat_wrong"]) == 1
+    refused = capsys.readouterr()
+    assert json.loads(refused.out)["reason"] == "TOKEN_UNKNOWN"
+    assert "chefshat_wrong" not in refused.out + refused.err
+    assert command.main([*arguments, "--token", SECRET]) == 0
+
+
+@pytest.mark.parametrize(("token", "reason"), [("", "TOKEN_MISSING"), ("chefshat_1_2", "TOKEN_UNKNOWN")])
+def test_a_refused_token_is_not_sent_again(guarded: FakeServer, play: Player, token: str, reason: str) -> None:
+    server = ServerAddress(guarded.address, token, AUTHORITY)
+    with pytest.raises(ChefsHatError) as caught:
+        play(server, chefshat.RandomAgent(1))
+    assert guarded.guard.calls == 1
+    error = caught.value
+    assert (error.reason, error.code, error.retryable) == (reason, grpc.StatusCode.UNAUTHENTICATED, False)
+    assert "host" in error.message
+    # The same for a stream.
+    with chefshat.Client(server) as client, pytest.raises(ChefsHatError, match=reason):
+        client.play(chefshat.RandomAgent(1), "ticket")
+    assert guarded.guard.calls == 2
+
+
+def test_a_token_is_never_shown(guarded: FakeServer) -> None:
+    server = ServerAddress(guarded.address, SECRET, AUTHORITY)
+    with chefshat.Client(server) as client, pytest.raises(ChefsHatError) as caught:
+        client.get_room("nowhere")
+    opened = channel(server)
+    shown = [server, str(server), client, vars(client), opened, opened.unary_unary("/a/b"), caught.value, caught.value.__cause__]
+    opened.close()
+    assert not any(SECRET in repr(thing) for thing in shown)
+
+
+def test_servers_that_cannot_be_trusted(guarded: FakeServer, fake: FakeServer) -> None:
+    for server in (ServerAddress(guarded.address), ServerAddress(f"https://{fake.address}", ca=AUTHORITY)):
+        with chefshat.Client(server, backoff=Backoff(attempts=3)) as client:
+            with pytest.raises(ChefsHatError, match=r"TLS_FAILED.*CHEFSHAT_CA") as caught:
+                client.play(chefshat.RandomAgent(1), "ticket")
+            assert not caught.value.retryable
+
+
+def test_unusable_files_and_tokens_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty.pem").touch()
+    with pytest.raises(ValueError, match="no certificate"):
+        chefshat.Client("https://localhost", ca=tmp_path / "empty.pem")
+    with pytest.raises(FileNotFoundError):
+        chefshat.Client("https://localhost", ca=tmp_path / "missing.pem")
+    with pytest.raises(ValueError, match="token is malformed") as caught:
+        chefshat.Client("localhost:1", token="two\nlines")
+    assert "lines" not in str(caught.value)
+
+
+class Silencer(chefshat.RandomAgent):
+    """Silences the connection once, at its third decision."""
+
+    def __init__(self, proxy: Proxy) -> None:
+        super().__init__(1)
+        self.proxy = proxy
+        self.decisions = 0
+
+    def decide(self, request: Decision) -> int:
+        self.decisions += 1
+        if self.decisions == 3:
+            self.proxy.silence()
+        return super().decide(request)
+
+
+def test_a_silent_connection_is_replaced_before_a_decision_is_lost(address: str, play: Player) -> None:
+    with Proxy(address) as proxy:
+        agent = Silencer(proxy)
+        result = play(proxy.address, agent)
+    assert result.finished
+    assert result.reconnects == 1
+    assert result.decisions == agent.decisions, "the server decided nothing"
