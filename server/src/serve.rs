@@ -1,6 +1,9 @@
 //! Serves all services and the page on one port, for gRPC and gRPC-web, and shuts down without
 //! leaving a client waiting.
 
+#[cfg(test)]
+mod fuzz;
+
 use std::future::Future;
 use std::io;
 use std::sync::Arc;

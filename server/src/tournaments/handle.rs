@@ -126,8 +126,8 @@ pub(super) enum Message {
 /// The state of a tournament. Its task has one with pending changes; the handle has one with only
 /// committed changes, for readers.
 #[derive(Debug, Clone)]
-pub(super) struct TournamentState {
-    pub(super) core: Tournament,
+pub(crate) struct TournamentState {
+    pub(crate) core: Tournament,
     /// Hashed tickets of participants; built-in ones have none.
     pub(super) tickets: BTreeMap<usize, SecretHash>,
     /// Rooms and game ids of the tournament's games.

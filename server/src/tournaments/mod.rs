@@ -319,7 +319,9 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
 }
 
 /// Restores the state of a stored tournament.
-fn restored(stored: &StoredTournament) -> Result<(TournamentPlan, TournamentState), String> {
+pub(crate) fn restored(
+    stored: &StoredTournament,
+) -> Result<(TournamentPlan, TournamentState), String> {
     let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
         .map_err(|problem: FieldProblem| problem.to_string())?;
     let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;

@@ -1,13 +1,15 @@
 //! Records for tests: games played by random choices and recorded as a server records them, and
-//! transcripts of them.
+//! transcripts of them; random edits of such inputs.
 #![allow(
     clippy::unwrap_used,
     missing_docs,
     reason = "test support: panics where a test fails"
 )]
 
+mod edits;
 mod transcript;
 
+pub use edits::Edits;
 pub use transcript::{Observed, transcript};
 
 use crate::branch::Branch;

@@ -1,5 +1,6 @@
 //! The database returns what was stored. `opening` tests folders and files that cannot be used.
 
+mod damage;
 mod forget;
 mod lists;
 mod opening;

@@ -8,7 +8,7 @@ use super::*;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::journal::TournamentGame;
 
-fn cup(number: u8) -> TournamentHeader {
+pub(super) fn cup(number: u8) -> TournamentHeader {
     TournamentHeader {
         id: Id([number; 16]),
         settings: v1::TournamentSettings {
@@ -25,7 +25,7 @@ fn cup(number: u8) -> TournamentHeader {
 }
 
 /// One entry of every kind.
-fn every_entry() -> Vec<TournamentEntry> {
+pub(super) fn every_entry() -> Vec<TournamentEntry> {
     let entrant = Entrant {
         name: "Bruna".into(),
         kind: ParticipantKind::Robot,
