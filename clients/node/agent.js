@@ -16,15 +16,28 @@ export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM))
 
 const MAX_GAMES = 64; // Maximum number of games that a participant plays at a time.
 const MAX_FAILURES = 9; // Maximum number of consecutive connections without progress.
-const connect = (Service, address) => new Service(address, grpc.credentials.createInsecure());
+const FINAL = ["UNAUTHENTICATED", "PERMISSION_DENIED", "INVALID_ARGUMENT", "UNIMPLEMENTED"].map((code) => grpc.status[code]); // Not retried.
+const KEEPALIVE = { "grpc.keepalive_time_ms": 3_000, "grpc.keepalive_timeout_ms": 5_000 }; // Finds a dead connection before a decision is lost.
+
+/** Connects to `address`: host:port, or https:// for TLS with the authorities in the PEM file `ca` or Node's own. Sends `token` with every call. */
+function connect(Service, { address, token, ca }) {
+  const [, scheme, authority] = /^(?:(https?):\/\/)?(.*?)\/*$/.exec(address);
+  const tls = () => grpc.credentials.createSsl(ca ? readFileSync(ca) : null);
+  const start = (metadata, listener, next) => {
+    if (token) metadata.set("authorization", `Bearer ${token.trim()}`);
+    next(metadata, listener);
+  };
+  const interceptors = [(options, next) => new grpc.InterceptingCall(next(options), { start })];
+  return new Service(authority, scheme === "https" ? tls() : grpc.credentials.createInsecure(), { ...KEEPALIVE, interceptors });
+}
 
 /** Returns the legal actions of a mask: bit i%8 of byte i/8 is action i. */
 export function legalActions(mask) {
   return Array.from({ length: mask.length * 8 }, (_, i) => i).filter((i) => mask[i >> 3] & (1 << (i & 7)));
 }
 
-function join(Service, method, address, request) {
-  const service = connect(Service, address);
+function join(Service, method, server, request) {
+  const service = connect(Service, server);
   const asked = { kind: "PARTICIPANT_KIND_AGENT", ...request };
   return promisify(service[method]).call(service, asked, { deadline: Date.now() + 30_000 }).finally(() => service.close());
 }
@@ -62,8 +75,8 @@ function seatOf(ticket, about = {}) {
 }
 
 /** Plays with the ticket of a seat, or of a tournament participant with all its seats, until the game or tournament is over. */
-async function playTicket(address, ticket) {
-  const client = connect(protocol.PlayService, address);
+async function playTicket(server, ticket) {
+  const client = connect(protocol.PlayService, server);
   let [seats, tournament, participant] = [[seatOf(ticket)]];
   let [outcomes, lost] = [[], new Error("the server ended the stream")];
   try {
@@ -101,17 +114,17 @@ async function playTicket(address, ticket) {
             if (!tournament && !seats.length) return { participant, outcomes };
           }
         }
-      } catch (error) { if (error !== lost) throw error; } finally { stream.cancel(); }
+      } catch (error) { if (error !== lost || FINAL.includes(error.code)) throw error; } finally { stream.cancel(); }
     }
     throw lost;
   } finally { client.close(); }
 }
 
 /** Joins a room or a tournament. Returns the ticket. */
-async function joinTable({ address, code, tournament, name, games }) {
-  if (!tournament) return (await join(protocol.RoomService, "JoinRoom", address, { join_code: code, name })).ticket;
+async function joinTable({ code, tournament, name, games, ...server }) {
+  if (!tournament) return (await join(protocol.RoomService, "JoinRoom", server, { join_code: code, name })).ticket;
   const request = { join_code: tournament, name, max_games: Number(games) };
-  return (await join(protocol.TournamentService, "JoinTournament", address, request)).ticket;
+  return (await join(protocol.TournamentService, "JoinTournament", server, request)).ticket;
 }
 
 /**
@@ -119,7 +132,7 @@ async function joinTable({ address, code, tournament, name, games }) {
  * and the outcome of each game. Throws an error if there is no result.
  */
 export async function play({ ticket, ...way }) {
-  const { participant, outcomes } = await playTicket(way.address, ticket ?? (await joinTable(way)));
+  const { participant, outcomes } = await playTicket(way, ticket ?? (await joinTable(way)));
   if (participant !== undefined) return { participant, games: outcomes.map(({ over, ...outcome }) => outcome) };
   const [{ error, over, ...outcome }] = outcomes;
   if (error) throw Object.assign(new Error(error), { over });
@@ -207,8 +220,9 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
   const option = (value) => ({ type: "string", default: value });
   const own = { ticket: option(process.env.CHEFSHAT_TICKET), "ticket-file": option() };
   const where = { address: option("127.0.0.1:50051"), code: option(), tournament: option() };
+  const access = { token: option(process.env.CHEFSHAT_TOKEN), ca: option(process.env.CHEFSHAT_CA) };
   try {
-    const { values } = parseArgs({ options: { ...where, ...own, name: option("Node"), games: option("1") } });
+    const { values } = parseArgs({ options: { ...where, ...access, ...own, name: option("Node"), games: option("1") } });
     const { ticket: given, "ticket-file": file, ...way } = values;
     if ([way.code, way.tournament, given].filter(Boolean).length > 1 || (given && file)) {
       throw new Error("give one of --code, --tournament and --ticket (or CHEFSHAT_TICKET); --ticket-file excludes --ticket");

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
-import { mkdirSync } from "node:fs";
+import { mkdirSync, readFileSync } from "node:fs";
 import { mkdir, mkdtemp, readFile, readdir, rm, stat, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -13,16 +13,32 @@ import grpc from "@grpc/grpc-js";
 import { legalActions, play, protocol } from "../agent.js";
 
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
-const BARE = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // Variables of the environment must not reach the agent.
+const BARE = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "", CHEFSHAT_TOKEN: "", CHEFSHAT_CA: "" }; // Variables of the environment must not reach the agent.
 const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
 const servers = [];
 after(() => servers.forEach((server) => server.forceShutdown()));
 
+const TLS = fileURLToPath(new URL("../../../tests/fixtures/tls/", import.meta.url));
+const CA = join(TLS, "localhost.pem"); // A certificate for this machine, which is its own authority.
+
 /** A server. Its n-th connection is served by the n-th of `connections`, a function of the stream and of a reader of its commands. */
-async function serve(...connections) {
+const serve = (...connections) => serveWith({}, ...connections);
+
+/** The same with TLS, where every call needs the `token`. `served.calls` counts the calls. */
+async function serveWith({ token }, ...connections) {
   const joins = [];
-  const served = { joins, remaining: connections };
-  const server = new grpc.Server();
+  const served = { joins, remaining: connections, calls: 0 };
+  const refusal = { code: grpc.status.UNAUTHENTICATED, details: "a token is needed" };
+  const guard = (descriptor, call) => new grpc.ServerInterceptingCall(call, {
+    start: (next) => next({
+      onReceiveMetadata: (metadata, pass) => {
+        served.calls += 1;
+        if (!token || metadata.get("authorization")[0] === `Bearer ${token}`) pass(metadata);
+        else call.sendStatus(refusal);
+      },
+    }),
+  });
+  const server = new grpc.Server({ interceptors: [guard] });
   server.addService(protocol.RoomService.service, {
     JoinRoom: ({ request }, done) => {
       joins.push(request);
@@ -47,9 +63,11 @@ async function serve(...connections) {
   servers.push(server);
   const port = await new Promise((resolve, reject) => {
     const bound = (error, number) => (error ? reject(error) : resolve(number));
-    server.bindAsync("127.0.0.1:0", grpc.ServerCredentials.createInsecure(), bound);
+    const [cert_chain, private_key] = [CA, join(TLS, "localhost.key")].map((file) => readFileSync(file));
+    const tls = () => grpc.ServerCredentials.createSsl(null, [{ cert_chain, private_key }]);
+    server.bindAsync("127.0.0.1:0", token ? tls() : grpc.ServerCredentials.createInsecure(), bound);
   });
-  served.address = `127.0.0.1:${port}`;
+  served.address = `${token ? "https://" : ""}127.0.0.1:${port}`;
   return served;
 }
 
@@ -155,6 +173,21 @@ for (const [what, updates, message] of [
     assert.equal(server.remaining.length, 0);
   });
 }
+
+test("TLS with an authority of its own, and a token with every call", async () => {
+  const game = async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  };
+  const server = await serveWith({ token: "chefshat_1_2" }, game);
+  const way = { address: server.address, ca: CA, code: "TABLE", name: "Ada" };
+  assert.deepEqual(await play({ ...way, token: "chefshat_1_2\n" }), { seat: 2, standings: STANDINGS });
+  assert.equal(server.calls, 2);
+  await assert.rejects(play(way), /a token is needed/);
+  await assert.rejects(play({ ...way, ticket: "a ticket" }), /a token is needed/);
+  assert.equal(server.calls, 4, "refused once each");
+  await assert.rejects(play({ ...way, ca: undefined }), /self-signed certificate/);
+});
 
 /** An update of a seat that the server attached: `number` counts these seats from 0. */
 const ofSeat = (number, update) => ({ ...update, handle: 2 ** 31 + number });
