@@ -131,11 +131,11 @@ def test_servers_that_cannot_be_trusted(guarded: FakeServer, fake: FakeServer) -
 
 def test_unusable_files_and_tokens_are_refused(tmp_path: Path) -> None:
     (tmp_path / "empty.pem").touch()
-    with pytest.raises(ValueError, match="no certificate"):
+    with pytest.raises(ChefsHatError, match=r"CA_REFUSED.*no certificate"):
         chefshat.Client("https://localhost", ca=tmp_path / "empty.pem")
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(ChefsHatError, match=r"CA_REFUSED.*missing\.pem"):
         chefshat.Client("https://localhost", ca=tmp_path / "missing.pem")
-    with pytest.raises(ValueError, match="token is malformed") as caught:
+    with pytest.raises(ChefsHatError, match="TOKEN_REFUSED") as caught:
         chefshat.Client("localhost:1", token="two\nlines")
     assert "lines" not in str(caught.value)
 

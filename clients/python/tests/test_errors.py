@@ -68,7 +68,7 @@ def test_a_slow_connection_is_awaited(fake: FakeServer) -> None:
 def test_addresses() -> None:
     for address in ("127.0.0.1:1", "http://127.0.0.1:1/", "https://127.0.0.1:1"):
         chefshat.Client(address).close()
-    with pytest.raises(ValueError, match="must begin with http"):
+    with pytest.raises(ChefsHatError, match=r"ADDRESS_REFUSED.*must begin with http"):
         chefshat.Client("ftp://127.0.0.1:1")
 
 

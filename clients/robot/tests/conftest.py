@@ -7,14 +7,16 @@ from collections.abc import Iterator
 
 import pytest
 from chefshat import LocalServer
+from chefshat.channels import CA, TOKEN
 from chefshat.join_options import TICKET
 from chefshat.local_server import BINARY
 
 
 @pytest.fixture(autouse=True)
-def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Removes a ticket from the environment."""
-    monkeypatch.delenv(TICKET, raising=False)
+def no_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Removes a ticket, a token and authorities from the environment."""
+    for name in (TICKET, TOKEN, CA):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.fixture(scope="session")

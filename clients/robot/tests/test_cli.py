@@ -58,3 +58,26 @@ def test_the_libraries_of_a_subcommand_are_imported_only_for_it() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["affect", "--ticket", "TICKET", "--listen", "127.0.0.1:0"],
+        ["bridge", "{folder}", "--ticket", "TICKET"],
+        ["markers", "ROOM"],
+        ["rehearse"],
+        ["robot", "--room", "CODE", "--name", "Pepe"],
+        ["wizard", "--room", "ROOM", "--seat", "0"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_every_subcommand_that_connects_takes_a_token_and_authorities(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = ["--address", "https://localhost:1", "--token", "chefshat_1_2", "--ca", str(tmp_path / "missing.pem")]
+    (tmp_path / "frame.png").write_bytes(b"")
+    assert cli.main([*(word.format(folder=tmp_path) for word in command), *where]) == 1
+    error = capsys.readouterr().err
+    assert "CA_REFUSED" in error
+    assert "chefshat_1_2" not in error

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, cast
 import grpc
 import grpc.aio
 
+from chefshat.errors import ChefsHatError
+
 #: Environment variable that may contain a token.
 TOKEN = "CHEFSHAT_TOKEN"
 #: Environment variable that may name a file of certificate authorities.
@@ -73,7 +75,7 @@ def target(address: str) -> Target:
     if not separator:
         return Target(address, tls=False)
     if scheme not in ("http", "https"):
-        raise ValueError(f"the address {address!r} must begin with http:// or https://")
+        raise _refused("ADDRESS_REFUSED", f"the address {address!r} must begin with http:// or https://")
     return Target(rest.rstrip("/"), tls=scheme == "https")
 
 
@@ -105,7 +107,7 @@ def _token(server: ServerAddress) -> str:
     token = os.environ.get(TOKEN, "") if server.token is None else server.token
     token = token.strip()
     if not (token.isascii() and token.isprintable()):
-        raise ValueError("the token is malformed: copy it as `chefshat token create` printed it")
+        raise _refused("TOKEN_REFUSED", "the token is malformed: copy it as `chefshat token create` printed it")
     return token
 
 
@@ -113,13 +115,21 @@ def _credentials(ca: Path | str | None) -> grpc.ChannelCredentials:
     """Returns the authorities of a file, of the environment, or of the system."""
     ca = ca or os.environ.get(CA)
     if ca:
-        roots = Path(ca).read_bytes()
+        try:
+            roots = Path(ca).read_bytes()
+        except OSError as error:
+            raise _refused("CA_REFUSED", f"cannot read the authorities: {error}") from error
         if _CERTIFICATE not in roots:
-            raise ValueError(f"{ca} contains no certificate in PEM form")
+            raise _refused("CA_REFUSED", f"{ca} contains no certificate in PEM form")
         return grpc.ssl_channel_credentials(roots)
     # gRPC has authorities of its own, for systems without such a file.
     system = ssl.get_default_verify_paths().cafile
     return grpc.ssl_channel_credentials(Path(system).read_bytes() if system else None)
+
+
+def _refused(reason: str, message: str) -> ChefsHatError:
+    """Returns the error for arguments with which no connection is possible."""
+    return ChefsHatError(reason, message, code=grpc.StatusCode.INVALID_ARGUMENT)
 
 
 class _Authorized:

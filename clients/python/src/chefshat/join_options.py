@@ -52,11 +52,18 @@ class JoinOptions:
     stateless: bool = False
 
 
-def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False) -> None:
+def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False, default: str | None = None) -> None:
     """Adds --address (and other `flags` for the same), --token and --ca."""
-    what = "the server" if required else "a running server"
+    what = "the server" if required or default else "a running server"
+    unless = f" (default: {default})" if default else ""
     parser.add_argument(
-        *flags, "--address", dest="address", required=required, metavar="ADDRESS", help=f"{what}, HOST:PORT or https://HOST:PORT"
+        *flags,
+        "--address",
+        dest="address",
+        required=required,
+        default=default,
+        metavar="ADDRESS",
+        help=f"{what}, HOST:PORT or https://HOST:PORT{unless}",
     )
     parser.add_argument(
         "--token",

@@ -13,11 +13,12 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
 from chefshat import ChefsHatError, aio, pb
+from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot import wire
 from chefshat_robot.cli import CommandError
 from chefshat_robot.drivers.driver import LOG, Affect, RobotError, require
-from chefshat_robot.running import run_command
+from chefshat_robot.running import SERVER, run_command
 
 DESCRIPTION = """\
 Forwards what analysers of faces and voices read, as expressions of the people's seats, recorded with the game.
@@ -188,7 +189,7 @@ async def stream_affects(key: str, value: str) -> AsyncIterator[Affect]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of the subcommand."""
     parser.description = DESCRIPTION
-    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    add_server_options(parser, default=SERVER)
     parser.add_argument(
         "--ticket",
         action="append",
@@ -210,7 +211,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError("give --listen HOST:PORT, --lsl KEY=VALUE, or both")
 
     async def forward() -> int:
-        async with aio.Client(arguments.address) as client:
+        async with aio.Client(server_of(arguments)) as client:
             forwarder = Forwarder(client, given, record_only=arguments.record_only, interval_s=arguments.interval)
             async with asyncio.TaskGroup() as tasks:
                 if arguments.listen:

@@ -10,10 +10,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from chefshat import aio, pb
+from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.cli import CommandError
-from chefshat_robot.running import run_command
+from chefshat_robot.running import SERVER, run_command
 from chefshat_robot.vision import Camera, Perception, Recorder, SourceError, open_source
 from chefshat_robot.vision.hand import HandReader
 
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = DESCRIPTION
     parser.add_argument("source", help="number of a camera, video file, or folder of pictures")
     parser.add_argument("--ticket", required=True, help="the ticket of the table, from creating the room")
-    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    add_server_options(parser, default=SERVER)
     parser.add_argument("--camera", type=Path, metavar="FILE", help="the camera's calibration, from `chefshat-robot calibrate`")
     parser.add_argument("--deck", type=int, choices=range(7), metavar="0..6", help="ignore the cards of other decks")
     parser.add_argument("--fps", type=float, help="frames per second of the camera, or of pictures")
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
             hands = [(seat, open_source(source, arguments.fps)) for seat, source in arguments.hand]
 
             async def watch() -> int:
-                async with aio.Client(arguments.address) as client:
+                async with aio.Client(server_of(arguments)) as client:
                     perception = Perception(camera, arguments.deck, recorder)
                     bridge = Bridge(client, arguments.ticket, perception, on_report=report_printer(arguments.json))
                     readers = [(seat, HandReader(deck=arguments.deck), source) for seat, source in hands]

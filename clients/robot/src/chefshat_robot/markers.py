@@ -20,10 +20,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from chefshat import aio
+from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot import wire
 from chefshat_robot.drivers.driver import LOG, require
-from chefshat_robot.running import live_from, run_command
+from chefshat_robot.running import SERVER, live_from, run_command
 
 DESCRIPTION = """\
 Sends every public event of rooms as markers of Lab Streaming Layer, one stream for each room, until their games are over.
@@ -83,14 +84,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of the subcommand."""
     parser.description = DESCRIPTION
     parser.add_argument("rooms", nargs="+", metavar="ROOM", help="the id of a room")
-    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    add_server_options(parser, default=SERVER)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs the subcommand."""
 
     async def follow_all(rooms: Sequence[str]) -> int:
-        async with aio.Client(arguments.address) as client:
+        async with aio.Client(server_of(arguments)) as client:
             await asyncio.gather(*(send_markers(client, room) for room in rooms))
         return 0
 

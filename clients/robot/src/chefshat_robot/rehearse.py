@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 
 from chefshat import aio, pb
+from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.cli import CommandError
 from chefshat_robot.command_bridge import report_printer, say
 from chefshat_robot.rehearsal import Rehearsal
-from chefshat_robot.running import run_command
+from chefshat_robot.running import SERVER, run_command
 from chefshat_robot.synthetic import DIFFICULTIES, SyntheticTable
 from chefshat_robot.vision.frames import Frame
 from chefshat_robot.vision.perception import Perception
@@ -31,7 +32,7 @@ PLAYERS = 4
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of the subcommand."""
     parser.description = DESCRIPTION
-    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    add_server_options(parser, default=SERVER)
     parser.add_argument("--ticket", help="the ticket of the table of a room that exists; otherwise a room is created")
     parser.add_argument("--people", type=int, default=2, help="people at the table, 1..4 (default: %(default)s)")
     parser.add_argument("--open", type=int, default=0, help="seats left open for robots, agents or the page (default: %(default)s)")
@@ -51,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError(f"a table has {PLAYERS} seats: people at the table and open seats together are at most {PLAYERS}")
 
     async def play() -> int:
-        async with aio.Client(arguments.address) as client:
+        async with aio.Client(server_of(arguments)) as client:
             ticket = arguments.ticket or await _create(client, arguments)
             table = SyntheticTable([], DIFFICULTIES[arguments.difficulty], seed=arguments.seed)
             rehearsal = Rehearsal(
@@ -87,7 +88,8 @@ async def _create(client: aio.Client, arguments: argparse.Namespace) -> str:
         physical=True,
     )
     room = created.room.room_id
-    link = f"http://{arguments.address}/rooms/{room}/table#ticket={created.table_ticket}"
+    page = arguments.address if "://" in arguments.address else f"http://{arguments.address}"
+    link = f"{page.rstrip('/')}/rooms/{room}/table#ticket={created.table_ticket}"
     values = {"room": room, "join_code": created.join_code, "table_ticket": created.table_ticket, "attendant_link": link}
     names = {"room": "room", "join_code": "join code", "table_ticket": "table ticket", "attendant_link": "attendant"}
     say(arguments.json, values, "\n".join(f"{names[key]:12} {value}" for key, value in values.items()))

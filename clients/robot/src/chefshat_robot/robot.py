@@ -15,7 +15,7 @@ from contextlib import nullcontext
 
 from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
 from chefshat.agent import make_agent
-from chefshat.join_options import TICKET
+from chefshat.join_options import TICKET, add_server_options, server_of
 from chefshat.outcome import Played
 from chefshat.outcome import report as report_result
 
@@ -27,7 +27,7 @@ from chefshat_robot.drivers.driver import LOG, Act, Affect, Done, Driver, Expres
 from chefshat_robot.player import RobotPlayer
 from chefshat_robot.questions import Questions
 from chefshat_robot.reporting import Reporter
-from chefshat_robot.running import run_command
+from chefshat_robot.running import SERVER, run_command
 from chefshat_robot.words import LANGUAGES, Words
 
 DESCRIPTION = """\
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments that all commands with a robot share."""
-    parser.add_argument("--address", default="127.0.0.1:50051", help="the server, HOST:PORT (default: %(default)s)")
+    add_server_options(parser, default=SERVER)
     parser.add_argument("--driver", default="simulated", metavar="SPEC", help="the robot (default: %(default)s)")
     parser.add_argument("--list-drivers", action="store_true", help="list the drivers and their options, and exit")
     parser.add_argument("--language", choices=LANGUAGES, default="en", help="what the robot speaks (default: %(default)s)")
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
         driver = drivers.create(arguments.driver)
         async with driver:
             pass  # The robot is there: only then a seat is taken.
-        async with aio.Client(arguments.address) as client:
+        async with aio.Client(server_of(arguments)) as client:
             taken = ticket or await _join(client, arguments)
             result = await play_seat(
                 client,

@@ -16,6 +16,9 @@ from chefshat.errors import INTERRUPTED, from_rpc_error
 from chefshat_robot.cli import CommandError
 from chefshat_robot.drivers.driver import LOG, RobotError
 
+#: The default address of the server.
+SERVER = "127.0.0.1:50051"
+
 Item = TypeVar("Item")
 
 

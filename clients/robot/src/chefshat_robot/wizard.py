@@ -12,6 +12,7 @@ import argparse
 from collections.abc import Callable
 
 from chefshat import aio, pb
+from chefshat.join_options import server_of
 
 from chefshat_robot import drivers, speech
 from chefshat_robot.body import Body, Notice, Times
@@ -101,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     async def follow() -> int:
         driver = drivers.create(arguments.driver)
-        async with aio.Client(arguments.address) as client:
+        async with aio.Client(server_of(arguments)) as client:
             await follow_seat(
                 client,
                 arguments.room,
