@@ -214,6 +214,10 @@ impl Reader {
     }
 
     pub(super) async fn attach(&mut self, attach: v1::Attach) {
+        // The client may have attached on its next stream already, which this one would supersede.
+        if self.outbox.is_abandoned() {
+            return;
+        }
         let handle = self.next_handle;
         self.next_handle = self.next_handle.wrapping_add(1);
         let request_id = attach.request_id;
@@ -483,9 +487,12 @@ pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, 
 mod tests {
     use tokio_util::task::TaskTracker;
 
+    use chefshat_room::journal::ParticipantKind;
+
     use super::*;
     use crate::config::ServerConfig;
     use crate::store::MemoryStore;
+    use crate::tournaments::Entry;
 
     #[tokio::test]
     async fn a_flood_of_commands_yields_to_other_tasks() {
@@ -510,5 +517,43 @@ mod tests {
         tokio::task::yield_now().await;
         assert!(!flood.is_finished());
         flood.abort();
+    }
+
+    #[tokio::test]
+    async fn a_stream_whose_client_has_gone_attaches_nothing() {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        let settings = v1::TournamentSettings {
+            format: v1::TournamentFormat::Swiss.into(),
+            ..v1::TournamentSettings::default()
+        };
+        let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+        let created = tournaments.create("Coppa", plan, None).await;
+        let (tournament, _owner) = created.expect("a tournament");
+        let entry = Entry {
+            name: "Ada".into(),
+            kind: ParticipantKind::Agent,
+            max_games: 1,
+            stateless: true,
+            at_table: false,
+            request_id: None,
+        };
+        let joined = tournament.join(entry).await.expect("it runs");
+        let (_participant, ticket) = joined.expect("it is open");
+        let attach = v1::Attach {
+            ticket: ticket.to_text(),
+            ..v1::Attach::default()
+        };
+        let (outbox, _updates) = Outbox::new();
+        let mut newer = Reader::new(&rooms, &tournaments, &outbox, true);
+        newer.attach(attach.clone()).await;
+        assert_eq!(newer.participants.len(), 1);
+        // The messages of a lost connection may be read after those of the next.
+        let (outbox, updates) = Outbox::new();
+        let mut older = Reader::new(&rooms, &tournaments, &outbox, true);
+        drop(updates);
+        older.attach(attach).await;
+        assert!(older.participants.is_empty(), "it would supersede the newer");
     }
 }
