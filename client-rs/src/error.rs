@@ -129,6 +129,9 @@ impl From<Status> for Error {
                 message = format!("{message}: {causes}");
             }
         }
+        if info.as_ref().is_some_and(|info| info.reason == "TOKEN_MISSING") {
+            message += "; give it with --token, CHEFSHAT_TOKEN or `ConnectOptions`";
+        }
         let (reason, metadata) = match info {
             Some(info) => (Some(info.reason), info.metadata.into_iter().collect()),
             None => (None, BTreeMap::new()),

@@ -143,6 +143,7 @@ async fn a_refused_token_is_not_sent_again() {
     };
     assert_eq!(error.code(), Code::Unauthenticated);
     assert_eq!(error.reason(), Some("TOKEN_MISSING"));
+    assert!(error.message().contains("CHEFSHAT_TOKEN"), "{error}");
     assert_eq!(guarded.calls.load(Ordering::Relaxed), 1);
 }
 

@@ -1,14 +1,17 @@
-// The entry point: applies the stored theme and language, then renders the page.
+// The entry point: takes the token from the address, applies the stored theme and language, then
+// renders the page.
 
 import { render } from "preact";
 import "@fontsource-variable/atkinson-hyperlegible-next/wght.css";
 import "./theme.css";
+import { startToken } from "./api/token";
 import { App } from "./app";
 import { startLanguage } from "./i18n";
 import { startTheme } from "./theme";
 
 const root = document.getElementById("app");
 if (root) {
+  startToken();
   startTheme();
   await startLanguage();
   render(<App />, root);

@@ -2,17 +2,23 @@
 // was no response.
 
 import { create } from "@bufbuild/protobuf";
+import { durationFromMs } from "@bufbuild/protobuf/wkt";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { beforeAll, expect, test } from "vitest";
 import { faultOf, inWords, isPassing } from "../src/api/faults";
-import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
+import { ErrorInfoSchema, RetryInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { startLanguage } from "../src/i18n";
 import { en } from "../src/i18n/en";
 
 beforeAll(startLanguage);
 
-function refusal(reason: string, message: string, metadata: Record<string, string> = {}): ConnectError {
-  const error = new ConnectError(message, Code.InvalidArgument);
+function refusal(
+  reason: string,
+  message: string,
+  metadata: Record<string, string> = {},
+  code = Code.InvalidArgument,
+): ConnectError {
+  const error = new ConnectError(message, code);
   error.details.push({
     desc: ErrorInfoSchema,
     value: create(ErrorInfoSchema, { reason, domain: "chefshat", metadata }),
@@ -36,4 +42,29 @@ test("an unreachable server is retried, a refusal is not", () => {
   expect(isPassing(faultOf(away))).toBe(true);
   expect(isPassing(faultOf(refusal("SHUTTING_DOWN", "")))).toBe(true);
   expect(isPassing(faultOf(refusal("ROOM_FULL", "")))).toBe(false);
+});
+
+test("a limit is explained with the time to wait, in whole seconds", () => {
+  const error = refusal("TOO_MANY_CALLS", "calls: at most 20", {}, Code.ResourceExhausted);
+  expect(inWords(error)).toBe("calls: at most 20");
+  const delays: [number, string][] = [
+    [0, "1 second"],
+    [2100, "3 seconds"],
+    [240_000, "4 minutes"],
+  ];
+  for (const [ms, words] of delays) {
+    error.details[1] = {
+      desc: RetryInfoSchema,
+      value: create(RetryInfoSchema, { retryDelay: durationFromMs(ms) }),
+    };
+    expect(inWords(error)).toBe(`This was too much at once. Try again in ${words}.`);
+  }
+});
+
+test("refused tokens are explained and not retried", () => {
+  for (const reason of ["TOKEN_MISSING", "TOKEN_UNKNOWN", "TOKEN_EXPIRED", "ROLE_TOO_LOW", "OUT_OF_SCOPE"]) {
+    const error = refusal(reason, "the server's words");
+    expect(inWords(error)).not.toContain("the server's words");
+    expect(isPassing(faultOf(error))).toBe(false);
+  }
 });

@@ -17,14 +17,6 @@ DETAILS_KEY = "grpc-status-details-bin"
 TLS_FAILED = "TLS_FAILED"
 # What gRPC writes into the message of such a connection.
 _TLS_MARKS = ("SSL_ERROR_SSL", "Verification Check failed")
-#: What to do about a refused token.
-_TOKEN_HINTS = {
-    "TOKEN_MISSING": "give the token you received from the host as token=, --token or CHEFSHAT_TOKEN",
-    "TOKEN_UNKNOWN": "check that you copied the token completely, or ask the host for another one",
-    "TOKEN_EXPIRED": "ask the host for another one",
-    "ROLE_TOO_LOW": "ask the host for a token with another role",
-    "OUT_OF_SCOPE": "the token is for another room or tournament",
-}
 #: Exit code of a command ended by Ctrl-C, by the convention of shells.
 INTERRUPTED = 130
 
@@ -98,8 +90,8 @@ def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
     if code is grpc.StatusCode.UNAVAILABLE and any(mark in message for mark in _TLS_MARKS):
         how = "for a certificate of a private authority, give the authority's file as ca=, --ca or CHEFSHAT_CA"
         return ChefsHatError(TLS_FAILED, f"no secure connection ({message}); {how}", code=code)
-    if reason in _TOKEN_HINTS:
-        message = f"{message}; {_TOKEN_HINTS[reason]}"
+    if reason == "TOKEN_MISSING":
+        message = f"{message}; give it as token=, --token or CHEFSHAT_TOKEN"
     elif code is grpc.StatusCode.UNAVAILABLE and not reason:
         # gRPC's message includes the address.
         message = f"no server answers ({message}): check that `chefshat serve` runs there, and give its address as HOST:PORT"

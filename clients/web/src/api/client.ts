@@ -11,8 +11,9 @@ import { SpectatorService } from "../gen/chefshat/v1/spectator_service_pb";
 import { TableService } from "../gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../gen/chefshat/v1/tournament_service_pb";
 import { repeat } from "./repeat";
+import { authorize } from "./token";
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat] });
+const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat, authorize] });
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);

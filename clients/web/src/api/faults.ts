@@ -2,8 +2,9 @@
 // (google.rpc.ErrorInfo) and a sentence in English; reasons that a person at this page can meet
 // have a sentence in each language (`faults` in i18n).
 
+import { durationMs } from "@bufbuild/protobuf/wkt";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { ErrorInfoSchema } from "../gen/google/rpc/error_details_pb";
+import { ErrorInfoSchema, RetryInfoSchema } from "../gen/google/rpc/error_details_pb";
 import { t } from "../i18n";
 
 /** The parts of a failed call's error. */
@@ -16,17 +17,21 @@ export interface Fault {
   message: string;
   /** The offending field or limit. */
   metadata: Record<string, string>;
+  /** Milliseconds after which the server would accept the call; undefined if it did not say. */
+  retryMs?: number;
 }
 
 /** Parses anything that a call threw. */
 export function faultOf(thrown: unknown): Fault {
   const error = ConnectError.from(thrown);
   const info = error.findDetails(ErrorInfoSchema)[0];
+  const delay = error.findDetails(RetryInfoSchema)[0]?.retryDelay;
   return {
     reason: info?.reason ?? "",
     code: error.code,
     message: error.rawMessage,
     metadata: { ...info?.metadata },
+    ...(delay && { retryMs: durationMs(delay) }),
   };
 }
 
@@ -43,6 +48,9 @@ export function wordsOf(fault: Fault): string {
   const known: Record<string, string> = t().faults.byReason;
   const own = known[fault.reason];
   if (own !== undefined) return own;
+  if (fault.code === Code.ResourceExhausted && fault.retryMs !== undefined) {
+    return t().faults.tooMuch(Math.max(1, Math.ceil(fault.retryMs / 1000)) * 1000);
+  }
   if (fault.reason === "" && isPassing(fault)) return t().faults.notReached;
   return fault.message || t().faults.unknown;
 }

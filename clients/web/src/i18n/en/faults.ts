@@ -1,10 +1,20 @@
 // What can go wrong in a call, in English: by the server's reason, for reasons that a person at the
 // page can meet.
 
+import { time } from "./time";
+
 export const faults = {
   notReached: "The server does not answer. It may be restarting; try again in a moment.",
   unknown: "Something went wrong.",
+  tooMuch: (ms: number) => `This was too much at once. Try again in ${time(ms)}.`,
   byReason: {
+    TOKEN_MISSING:
+      "This server is open to invited people only. Ask its host for a link with a token, and open it here.",
+    TOKEN_UNKNOWN:
+      "The server does not know the token of your link. Check that you opened the complete link, or ask its host for a new one.",
+    TOKEN_EXPIRED: "The token of your link has expired. Ask the server’s host for a new link.",
+    ROLE_TOO_LOW: "Your link does not allow this. Ask the server’s host for one that does.",
+    OUT_OF_SCOPE: "Your link is for another room or tournament.",
     ROOM_UNKNOWN: "This room no longer exists.",
     ROOM_FULL: "All seats of this room are taken.",
     SEAT_TAKEN: "Someone else has just taken this seat.",

@@ -1,11 +1,20 @@
 // What can go wrong in a call, in Italian.
 
 import type { Texts } from "../en";
+import { time } from "./time";
 
 export const faults: Texts["faults"] = {
   notReached: "Il server non risponde. Forse si sta riavviando: riprova tra poco.",
   unknown: "Qualcosa è andato storto.",
+  tooMuch: (ms: number) => `Troppe richieste in una volta. Riprova tra ${time(ms)}.`,
   byReason: {
+    TOKEN_MISSING:
+      "Questo server è aperto solo agli invitati. Chiedi a chi lo gestisce un link con un token e aprilo qui.",
+    TOKEN_UNKNOWN:
+      "Il server non riconosce il token del tuo link. Controlla di aver aperto il link completo, o chiedine uno nuovo a chi gestisce il server.",
+    TOKEN_EXPIRED: "Il token del tuo link è scaduto. Chiedi un nuovo link a chi gestisce il server.",
+    ROLE_TOO_LOW: "Il tuo link non lo permette. Chiedine uno adatto a chi gestisce il server.",
+    OUT_OF_SCOPE: "Il tuo link vale per un’altra stanza o un altro torneo.",
     ROOM_UNKNOWN: "Questa stanza non esiste più.",
     ROOM_FULL: "Tutti i posti di questa stanza sono occupati.",
     SEAT_TAKEN: "Qualcun altro ha appena preso questo posto.",
