@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::access::AccessSettings;
+
 /// Largest message a client may send, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Most streams of one connection.
@@ -105,6 +107,8 @@ pub struct ServerConfig {
     pub first_byte_timeout: Duration,
     /// Whether clients may import records of games played elsewhere.
     pub allow_import: bool,
+    /// Who may call.
+    pub access: AccessSettings,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
@@ -120,6 +124,7 @@ impl Default for ServerConfig {
             grace: Duration::from_secs(30),
             first_byte_timeout: Duration::from_secs(10),
             allow_import: false,
+            access: AccessSettings::default(),
             allowed_origins: Vec::new(),
         }
     }

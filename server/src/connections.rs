@@ -2,6 +2,7 @@
 //! nothing at the start or whose peer has vanished.
 
 use std::io;
+use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -39,6 +40,14 @@ pub struct Limits {
     pub max_connections: usize,
     /// How long a new connection may stay silent.
     pub first_byte_timeout: Duration,
+}
+
+/// The address of the peer that sent a request, from the request's extensions; `None` for
+/// connections without one, such as those of a unix socket.
+pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
+    let info: &TcpConnectInfo = extensions.get()?;
+    info.remote_addr()
+        .map(|address| address.ip().to_canonical())
 }
 
 /// The connections of a listening socket.

@@ -2,10 +2,12 @@
 //! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
 //! command line is `chefshat`, in `server/cli`.
 
+pub mod access;
 pub mod clock;
 pub mod config;
 pub mod connections;
 pub mod convert;
+pub mod file_watch;
 pub mod grpc;
 pub mod host;
 pub mod outbox;

@@ -21,6 +21,7 @@ use tonic::transport::server::Connected;
 use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
+use crate::access::{Access, TokenFileError};
 use crate::config::{
     DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
     ServerConfig,
@@ -50,6 +51,9 @@ pub enum ServeError {
     /// The threads that step vector games could not be started.
     #[error("starting the threads of vector streams failed: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The tokens file is unreadable.
+    #[error(transparent)]
+    Tokens(#[from] TokenFileError),
     /// A setting is not a web origin.
     #[error("{0:?} is not a web origin; an example is https://example.org")]
     Origin(String),
@@ -77,6 +81,7 @@ pub struct Server {
     store: Arc<dyn Store>,
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    access: Arc<Access>,
     tracker: TaskTracker,
     games: usize,
 }
@@ -87,6 +92,7 @@ impl Server {
     /// # Errors
     /// The store failed.
     pub async fn restored(config: ServerConfig, store: Arc<dyn Store>) -> Result<Self, ServeError> {
+        let access = Access::open(&config.access, config.data_dir.as_ref())?;
         let tracker = TaskTracker::new();
         let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
         let games = rooms.restore().await?;
@@ -97,6 +103,7 @@ impl Server {
             store,
             rooms,
             tournaments,
+            access: Arc::new(access),
             tracker,
             games,
         })
@@ -105,6 +112,11 @@ impl Server {
     /// Number of resumed games and of tournament games that are still to be played.
     pub fn games(&self) -> usize {
         self.games
+    }
+
+    /// Who may call.
+    pub fn access(&self) -> &Access {
+        &self.access
     }
 
     /// Serves on a socket until `shutdown` completes and everything has ended.
@@ -142,6 +154,7 @@ impl Server {
             store,
             rooms,
             tournaments,
+            access,
             tracker,
             ..
         } = self;
@@ -154,6 +167,11 @@ impl Server {
             .set_service_status("", tonic_health::ServingStatus::Serving)
             .await;
 
+        tracker.spawn(
+            closing
+                .clone()
+                .run_until_cancelled_owned(Arc::clone(&access).follow()),
+        );
         let closed = closing.clone();
         let serving = transport::Server::builder()
             .accept_http1(true)
@@ -163,6 +181,7 @@ impl Server {
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())
+            .layer(grpc::AccessLayer::new(Arc::clone(&access)))
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
 

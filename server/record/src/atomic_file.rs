@@ -31,13 +31,33 @@ impl AtomicFile {
     /// # Errors
     /// The file cannot be created.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
+        // By the standard library, with the permissions of any new file.
+        Self::opened_by(path, |part| File::create_new(part))
+    }
+
+    /// Like [`create`](Self::create), for a file that only its owner may read.
+    ///
+    /// # Errors
+    /// The file cannot be created.
+    pub fn create_private(path: &Path) -> Result<Self, WriteError> {
+        let mut options = File::options();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        Self::opened_by(path, |part| options.open(part))
+    }
+
+    /// `open` creates the unfinished file.
+    fn opened_by(
+        path: &Path,
+        open: impl Fn(&Path) -> io::Result<File>,
+    ) -> Result<Self, WriteError> {
         let mut prefix = path.file_name().unwrap_or_default().to_owned();
         prefix.push(".");
         let file = tempfile::Builder::new()
             .prefix(&prefix)
             .suffix(".part")
-            // Created by the standard library, with the permissions of any new file.
-            .make_in(folder_of(path), |part| File::create_new(part))
+            .make_in(folder_of(path), open)
             .map_err(|source| WriteError {
                 path: path.to_path_buf(),
                 source,

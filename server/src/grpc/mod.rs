@@ -1,6 +1,7 @@
 //! The gRPC services: they translate and forward. No handler owns state, so a cancelled one loses
 //! nothing.
 
+mod access;
 mod follow;
 mod info;
 mod new_room;
@@ -15,6 +16,7 @@ mod table;
 mod tournaments;
 mod vector;
 
+pub use access::AccessLayer;
 pub use info::Info;
 pub use play::Play;
 pub use recorded::Recorded;

@@ -1,0 +1,505 @@
+//! Decides about each request, and ends what a token started once the token is revoked or expires.
+//! Reads the tokens file again when it changes.
+
+use std::collections::HashMap;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::sync::{Arc, RwLock};
+use std::time::Duration;
+
+use tokio_util::sync::CancellationToken;
+use tracing::{debug, error, info, warn};
+
+use super::caller::{Caller, Role, Scope};
+use super::calls::{Call, Scoped};
+use super::file::{StoredToken, TokenFile, TokenFileError};
+use super::token::{AccessToken, TokenId};
+use crate::clock::since_epoch_ms;
+use crate::file_watch::FileWatch;
+
+/// How often the tokens file is looked at, and expired tokens are searched for.
+const INTERVAL: Duration = Duration::from_secs(1);
+/// How an `authorization` header with a token starts.
+const BEARER: &[u8] = b"bearer ";
+
+/// Whether callers need a token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// Callers without a token are hosts.
+    Open,
+    /// Callers need a token.
+    Tokens,
+}
+
+/// The settings of access.
+#[derive(Debug, Clone)]
+pub struct AccessSettings {
+    /// Whether callers need a token; `None`: if the tokens file exists.
+    pub mode: Option<Mode>,
+    /// The role of callers without a token in mode [`Mode::Tokens`].
+    pub anonymous: Role,
+    /// The role that is required to read records, if higher than that of the calls.
+    pub records: Role,
+}
+
+impl Default for AccessSettings {
+    fn default() -> Self {
+        Self {
+            mode: None,
+            anonymous: Role::Anyone,
+            records: Role::Spectator,
+        }
+    }
+}
+
+/// Why a request is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// It needs a token and has none.
+    TokenMissing {
+        /// The minimal role.
+        required: Role,
+    },
+    /// Its token was never created, is mistyped, or was revoked.
+    TokenUnknown,
+    /// Its token is no longer valid.
+    TokenExpired,
+    /// Its role is too low.
+    RoleTooLow {
+        /// The minimal role.
+        required: Role,
+        /// The caller's role.
+        role: Role,
+    },
+    /// Its token is limited to something else.
+    OutOfScope {
+        /// What the token is valid for.
+        scope: Scope,
+    },
+}
+
+/// A caller that may proceed.
+#[derive(Debug)]
+pub struct Granted {
+    /// The caller.
+    pub caller: Caller,
+    /// Ends with its token; `None` without a token.
+    pub ended: Option<Ended>,
+}
+
+/// Completes when a token is revoked, expires, or comes to grant something else.
+#[derive(Debug, Clone)]
+pub struct Ended {
+    token: CancellationToken,
+    expires_at_ms: Option<u64>,
+}
+
+impl Ended {
+    /// The signal.
+    pub fn signal(&self) -> &CancellationToken {
+        &self.token
+    }
+
+    /// Why the token is invalid, after the signal.
+    pub fn refusal(&self) -> Refusal {
+        match self.expires_at_ms {
+            Some(expiry) if expiry <= since_epoch_ms() => Refusal::TokenExpired,
+            _ => Refusal::TokenUnknown,
+        }
+    }
+}
+
+/// A token that the server knows.
+#[derive(Debug)]
+struct Known {
+    token: StoredToken,
+    ended: CancellationToken,
+}
+
+/// Decides who may do what.
+#[derive(Debug)]
+pub struct Access {
+    mode: Mode,
+    anonymous: Role,
+    records: Role,
+    file: Option<TokenFile>,
+    known: RwLock<HashMap<TokenId, Known>>,
+}
+
+impl Access {
+    /// Reads the tokens of a data directory; without one there are none.
+    ///
+    /// # Errors
+    /// The tokens file is unreadable.
+    pub fn open(
+        settings: &AccessSettings,
+        data_dir: Option<&PathBuf>,
+    ) -> Result<Self, TokenFileError> {
+        let file = data_dir.map(|folder| TokenFile::of(folder));
+        let tokens = file.as_ref().map(TokenFile::read).transpose()?.flatten();
+        let exists = tokens.is_some();
+        let access = Self {
+            mode: settings.mode.unwrap_or(match exists {
+                true => Mode::Tokens,
+                false => Mode::Open,
+            }),
+            anonymous: settings.anonymous,
+            records: settings.records,
+            file,
+            known: RwLock::default(),
+        };
+        access.replace(tokens.unwrap_or_default());
+        Ok(access)
+    }
+
+    /// Whether callers need a token.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Number of tokens.
+    pub fn tokens(&self) -> usize {
+        self.known().len()
+    }
+
+    /// The role of callers without a token.
+    pub fn role_without_token(&self) -> Role {
+        match self.mode {
+            // Operating a server always needs a token: a proxy makes strangers look local.
+            Mode::Open => Role::Host,
+            Mode::Tokens => self.anonymous,
+        }
+    }
+
+    /// Decides about a request. `authorization` is the value of that header.
+    ///
+    /// # Errors
+    /// It is refused.
+    pub fn check(
+        &self,
+        call: &Call,
+        authorization: Option<&[u8]>,
+        address: Option<IpAddr>,
+    ) -> Result<Granted, Refusal> {
+        let granted = match self.identify(authorization, address) {
+            Ok(granted) => granted,
+            // A call that needs no role needs no valid token either.
+            Err(_) if call.role == Role::Anyone => self.without_token(address),
+            Err(refusal) => return Err(refusal),
+        };
+        let caller = &granted.caller;
+        let required = match call.reads_records {
+            true => call.role.max(self.records),
+            false => call.role,
+        };
+        if caller.role < required {
+            return Err(match caller.token {
+                None => Refusal::TokenMissing { required },
+                Some(_) => Refusal::RoleTooLow {
+                    required,
+                    role: caller.role,
+                },
+            });
+        }
+        match caller.scope {
+            Some(scope) if call.scoped == Scoped::Refused => Err(Refusal::OutOfScope { scope }),
+            _ => Ok(granted),
+        }
+    }
+
+    fn identify(
+        &self,
+        authorization: Option<&[u8]>,
+        address: Option<IpAddr>,
+    ) -> Result<Granted, Refusal> {
+        let Some(value) = authorization else {
+            return Ok(self.without_token(address));
+        };
+        let token = bearer(value).ok_or(Refusal::TokenUnknown)?;
+        let known = self.known();
+        let Known { token, ended } = (known.get(&token.id))
+            .filter(|known| known.token.hash.is(&token.hash()))
+            .ok_or(Refusal::TokenUnknown)?;
+        if token.is_expired(since_epoch_ms()) {
+            return Err(Refusal::TokenExpired);
+        }
+        Ok(Granted {
+            caller: Caller {
+                address,
+                token: Some(token.id),
+                role: token.role,
+                scope: token.scope,
+            },
+            ended: Some(Ended {
+                token: ended.clone(),
+                expires_at_ms: token.expires_at_ms,
+            }),
+        })
+    }
+
+    fn without_token(&self, address: Option<IpAddr>) -> Granted {
+        let caller = Caller {
+            address,
+            role: self.role_without_token(),
+            ..Caller::default()
+        };
+        Granted {
+            caller,
+            ended: None,
+        }
+    }
+
+    /// Follows the tokens file and the expiry of tokens, until it is dropped.
+    pub async fn follow(self: Arc<Self>) {
+        let mut watch = self.file.as_ref().map(|file| FileWatch::of([file.path()]));
+        let mut open_noted = false;
+        // It may have changed since the server read it.
+        let mut changed = true;
+        loop {
+            tokio::time::sleep(INTERVAL).await;
+            changed |= watch.as_mut().is_some_and(FileWatch::has_changed);
+            if let Some(file) = &self.file
+                && std::mem::take(&mut changed)
+            {
+                match file.read() {
+                    Ok(tokens) => {
+                        let tokens = tokens.unwrap_or_default();
+                        debug!(tokens = tokens.len(), "tokens read again");
+                        if self.mode == Mode::Open && !tokens.is_empty() && !open_noted {
+                            open_noted = true;
+                            warn!("the server has tokens but requires none until it is restarted");
+                        }
+                        self.replace(tokens);
+                    }
+                    Err(error) => error!(%error, "the tokens stay as they were"),
+                }
+            }
+            self.end_expired(since_epoch_ms());
+        }
+    }
+
+    /// Replaces the tokens. What those started that are gone or grant something else ends.
+    fn replace(&self, tokens: Vec<StoredToken>) {
+        let mut known = self
+            .known
+            .write()
+            .expect("no code that holds this lock can panic");
+        let mut before = std::mem::take(&mut *known);
+        for token in tokens {
+            let same = before.remove(&token.id);
+            let ended = match same {
+                Some(same) if same.token.grants_the_same_as(&token) => same.ended,
+                Some(other) => {
+                    other.ended.cancel();
+                    CancellationToken::new()
+                }
+                None => CancellationToken::new(),
+            };
+            known.insert(token.id, Known { token, ended });
+        }
+        drop(known);
+        for (id, gone) in before {
+            info!(token = %id, "a token was revoked");
+            gone.ended.cancel();
+        }
+    }
+
+    fn end_expired(&self, now_ms: u64) {
+        for (id, Known { token, ended }) in self.known().iter() {
+            if token.is_expired(now_ms) && !ended.is_cancelled() {
+                info!(token = %id, "a token has expired");
+                ended.cancel();
+            }
+        }
+    }
+
+    fn known(&self) -> std::sync::RwLockReadGuard<'_, HashMap<TokenId, Known>> {
+        self.known
+            .read()
+            .expect("no code that holds this lock can panic")
+    }
+}
+
+/// The token of an `authorization` header: `Bearer TOKEN`.
+fn bearer(value: &[u8]) -> Option<AccessToken> {
+    let (scheme, token) = value.split_at_checked(BEARER.len())?;
+    let token = scheme.eq_ignore_ascii_case(BEARER).then_some(token)?;
+    AccessToken::parse(std::str::from_utf8(token).ok()?.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use tempfile::TempDir;
+
+    use super::*;
+    use crate::access::NewToken;
+    use chefshat_room::ids::Id;
+
+    struct Setup {
+        _folder: TempDir,
+        file: TokenFile,
+        access: Access,
+    }
+
+    impl Setup {
+        fn new(settings: &AccessSettings) -> Self {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().to_path_buf();
+            let access = Access::open(settings, Some(&path)).expect("readable");
+            Self {
+                file: TokenFile::of(&path),
+                _folder: folder,
+                access,
+            }
+        }
+
+        fn add(&self, role: Role, scope: Option<Scope>, lifetime: Option<Duration>) -> AccessToken {
+            let token = self.file.create(NewToken {
+                role,
+                label: String::new(),
+                lifetime,
+                scope,
+            });
+            self.reload();
+            token.expect("written")
+        }
+
+        fn reload(&self) {
+            let tokens = self.file.read().expect("readable").expect("a file");
+            self.access.replace(tokens);
+        }
+
+        fn check(&self, method: &str, token: Option<&AccessToken>) -> Result<Granted, Refusal> {
+            let path = format!("/chefshat.v1.{method}");
+            let header = token.map(|token| format!("Bearer {}", token.to_text()));
+            let call = Call::find(&path).expect("a call");
+            let value = header.as_deref().map(str::as_bytes);
+            self.access.check(call, value, None)
+        }
+    }
+
+    fn required() -> AccessSettings {
+        AccessSettings {
+            mode: Some(Mode::Tokens),
+            ..AccessSettings::default()
+        }
+    }
+
+    #[test]
+    fn tokens_are_required_once_the_file_exists() {
+        let setup = Setup::new(&AccessSettings::default());
+        assert_eq!(setup.access.mode(), Mode::Open);
+        let granted = setup.check("RoomService/CreateRoom", None).expect("open");
+        assert_eq!(granted.caller.role, Role::Host);
+        let token = setup.add(Role::Player, None, None);
+        setup.file.revoke(token.id).expect("written");
+        let folder = setup.file.path().parent().expect("a folder").to_path_buf();
+        let access = Access::open(&AccessSettings::default(), Some(&folder)).expect("readable");
+        assert_eq!((access.mode(), access.tokens()), (Mode::Tokens, 0));
+    }
+
+    #[test]
+    fn a_role_is_enough_or_too_low() {
+        let setup = Setup::new(&required());
+        let host = setup.add(Role::Host, None, None);
+        let player = setup.add(Role::Player, None, None);
+        let granted = setup
+            .check("RoomService/CreateRoom", Some(&host))
+            .expect("a host");
+        assert_eq!(granted.caller.token, Some(host.id));
+        let missing = setup.check("RoomService/CreateRoom", None).map(|_| ());
+        assert_eq!(
+            missing,
+            Err(Refusal::TokenMissing {
+                required: Role::Host
+            })
+        );
+        let refused = setup
+            .check("RoomService/CreateRoom", Some(&player))
+            .map(|_| ());
+        let (required, role) = (Role::Host, Role::Player);
+        assert_eq!(refused, Err(Refusal::RoleTooLow { required, role }));
+        let stranger = AccessToken::random(host.id);
+        let refused = setup
+            .check("RoomService/CreateRoom", Some(&stranger))
+            .map(|_| ());
+        assert_eq!(refused, Err(Refusal::TokenUnknown));
+        // What the server is, everybody learns.
+        let granted = setup.check("ServerService/GetServerInfo", Some(&stranger));
+        assert_eq!(granted.expect("for everybody").caller.role, Role::Anyone);
+    }
+
+    #[test]
+    fn a_scoped_token_calls_nothing_that_has_no_scope() {
+        let setup = Setup::new(&required());
+        let scope = Scope::Room(Id::random());
+        let host = setup.add(Role::Host, Some(scope), None);
+        let refused = setup
+            .check("RoomService/CreateRoom", Some(&host))
+            .map(|_| ());
+        assert_eq!(refused, Err(Refusal::OutOfScope { scope }));
+        let granted = setup
+            .check("RoomService/CloseRoom", Some(&host))
+            .expect("its room");
+        assert_eq!(granted.caller.scope, Some(scope));
+    }
+
+    #[test]
+    fn reading_records_may_require_more() {
+        let setup = Setup::new(&AccessSettings {
+            records: Role::Host,
+            ..required()
+        });
+        let player = setup.add(Role::Player, None, None);
+        let host = setup.add(Role::Host, None, None);
+        assert!(
+            setup
+                .check("RecordService/GetRecord", Some(&player))
+                .is_err()
+        );
+        assert!(setup.check("RecordService/GetRecord", Some(&host)).is_ok());
+        assert!(setup.check("RoomService/GetRoom", Some(&player)).is_ok());
+    }
+
+    #[test]
+    fn what_a_token_started_ends_with_it() {
+        let setup = Setup::new(&required());
+        let revoked = setup.add(Role::Player, None, None);
+        let expiring = setup.add(Role::Player, None, Some(Duration::from_secs(60)));
+        let other = setup.add(Role::Player, None, None);
+        let ended = |token| {
+            let granted = setup.check("PlayService/Play", Some(token)).expect("valid");
+            granted.ended.expect("with a token")
+        };
+        let (first, second, third) = (ended(&revoked), ended(&expiring), ended(&other));
+        setup.file.revoke(revoked.id).expect("written");
+        setup.reload();
+        assert!(first.signal().is_cancelled());
+        assert_eq!(first.refusal(), Refusal::TokenUnknown);
+        setup.access.end_expired(since_epoch_ms());
+        assert!(!second.signal().is_cancelled());
+        setup.access.end_expired(since_epoch_ms() + 60_000);
+        assert!(second.signal().is_cancelled());
+        assert!(!third.signal().is_cancelled());
+        let refused = setup.check("PlayService/Play", Some(&revoked)).map(|_| ());
+        assert_eq!(refused, Err(Refusal::TokenUnknown));
+    }
+
+    #[test]
+    fn an_expired_token_is_named_as_such() {
+        let setup = Setup::new(&required());
+        let token = setup.add(Role::Player, None, Some(Duration::ZERO));
+        let refused = setup.check("PlayService/Play", Some(&token)).map(|_| ());
+        assert_eq!(refused, Err(Refusal::TokenExpired));
+    }
+
+    #[test]
+    fn only_bearer_tokens_are_read() {
+        let text = AccessToken::random(TokenId([1; 4])).to_text();
+        assert!(bearer(format!("Bearer {text}").as_bytes()).is_some());
+        assert!(bearer(format!("bearer {text}").as_bytes()).is_some());
+        for wrong in ["", "Bearer", "Bearer ", "Basic YTpi", &text] {
+            assert!(bearer(wrong.as_bytes()).is_none(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Who may do what: roles and scopes, tokens and the file that holds them, and the minimal role of
+//! every call. Everything here decides and nothing here knows gRPC: `grpc/access.rs` asks
+//! [`Access`] about each request and puts the [`Caller`] into its extensions.
+//!
+//! Join codes, owner tokens and tickets are another matter: they authorise for one room, seat or
+//! tournament, beside the role.
+
+mod caller;
+mod calls;
+mod file;
+mod guard;
+mod token;
+
+pub use caller::{Caller, Role, Scope};
+pub use calls::{CALLS, Call, Scoped};
+pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
+pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};
+pub use token::{AccessToken, TokenId};

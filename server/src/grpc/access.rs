@@ -1,0 +1,219 @@
+//! The layer in front of all services that asks `access` about each request: it refuses the
+//! request, or puts the [`Caller`] into its extensions. A call or stream ends with the token that
+//! authorised it.
+
+use std::future::{Ready, ready};
+use std::net::IpAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use axum::body::HttpBody;
+use bytes::Bytes;
+use futures::future::{BoxFuture, Either};
+use http::{HeaderMap, Request, Response, header};
+use http_body::Frame;
+use tokio_util::sync::WaitForCancellationFutureOwned;
+use tonic::body::Body;
+use tonic::{Code, Status};
+use tower::{Layer, Service};
+use tracing::info;
+
+use super::status::status;
+use crate::access::{Access, Call, Caller, Ended, Granted, Refusal};
+use crate::connections::peer_address;
+
+/// Where the services of this project are.
+const OWN_PACKAGE: &str = "/chefshat.";
+
+/// Puts the decision about each request in front of the services.
+#[derive(Debug, Clone)]
+pub struct AccessLayer {
+    access: Arc<Access>,
+}
+
+impl AccessLayer {
+    /// Creates a layer that asks `access`.
+    pub fn new(access: Arc<Access>) -> Self {
+        Self { access }
+    }
+}
+
+impl<S> Layer<S> for AccessLayer {
+    type Service = WithAccess<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithAccess {
+            access: Arc::clone(&self.access),
+            services,
+        }
+    }
+}
+
+/// The services with the decision in front of them.
+#[derive(Debug, Clone)]
+pub struct WithAccess<S> {
+    access: Arc<Access>,
+    services: S,
+}
+
+impl<S> WithAccess<S> {
+    /// Decides about a request.
+    fn decide<B>(&self, request: &Request<B>) -> Result<Granted, Status> {
+        let address = peer_address(request.extensions());
+        let path = request.uri().path();
+        let Some(call) = Call::find(path) else {
+            if path.starts_with(OWN_PACKAGE) {
+                return Err(Status::unimplemented("this server does not have this call"));
+            }
+            // No service: what follows says so.
+            return Ok(Granted {
+                caller: Caller::default(),
+                ended: None,
+            });
+        };
+        let authorization = request.headers().get(header::AUTHORIZATION);
+        let authorization = authorization.map(|value| value.as_bytes());
+        let checked = self.access.check(call, authorization, address);
+        checked.map_err(|refusal| {
+            log(path, address, refusal);
+            refused(refusal)
+        })
+    }
+}
+
+fn log(path: &str, address: Option<IpAddr>, refusal: Refusal) {
+    let address = address.map(tracing::field::display);
+    info!(call = path, address, ?refusal, "a call was refused");
+}
+
+impl<S, B> Service<Request<B>> for WithAccess<S>
+where
+    S: Service<Request<B>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<
+        Ready<Result<Self::Response, Self::Error>>,
+        Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>,
+    >;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+        let granted = match self.decide(&request) {
+            Ok(granted) => granted,
+            Err(status) => return Either::Left(ready(Ok(status.into_http()))),
+        };
+        // The token has served: nothing behind this layer needs it, or could log it.
+        request.headers_mut().remove(header::AUTHORIZATION);
+        request.extensions_mut().insert(granted.caller);
+        let answering = self.services.call(request);
+        Either::Right(match granted.ended {
+            None => Either::Left(answering),
+            Some(ended) => Either::Right(Box::pin(until_ended(answering, ended))),
+        })
+    }
+}
+
+/// Answers a call, and ends it together with its token.
+async fn until_ended<E>(
+    answering: impl Future<Output = Result<Response<Body>, E>>,
+    ended: Ended,
+) -> Result<Response<Body>, E> {
+    tokio::select! {
+        () = ended.signal().cancelled() => Ok(refused(ended.refusal()).into_http()),
+        response = answering => Ok(response?.map(|body| {
+            // The body of a finished call has nothing left to end.
+            match body.is_end_stream() {
+                true => body,
+                false => Body::new(EndingBody {
+                    body: Some(body),
+                    signalled: Box::pin(ended.signal().clone().cancelled_owned()),
+                    ended,
+                }),
+            }
+        })),
+    }
+}
+
+/// A body that ends with a status once its token does.
+struct EndingBody {
+    /// `None` after the end.
+    body: Option<Body>,
+    signalled: Pin<Box<WaitForCancellationFutureOwned>>,
+    ended: Ended,
+}
+
+impl HttpBody for EndingBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let this = &mut *self;
+        let Some(body) = &mut this.body else {
+            return Poll::Ready(None);
+        };
+        // Checked first: a body that always has something to send ends as well.
+        if !this.ended.signal().is_cancelled() {
+            let frame = Pin::new(body).poll_frame(context);
+            if frame.is_ready() {
+                return frame;
+            }
+        }
+        match this.signalled.as_mut().poll(context) {
+            Poll::Pending => Poll::Pending,
+            Poll::Ready(()) => {
+                this.body = None;
+                let mut trailers = HeaderMap::new();
+                let written = refused(this.ended.refusal()).add_header(&mut trailers);
+                Poll::Ready(Some(written.map(|()| Frame::trailers(trailers))))
+            }
+        }
+    }
+}
+
+/// The status for a refused request.
+fn refused(refusal: Refusal) -> Status {
+    match refusal {
+        Refusal::TokenMissing { required } => status(
+            Code::Unauthenticated,
+            "TOKEN_MISSING",
+            format!(
+                "this server requires a token with the role {required} or higher for this; ask its operator for one, and send it as `authorization: Bearer TOKEN`"
+            ),
+            [("required_role", required.name())],
+        ),
+        Refusal::TokenUnknown => status(
+            Code::Unauthenticated,
+            "TOKEN_UNKNOWN",
+            "the server does not know this token: it is mistyped or was revoked; ask the operator for another",
+            [],
+        ),
+        Refusal::TokenExpired => status(
+            Code::Unauthenticated,
+            "TOKEN_EXPIRED",
+            "this token has expired; ask the operator for another",
+            [],
+        ),
+        Refusal::RoleTooLow { required, role } => status(
+            Code::PermissionDenied,
+            "ROLE_TOO_LOW",
+            format!("this needs the role {required}; the token has the role {role}"),
+            [("required_role", required.name()), ("role", role.name())],
+        ),
+        Refusal::OutOfScope { scope } => status(
+            Code::PermissionDenied,
+            "OUT_OF_SCOPE",
+            format!("the token is valid for {scope} only"),
+            [("scope", &scope.to_string())],
+        ),
+    }
+}
