@@ -22,7 +22,7 @@ use clap::{Parser, Subcommand};
 
 use crate::places::Places;
 use crate::steps::Steps;
-use crate::test::Language;
+use crate::test::Part;
 
 /// Set up, test and lint everything in every language.
 #[derive(Parser)]
@@ -39,9 +39,9 @@ struct Cli {
 enum Task {
     /// Run all tests; sets up what they need, inside the build folder.
     Test {
-        /// Run only the tests of one language.
+        /// Run only the tests of one part.
         #[arg(long, value_enum)]
-        only: Option<Language>,
+        only: Option<Part>,
     },
     /// Check format, lints, protocol, licences and images.
     Lint,

@@ -130,6 +130,16 @@ pub(crate) fn tmux() -> Result<(), Failure> {
     debian_package("tmux")
 }
 
+/// The proxies that are Debian packages, for the tests of docker/proxies.
+pub(crate) fn proxies() -> Result<(), Failure> {
+    for name in ["nginx", "haproxy"] {
+        if !succeeds(format!("/usr/sbin/{name}"), &["-v"]) {
+            debian_package(name)?;
+        }
+    }
+    Ok(())
+}
+
 /// cargo-deny: from the path if it has the right version, else built here. Returns its command.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     let wanted = format!("cargo-deny {CARGO_DENY}");

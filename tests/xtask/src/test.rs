@@ -8,14 +8,14 @@ use clap::ValueEnum;
 use crate::command::{cargo, python_command, with_environment};
 use crate::failure::Failure;
 use crate::lint;
-use crate::places::{NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
+use crate::places::{DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
 use crate::steps::Steps;
 use crate::web;
 
-/// A language whose tests can be run separately.
+/// The tests of a language, or of docker/, which can be run separately.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Language {
+pub(crate) enum Part {
     /// Engine, server, Rust SDK and system tests.
     Rust,
     /// The packages in clients/python and clients/robot.
@@ -24,25 +24,24 @@ pub(crate) enum Language {
     Node,
     /// The page for people in clients/web, including browser tests.
     Web,
+    /// The proxies of docker/, with agents in all languages and a browser.
+    Deployment,
 }
 
-/// Sets up and runs the tests of one language, or of all.
-pub(crate) fn run(
-    places: &Places,
-    steps: &mut Steps,
-    only: Option<Language>,
-) -> Result<(), Failure> {
-    let wants = |language| only.is_none_or(|only| only == language);
+/// Sets up and runs the tests of one part, or of all.
+pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Result<(), Failure> {
+    let wants = |part| only.is_none_or(|only| only == part);
     let has_python = !places.python_packages().is_empty();
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
 
-    if has_python && (wants(Language::Rust) || wants(Language::Python)) {
+    let deployment = wants(Part::Deployment);
+    if has_python && (wants(Part::Rust) || wants(Part::Python) || deployment) {
         steps.run("set up Python", || setup::python_packages(places))?;
     }
-    if has_node && (wants(Language::Rust) || wants(Language::Node)) {
+    if has_node && (wants(Part::Rust) || wants(Part::Node) || deployment) {
         steps.run("set up Node", || setup::node_package(places))?;
     }
-    if has_web && (wants(Language::Rust) || wants(Language::Web)) {
+    if has_web && (wants(Part::Rust) || wants(Part::Web) || deployment) {
         web::run(places, steps)?;
     }
     // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
@@ -57,7 +56,7 @@ pub(crate) fn run(
     ];
     steps.program("build", cargo_command(places).args(build))?;
 
-    if wants(Language::Rust) {
+    if wants(Part::Rust) {
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
@@ -68,20 +67,19 @@ pub(crate) fn run(
         let test = ["test", "--workspace", "--no-fail-fast"];
         steps.program("cargo test", cargo_command(places).args(test))?;
     }
-    if wants(Language::Python) {
+    if wants(Part::Python) {
         if has_python {
             for package in places.python_packages() {
-                let cache = places.own.join("pytest").join(package);
-                let cache = format!("cache_dir={}", cache.display());
-                let mut pytest = python_command(places, package, "pytest");
-                steps.program(&format!("pytest, {package}"), pytest.args(["-o", &cache]))?;
+                if package != DEPLOYMENT {
+                    pytest(places, steps, package)?;
+                }
             }
             lint::python(places, steps)?;
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
         }
     }
-    if wants(Language::Node) {
+    if wants(Part::Node) {
         if has_node {
             let mut node = with_environment(places, Command::new("node"));
             steps.program("node --test", node.arg("--test").current_dir(places.node()))?;
@@ -89,7 +87,7 @@ pub(crate) fn run(
             steps.skip("node --test", NO_NODE_PACKAGE);
         }
     }
-    if wants(Language::Web) {
+    if wants(Part::Web) {
         if has_web {
             web::test(places, steps)?;
             web::check(places, steps)?;
@@ -97,7 +95,20 @@ pub(crate) fn run(
             steps.skip("vitest, browser tests, tsc, biome", NO_WEB_PACKAGE);
         }
     }
+    if deployment {
+        steps.run("set up proxies and a browser", || {
+            setup::proxies().and_then(|()| setup::chromium())
+        })?;
+        pytest(places, steps, DEPLOYMENT)?;
+    }
     Ok(())
+}
+
+fn pytest(places: &Places, steps: &mut Steps, package: &str) -> Result<(), Failure> {
+    let cache = places.own.join("pytest").join(package);
+    let cache = format!("cache_dir={}", cache.display());
+    let mut pytest = python_command(places, package, "pytest");
+    steps.program(&format!("pytest, {package}"), pytest.args(["-o", &cache]))
 }
 
 fn cargo_command(places: &Places) -> Command {

@@ -16,13 +16,20 @@ FLAGS.push("--disable-background-networking", "--disable-component-update", "--d
 /** A running server. */
 export class Server {
   private constructor(
-    private process: ChildProcess,
+    private process: ChildProcess | undefined,
     readonly dataDir: string,
     readonly address: string,
+    private scheme = "http",
   ) {}
 
-  /** Starts the server CHEFSHAT_BIN on a free port, with a data folder of its own. */
+  /**
+   * Starts the server CHEFSHAT_BIN on a free port, with a data folder of its own. If CHEFSHAT_URL is set, the tests use the server
+   * there instead, such as one behind a proxy, whose data folder is CHEFSHAT_DATA_DIR; it cannot be restarted.
+   */
   static async start(): Promise<Server> {
+    const running = process.env.CHEFSHAT_URL && new URL(process.env.CHEFSHAT_URL);
+    const { CHEFSHAT_DATA_DIR: runningData = "" } = process.env;
+    if (running) return new Server(undefined, runningData, running.host, running.protocol.replace(":", ""));
     const dataDir = mkdtempSync(join(tmpdir(), "chefshat-web-"));
     const { child, address } = await serve(dataDir, "127.0.0.1:0");
     return new Server(child, dataDir, address);
@@ -30,17 +37,19 @@ export class Server {
 
   /** Address of the page. */
   get url(): string {
-    return `http://${this.address}`;
+    return `${this.scheme}://${this.address}`;
   }
 
   /** Kills the server and starts it again on the same port with the same data. */
   async restart(): Promise<void> {
+    if (!this.process) throw new Error("a server that the tests did not start cannot be restarted");
     await ended(this.process, "SIGKILL");
     this.process = (await serve(this.dataDir, this.address)).child;
   }
 
   /** Stops the server and deletes its data. */
   async stop(): Promise<void> {
+    if (!this.process) return;
     await ended(this.process, "SIGKILL");
     rmSync(this.dataDir, { recursive: true, force: true });
   }
@@ -75,7 +84,12 @@ export async function person(
   browser: Browser,
   options: BrowserContextOptions = {},
 ): Promise<{ page: Page; faults: string[] }> {
-  const context = await browser.newContext({ locale: "en-GB", viewport: { width: 1280, height: 800 }, ...options });
+  const context = await browser.newContext({
+    locale: "en-GB",
+    viewport: { width: 1280, height: 800 },
+    ignoreHTTPSErrors: true,
+    ...options,
+  });
   context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
   const faults: string[] = [];

@@ -1,0 +1,210 @@
+"""Real proxies with the configurations of docker/proxies, of which only addresses and paths are replaced."""
+
+import contextlib
+import itertools
+import json
+import os
+import shutil
+import signal
+import ssl
+import subprocess
+import sysconfig
+import time
+import urllib.request
+from abc import ABC, abstractmethod
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import ClassVar, Self
+
+import pytest
+from certificates import client_context, issue
+
+CONFIGURATIONS = Path(__file__).resolve().parents[3] / "docker" / "proxies"
+#: How long a test waits for something that must happen, seconds.
+PATIENCE_S = 120.0
+_PORT = 8443
+_numbers = itertools.count(1)
+
+
+class Proxy(ABC):
+    """A proxy with TLS in front of a server; a context manager."""
+
+    #: The program, which may be missing.
+    program: ClassVar[str]
+    #: The configurations; the first is the one to start with.
+    files: ClassVar[tuple[str, ...]]
+
+    def __init__(self, server: str, folder: Path) -> None:
+        """Prepares the proxy of the server at host:port, with its files in an empty folder."""
+        self._folder = folder
+        self._tls = folder / "tls"
+        self._tls.mkdir()
+        # Its own loopback address, so that tests do not compete for ports.
+        high, low = (os.getpid() >> 8) & 255, os.getpid() & 255
+        self.host = f"127.{200 + next(_numbers) % 50}.{high}.{low}"
+        self.address = f"{self.host}:{_PORT}"
+        self.url = f"https://{self.address}"
+        for name in self.files:
+            text = (CONFIGURATIONS / name).read_text()
+            for old, new in self._replacements(server, name):
+                assert old in text, f"{name} has no {old}"
+                text = text.replace(old, new)
+            (folder / name).write_text(text)
+        self._processes: list[subprocess.Popen[bytes]] = []
+        # Envoy ends with the thread that started it.
+        self._starter = ThreadPoolExecutor(1)
+
+    def __enter__(self) -> Self:
+        certificate = issue(self.host, self._tls)
+        self._start()
+        self._until_served(certificate)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            process.send_signal(signal.SIGTERM)
+        for process in self._processes:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(5)
+            # A master process passes its end on to its workers.
+            process.kill()
+            process.wait()
+        self._starter.shutdown()
+
+    def reload(self) -> None:
+        """Replaces the certificate and reloads; returns when new connections get the new certificate."""
+        certificate = issue(self.host, self._tls)
+        self._reload()
+        self._until_served(certificate)
+
+    @abstractmethod
+    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+        """What to replace in a configuration."""
+
+    @abstractmethod
+    def _start(self) -> None: ...
+
+    @abstractmethod
+    def _reload(self) -> None: ...
+
+    def _run(self, *arguments: str) -> None:
+        with (self._folder / "log").open("ab") as log:
+            command = [find(self.program), *arguments]
+            starting = self._starter.submit(subprocess.Popen, command, stdout=log, stderr=log, cwd=self._folder)
+            self._processes.append(starting.result())
+
+    def _until_served(self, certificate: str) -> None:
+        context = client_context()
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+        give_up_at = time.monotonic() + PATIENCE_S
+        while True:
+            with contextlib.suppress(OSError):
+                served = ssl.get_server_certificate((self.host, _PORT), timeout=PATIENCE_S)
+                if served.split() == certificate.split():
+                    return
+            assert self._processes[-1].poll() is None, self.log
+            assert time.monotonic() < give_up_at, self.log
+            time.sleep(0.05)
+
+    @property
+    def log(self) -> str:
+        """The output of the program."""
+        return (self._folder / "log").read_text()
+
+
+class Nginx(Proxy):
+    """Reloads by a signal: new workers accept, old ones finish."""
+
+    program = "nginx"
+    files = ("nginx.conf",)
+
+    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+        kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+        temporary = "".join(f" {kind}_temp_path {self._folder}/{kind};" for kind in kinds)
+        return [
+            ("server server:50051;", f"server {server};"),
+            ("listen 443 ", f"listen {self.address} "),
+            ("/etc/chefshat/tls", str(self._tls)),
+            ("http {", f"http {{{temporary}"),
+        ]
+
+    def _start(self) -> None:
+        directives = f"daemon off; error_log stderr; pid {self._folder}/pid;"
+        self._run("-e", "stderr", "-c", str(self._folder / self.files[0]), "-g", directives)
+
+    def _reload(self) -> None:
+        self._processes[0].send_signal(signal.SIGHUP)
+
+
+class HAProxy(Proxy):
+    """Reloads by a signal to its master process: a new worker accepts, the old one finishes."""
+
+    program = "haproxy"
+    files = ("haproxy.cfg",)
+
+    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+        return [
+            ("server chefshat server:50051 ", f"server chefshat {server} "),
+            ("bind :443 ", f"bind {self.address} "),
+            ("/etc/chefshat/tls", str(self._tls)),
+        ]
+
+    def _start(self) -> None:
+        self._run("-W", "-db", "-f", self.files[0])
+
+    def _reload(self) -> None:
+        self._processes[0].send_signal(signal.SIGUSR2)
+
+
+class Envoy(Proxy):
+    """Loads a new certificate by itself. The first reload is a hot restart as well: a new process accepts, the old one finishes.
+
+    A second hot restart would end the first process, with what it serves.
+    """
+
+    program = "envoy"
+    files = ("envoy.yaml", "envoy-certificate.yaml")
+
+    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+        if name == "envoy-certificate.yaml":
+            return [("/etc/chefshat/tls", str(self._tls))]
+        host, _, port = server.rpartition(":")
+        return [
+            ("address: server, port_value: 50051", f"address: {host}, port_value: {port}"),
+            ("address: 0.0.0.0, port_value: 443", f"address: {self.host}, port_value: {_PORT}"),
+            ("address: 127.0.0.1, port_value: 9901", f"address: {self.host}, port_value: 9901"),
+            ("/etc/chefshat/envoy-certificate.yaml", str(self._folder / "envoy-certificate.yaml")),
+        ]
+
+    def _start(self) -> None:
+        self._launch("--use-dynamic-base-id", "--base-id-path", "base-id")
+
+    def _reload(self) -> None:
+        if len(self._processes) > 1:
+            return
+        base_id = (self._folder / "base-id").read_text().strip()
+        self._launch("--base-id", base_id, "--restart-epoch", "1")
+        give_up_at = time.monotonic() + PATIENCE_S
+        while not self._is_restarted():
+            assert time.monotonic() < give_up_at, self.log
+            time.sleep(0.05)
+
+    def _is_restarted(self) -> bool:
+        with contextlib.suppress(OSError, ValueError), urllib.request.urlopen(f"http://{self.host}:9901/server_info") as answer:
+            info = json.load(answer)
+            return bool(info["state"] == "LIVE" and info["command_line_options"]["restart_epoch"] == 1)
+        return False
+
+    def _launch(self, *arguments: str) -> None:
+        short = ("--drain-time-s", "1", "--parent-shutdown-time-s", "600", "--concurrency", "1", "--log-level", "warning")
+        self._run("-c", self.files[0], *short, *arguments)
+
+
+def find(program: str) -> str:
+    """The path of a proxy. Skips the test if there is none."""
+    installed = Path(sysconfig.get_path("scripts")) / program
+    found = str(installed) if installed.exists() else shutil.which(program, path=f"{os.environ['PATH']}:/usr/sbin")
+    if found is None:
+        pytest.skip(f"{program} is not installed")
+    return found
