@@ -21,7 +21,7 @@ from certificates import client_context, issue
 
 CONFIGURATIONS = Path(__file__).resolve().parents[3] / "docker" / "proxies"
 #: How long a test waits for something that must happen, seconds.
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 _PORT = 8443
 _numbers = itertools.count(1)
 
