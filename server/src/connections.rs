@@ -9,6 +9,7 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 
 use futures::{Stream, stream};
+use prometheus_client::metrics::gauge::Gauge;
 use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
@@ -16,6 +17,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Sleep;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::debug;
+
+use crate::metrics::Counted;
 
 /// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -50,33 +53,41 @@ pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
         .map(|address| address.ip().to_canonical())
 }
 
-/// The connections of a listening socket.
-pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::Result<Connection>> {
+/// The connections of a listening socket. `open`: gauge of open connections.
+pub fn accept(
+    listener: TcpListener,
+    limits: Limits,
+    open: Gauge,
+) -> impl Stream<Item = io::Result<Connection>> {
     let permits = Arc::new(Semaphore::new(limits.max_connections));
-    stream::unfold((listener, permits), move |(listener, permits)| async move {
-        let permit = Arc::clone(&permits)
-            .acquire_owned()
-            .await
-            .expect("the semaphore is never closed");
-        let stream = loop {
-            match listener.accept().await {
-                Ok((stream, _)) => break stream,
-                Err(error) => {
-                    debug!(%error, "accepting a connection failed");
-                    tokio::time::sleep(ACCEPT_PAUSE).await;
+    stream::unfold(
+        (listener, permits, open),
+        move |(listener, permits, open)| async move {
+            let permit = Arc::clone(&permits)
+                .acquire_owned()
+                .await
+                .expect("the semaphore is never closed");
+            let stream = loop {
+                match listener.accept().await {
+                    Ok((stream, _)) => break stream,
+                    Err(error) => {
+                        debug!(%error, "accepting a connection failed");
+                        tokio::time::sleep(ACCEPT_PAUSE).await;
+                    }
                 }
+            };
+            if let Err(error) = set_options(&stream) {
+                debug!(%error, "could not set the options of a connection");
             }
-        };
-        if let Err(error) = set_options(&stream) {
-            debug!(%error, "could not set the options of a connection");
-        }
-        let connection = Connection {
-            stream,
-            silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
-            _permit: permit,
-        };
-        Some((Ok(connection), (listener, permits)))
-    })
+            let connection = Connection {
+                stream,
+                silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
+                _permit: permit,
+                _counted: Counted::new(&open),
+            };
+            Some((Ok(connection), (listener, permits, open)))
+        },
+    )
 }
 
 fn set_options(stream: &TcpStream) -> io::Result<()> {
@@ -99,6 +110,7 @@ pub struct Connection {
     /// Fires unless something has been read.
     silence: Option<Pin<Box<Sleep>>>,
     _permit: OwnedSemaphorePermit,
+    _counted: Counted,
 }
 
 impl Connected for Connection {
@@ -172,7 +184,7 @@ mod tests {
             max_connections: 1,
             first_byte_timeout: Duration::from_secs(60),
         };
-        let mut connections = std::pin::pin!(accept(listener, limits));
+        let mut connections = std::pin::pin!(accept(listener, limits, Gauge::default()));
         let _client = TcpStream::connect(address).await.expect("it listens");
         let connection = connections.next().await.expect("endless").expect("one");
         let socket = SockRef::from(&connection.stream);

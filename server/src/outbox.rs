@@ -219,6 +219,11 @@ impl Outbox {
         }
     }
 
+    /// The queued updates and events.
+    pub fn depth(&self) -> usize {
+        self.lock().weight
+    }
+
     /// Whether the client has gone and nothing in here will be read.
     pub fn is_abandoned(&self) -> bool {
         self.lock().abandoned

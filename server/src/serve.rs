@@ -28,7 +28,9 @@ use crate::config::{
 };
 use crate::connections::{self, Limits};
 use crate::grpc;
+use crate::metrics::Metrics;
 use crate::rooms::Rooms;
+use crate::scrape;
 use crate::store::{Store, StoreError};
 use crate::tournaments::Tournaments;
 use crate::web::PageLayer;
@@ -98,6 +100,7 @@ impl Server {
         let games = rooms.restore().await?;
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
         tournaments.restore().await?;
+        scrape::add_state(&rooms, &tournaments);
         Ok(Self {
             config,
             store,
@@ -119,6 +122,11 @@ impl Server {
         &self.access
     }
 
+    /// What the server counts.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        self.rooms.metrics()
+    }
+
     /// Serves on a socket until `shutdown` completes and everything has ended.
     ///
     /// # Errors
@@ -132,7 +140,7 @@ impl Server {
             max_connections: self.config.max_connections,
             first_byte_timeout: self.config.first_byte_timeout,
         };
-        let incoming = connections::accept(listener, limits);
+        let incoming = connections::accept(listener, limits, self.metrics().connections().clone());
         self.serve_incoming(incoming, shutdown).await
     }
 
@@ -181,6 +189,7 @@ impl Server {
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())
+            .layer(grpc::count_refusals(rooms.metrics()))
             .layer(grpc::AccessLayer::new(Arc::clone(&access)))
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });

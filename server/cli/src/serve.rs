@@ -14,6 +14,7 @@ use tokio::sync::oneshot;
 
 use super::{CommandError, data_dir, say};
 use chefshat_server::config::ServerConfig;
+use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_server::web;
@@ -30,6 +31,10 @@ pub(super) struct Settings {
     /// free port.
     #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
     listen: String,
+    /// Address and port that serve metrics for Prometheus at /metrics, such as 127.0.0.1:9464. They
+    /// contain no names or cards, but anyone who reaches the port can read them. Default: none.
+    #[arg(long, env = "CHEFSHAT_METRICS_LISTEN", value_name = "HOST:PORT", value_parser = host_and_port)]
+    metrics_listen: Option<String>,
     /// Data directory: the database (games.sqlite3) and the records of finished games
     /// (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
@@ -90,17 +95,19 @@ impl Serve {
             }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
-        let listener = TcpListener::bind(&settings.listen).await.map_err(|error| {
-            format!(
-                "cannot listen on {}: {error}; choose another address with --listen",
-                settings.listen
-            )
-        })?;
+        let listener = listen(&settings.listen, "--listen").await?;
+        let metrics_listener = match &settings.metrics_listen {
+            Some(address) => Some(listen(address, "--metrics-listen").await?),
+            None => None,
+        };
         let store: Arc<dyn Store> = match &data_dir {
             Some(folder) => Arc::new(SqliteStore::open(folder).await?),
             None => Arc::new(MemoryStore::default()),
         };
         let address = listener.local_addr()?;
+        let metrics_address = (metrics_listener.as_ref())
+            .map(TcpListener::local_addr)
+            .transpose()?;
         // Before the address is printed, so that an immediate signal is handled.
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
@@ -128,10 +135,20 @@ impl Serve {
             say(serde_json::json!({
                 "event": "listening",
                 "address": address.to_string(),
+                "metrics_address": metrics_address.map(|address| address.to_string()),
                 "games": server.games(),
             }))?;
         }
         eprintln!("listening on http://{address}");
+        if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
+            eprintln!("metrics at http://{address}/metrics");
+            let metrics = Arc::clone(server.metrics());
+            tokio::spawn(async move {
+                if let Err(error) = scrape::serve(listener, metrics).await {
+                    tracing::error!(%error, "metrics are no longer served");
+                }
+            });
+        }
         if !web::is_built_in() {
             eprintln!("the web page is not built in; `cargo xtask web` builds it");
         }
@@ -161,6 +178,14 @@ impl Serve {
         eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Listens on the address of a setting.
+async fn listen(address: &str, flag: &str) -> Result<TcpListener, CommandError> {
+    let listener = TcpListener::bind(address).await.map_err(|error| {
+        format!("cannot listen on {address}: {error}; choose another address with {flag}")
+    })?;
+    Ok(listener)
 }
 
 /// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own

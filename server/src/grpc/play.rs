@@ -17,6 +17,7 @@ use tonic::{Request, Response, Status, Streaming};
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
+use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
@@ -51,6 +52,7 @@ impl Play {
 
     /// Creates the reader of a new stream.
     fn reader(&self, outbox: &Arc<Outbox>, with_decisions: bool) -> Reader {
+        self.rooms.metrics().add_outbox(outbox);
         Reader::new(&self.rooms, &self.tournaments, outbox, with_decisions)
     }
 }
@@ -69,7 +71,9 @@ impl PlayService for Play {
         let reader = self.reader(&outbox, true);
         tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure)));
         let closing = self.closing.clone();
+        let counted = self.rooms.metrics().stream(StreamKind::Play);
         tokio::spawn(async move {
+            let _counted = counted;
             tokio::select! {
                 () = closing.cancelled() => outbox.stop_reading(),
                 () = outbox.abandoned() => {}
@@ -92,7 +96,9 @@ impl PlayService for Play {
         let (outbox, updates) = Outbox::new();
         let mut reader = self.reader(&outbox, false);
         let closing = self.closing.clone();
+        let counted = self.rooms.metrics().stream(StreamKind::Watch);
         tokio::spawn(async move {
+            let _counted = counted;
             for attach in seats {
                 reader.attach(attach).await;
             }

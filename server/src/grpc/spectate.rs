@@ -11,6 +11,7 @@ use tonic::{Request, Response, Status};
 use super::play::with_heartbeats;
 use super::room_service::find;
 use super::status::Refusal;
+use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::SpectateRequest;
 use crate::rooms::Rooms;
@@ -52,7 +53,10 @@ impl SpectatorService for Spectate {
         .map_err(Refusal::from)?
         .map_err(Refusal::from)?;
         let closing = self.closing.clone();
+        self.rooms.metrics().add_outbox(&outbox);
+        let counted = self.rooms.metrics().stream(StreamKind::Spectate);
         tokio::spawn(async move {
+            let _counted = counted;
             tokio::select! {
                 () = outbox.abandoned() => {}
                 () = closing.cancelled() => outbox.end(StreamEnd::Complete),

@@ -21,6 +21,7 @@ use super::status::{
     disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
 };
 use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
+use crate::metrics::StreamKind;
 use crate::convert;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
@@ -304,7 +305,9 @@ impl TournamentService for TournamentCalls {
         })?;
         let (sender, responses) = mpsc::channel(1);
         let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
+        let counted = self.recorded.rooms().metrics().stream(StreamKind::Follow);
         let following = async move {
+            let _counted = counted;
             let followed = follow(&handle, &permits, &sender).await;
             // A follower that does not read does not block the others.
             drop(place);

@@ -35,6 +35,7 @@ use crate::config::{
 };
 use crate::convert;
 use crate::convert::Reset;
+use crate::metrics::{Counted, Metrics, StreamKind};
 use chefshat_record::convert::Played;
 use chefshat_room::ids::random_bytes;
 
@@ -81,6 +82,10 @@ impl Vectors {
             closing,
         })
     }
+
+    fn metrics(&self) -> &Metrics {
+        self.recorded.rooms().metrics()
+    }
 }
 
 #[tonic::async_trait]
@@ -99,6 +104,7 @@ impl VectorService for Vectors {
             service: self.clone(),
             responses,
             _permit: permit,
+            _counted: self.metrics().stream(StreamKind::Vector),
         };
         tokio::spawn(runner.run(request.into_inner()));
         Ok(Response::new(ReceiverStream::new(stream)))
@@ -110,6 +116,7 @@ struct Runner {
     service: Vectors,
     responses: mpsc::Sender<Result<v1::RunResponse, Status>>,
     _permit: OwnedSemaphorePermit,
+    _counted: Counted,
 }
 
 /// The reason why a stream ends.
@@ -160,6 +167,7 @@ impl Runner {
         };
         let setup = self.setup(&message).await?;
         let _seats = self.reserve(&setup)?;
+        let _games = self.service.metrics().vector_games(setup.games());
         self.send(ResponseKind::Started(convert::started_to_proto(&setup)))
             .await?;
         let in_place = steps_in_place(&setup);
@@ -182,6 +190,10 @@ impl Runner {
             let Some(command) = self.next_command(requests).await? else {
                 return Err(End::Gone);
             };
+            if let Command::Actions(actions) = &command {
+                let decisions = u64::try_from(actions.len()).unwrap_or(u64::MAX);
+                self.service.metrics().vector_decided(decisions);
+            }
             let step = move || (execute(&mut games, command), games);
             let stepped;
             (stepped, games) = match in_place {

@@ -62,6 +62,11 @@ impl Handle {
         self.id
     }
 
+    /// Number of messages in the mailbox.
+    pub fn mailbox_depth(&self) -> usize {
+        self.mailbox.max_capacity() - self.mailbox.capacity()
+    }
+
     /// Takes a seat.
     ///
     /// # Errors

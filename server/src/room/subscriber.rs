@@ -16,6 +16,7 @@ use chefshat_room::log::RoomEvent;
 use chefshat_room::{ConnectionId, Core};
 
 use crate::convert;
+use crate::metrics::Counted;
 use crate::outbox::{HandStamp, OnSpace, Outbox, StreamEnd};
 use crate::wire::{Events, Updates, encode_decision, put_event};
 
@@ -60,6 +61,7 @@ pub struct Subscriber {
 enum Role {
     Seat(SeatConnection),
     Spectator {
+        _counted: Counted,
         /// Number of events it could see when its stream last had space.
         kept_up_at: usize,
     },
@@ -85,6 +87,7 @@ pub struct SeatConnection {
     acknowledged: u64,
     /// Whether a decision request is among the pending updates.
     decision_pending: bool,
+    _counted: Counted,
 }
 
 impl SeatConnection {
@@ -96,6 +99,7 @@ impl SeatConnection {
         options: DeliveryOptions,
         stamp: Arc<HandStamp>,
         detached: Arc<AtomicBool>,
+        counted: Counted,
     ) -> Self {
         Self {
             seat,
@@ -107,6 +111,7 @@ impl SeatConnection {
             sent: 0,
             acknowledged: 0,
             decision_pending: false,
+            _counted: counted,
         }
     }
 }
@@ -133,6 +138,7 @@ impl Subscriber {
         on_space: Arc<dyn OnSpace>,
         from: usize,
         with_snapshot: bool,
+        counted: Counted,
     ) -> Self {
         let visible = core.visible_to_spectators();
         let position = if with_snapshot {
@@ -141,6 +147,7 @@ impl Subscriber {
             from.min(visible)
         };
         let role = Role::Spectator {
+            _counted: counted,
             kept_up_at: visible,
         };
         let mut spectator = Self::new(position, outbox, on_space, role);
@@ -333,7 +340,7 @@ impl Subscriber {
         if !self.pending.is_empty() && !self.flush() {
             return self.keeps_up(visible);
         }
-        if let Role::Spectator { kept_up_at } = &mut self.role {
+        if let Role::Spectator { kept_up_at, .. } = &mut self.role {
             *kept_up_at = visible;
         }
         if over {
@@ -381,7 +388,7 @@ impl Subscriber {
 
     /// Disconnects a spectator that is too far behind. Seats have no such limit.
     fn keeps_up(&mut self, visible: usize) -> bool {
-        let Role::Spectator { kept_up_at } = self.role else {
+        let Role::Spectator { kept_up_at, .. } = self.role else {
             return true;
         };
         if visible.saturating_sub(kept_up_at) <= MAX_SPECTATOR_LAG {

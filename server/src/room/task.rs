@@ -14,8 +14,9 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
-use chefshat_room::journal::{AbortReason, SeatedParticipant};
+use chefshat_room::journal::{AbortReason, Change, ParticipantKind, SeatedParticipant};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
+use smallvec::SmallVec;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
@@ -32,6 +33,7 @@ use super::table_view::TableView;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
+use crate::metrics::{Counted, Metrics, Outcome};
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::store::{Journal, Store, StoreError};
@@ -52,6 +54,8 @@ pub struct TaskContext {
     pub connections: Arc<AtomicU64>,
     /// Tasks that a shutdown waits for.
     pub tracker: TaskTracker,
+    /// Counts what the room does.
+    pub metrics: Arc<Metrics>,
     /// Notified when the game of a room has ended, and when the room is gone.
     pub watcher: Arc<dyn RoomWatcher>,
 }
@@ -77,6 +81,7 @@ pub(super) fn spawn(
     let resting = Arc::new(Resting::default());
     let seats = core.header().fills.len();
     let physical = core.header().is_physical();
+    let (state, core_changes) = (core.state(), core.changes());
     let room = Box::new(Room {
         core,
         journal,
@@ -95,6 +100,9 @@ pub(super) fn spawn(
         timer_at: None,
         answers_in_place: false,
         table: physical.then(|| Box::new(TableView::new())),
+        counted_changes: core_changes,
+        counted_state: (state, context.metrics.room(state)),
+        answers_read: SmallVec::new(),
         context: context.clone(),
     });
     context
@@ -159,6 +167,12 @@ pub(super) struct Room {
     answers_in_place: bool,
     /// The physical table, if the room has one.
     table: Option<Box<TableView>>,
+    /// Number of changes that the metrics include.
+    counted_changes: u64,
+    /// The state as which the room is counted.
+    counted_state: (State, Counted),
+    /// When the answers were read whose results are not published.
+    answers_read: SmallVec<[Instant; 1]>,
     context: TaskContext,
 }
 
@@ -484,6 +498,7 @@ impl Room {
     fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
         match action {
             SeatAction::Answer(answer) => {
+                self.answers_read.push(arrived);
                 let (decision_id, action) = (answer.decision_id, answer.action);
                 let handed = self.connections[seat.index()]
                     .as_ref()
@@ -551,6 +566,7 @@ impl Room {
             Arc::clone(&self.on_space),
             request.from,
             request.snapshot,
+            self.context.metrics.spectator(),
         );
         self.spectators.push(spectator);
         Ok(())
@@ -558,7 +574,43 @@ impl Room {
 
     /// Commits new changes if this takes no time.
     fn commit_now(&mut self) -> bool {
+        self.count_changes();
         self.core.pending().is_empty() || self.journal.append_now(self.core.pending())
+    }
+
+    /// Counts the changes that are not counted yet, which are the last ones pending.
+    fn count_changes(&mut self) {
+        let new = self.core.changes() - self.counted_changes;
+        self.counted_changes += new;
+        let Self { core, context, .. } = self;
+        let header = Arc::clone(core.header());
+        let metrics = &context.metrics;
+        let pending = core.pending();
+        let first = (pending.len()).saturating_sub(usize::try_from(new).unwrap_or(usize::MAX));
+        for entry in &pending[first..] {
+            match &entry.change {
+                Change::Decided(decided) => {
+                    let built_in = header.fills[decided.seat.index()].is_built_in();
+                    metrics.decided(decided, Outcome::of(decided.source, built_in));
+                }
+                Change::Attempted { .. } => metrics.invalid_answer(),
+                _ => {}
+            }
+        }
+    }
+
+    /// Counts the answers that have been published, and a new state of the room.
+    fn count_published(&mut self) {
+        if !self.answers_read.is_empty() {
+            let now = Instant::now();
+            for read in self.answers_read.drain(..) {
+                self.context.metrics.answered(now - read);
+            }
+        }
+        let state = self.core.state();
+        if state != self.counted_state.0 {
+            self.counted_state = (state, self.context.metrics.room(state));
+        }
     }
 
     /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
@@ -598,6 +650,7 @@ impl Room {
             table.follow(&self.core, self.now);
         }
         self.deliver();
+        self.count_published();
     }
 
     fn release(&mut self, release: Release) {
@@ -647,6 +700,8 @@ impl Room {
         connection: ConnectionId,
         reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
     ) {
+        let participant = self.core.standing(seat).participant;
+        let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
         let connected = SeatConnection::new(
             seat,
             connection,
@@ -654,6 +709,7 @@ impl Room {
             request.options,
             HandStamp::new(self.clock),
             request.detached,
+            self.context.metrics.seat(kind),
         );
         let mut subscriber =
             Subscriber::seat(connected, request.outbox, Arc::clone(&self.on_space));
@@ -707,6 +763,7 @@ impl Room {
         // A game without a deal has no record.
         let summary = self.core.game().map(|_| convert::summary(&self.core));
         let has_record = summary.is_some();
+        (self.context.metrics).game_ended(self.core.state() == State::Finished);
         if let Err(error) = self.journal.finish(summary.map(Box::new)).await {
             self.fail(&error);
             return false;

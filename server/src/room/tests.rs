@@ -86,6 +86,7 @@ async fn room_with(
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
             tracker: TaskTracker::new(),
+            metrics: Arc::default(),
             watcher: Arc::new(NullWatcher),
         },
     )

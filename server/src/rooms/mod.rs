@@ -19,6 +19,7 @@ use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::config::ServerConfig;
+use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
 use crate::store::{Store, StoreError};
@@ -101,6 +102,10 @@ pub struct Rooms {
 impl Rooms {
     /// Creates an empty set.
     pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
+        let metrics = Arc::new(Metrics::default());
+        if let Some(store) = store.metrics() {
+            metrics.add_store(store);
+        }
         Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
             closed: Mutex::default(),
@@ -117,6 +122,7 @@ impl Rooms {
                 retention: config.retention,
                 connections: Arc::new(AtomicU64::new(1)),
                 tracker,
+                metrics,
                 watcher: Arc::new(Watcher(Weak::clone(rooms))),
             },
             max_rooms: config.max_rooms,
@@ -259,6 +265,18 @@ impl Rooms {
     /// The store of games.
     pub fn store(&self) -> &Arc<dyn Store> {
         &self.context.store
+    }
+
+    /// What the server counts.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        &self.context.metrics
+    }
+
+    /// Number of messages in the mailbox of each room.
+    pub fn mailbox_depths(&self) -> Vec<usize> {
+        let table = self.lock();
+        let handles = table.by_number.values().map(|entry| &entry.handle);
+        handles.map(Handle::mailbox_depth).collect()
     }
 
     /// Writes records to files.

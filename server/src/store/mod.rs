@@ -17,6 +17,7 @@ pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use sqlite::{ForgetError, Forgetting, Forgotten, OpenError, SqliteStore};
 
+use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
@@ -87,6 +88,14 @@ pub trait Store: Send + Sync + 'static {
     /// Whether there is space for new games besides the reserve for running ones.
     fn has_space(&self) -> bool {
         true
+    }
+    /// The metrics of its writer, if it has one.
+    fn metrics(&self) -> Option<&StoreMetrics> {
+        None
+    }
+    /// Number of commands that wait for its writer.
+    fn queue_depth(&self) -> usize {
+        0
     }
     /// Creates a game with its first entries, in one commit. Returns its journal.
     fn create(

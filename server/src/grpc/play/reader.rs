@@ -17,6 +17,7 @@ use tonic::{Code, Status, Streaming};
 
 use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
 use crate::convert;
+use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::subscriber::DeliveryOptions;
@@ -331,6 +332,7 @@ impl Reader {
     }
 
     pub(super) fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
+        count(self.rooms.metrics(), refusal);
         self.send_update(handle, Update::Refused(refused(request_id, refusal)));
     }
 

@@ -34,6 +34,11 @@ impl WriteQueue {
         self.next_row.load(Ordering::Relaxed)
     }
 
+    /// Number of commands in the queue.
+    pub(super) fn depth(&self) -> usize {
+        self.queue.max_capacity() - self.queue.capacity()
+    }
+
     /// Sends a command and waits until it is committed.
     pub(super) async fn send(&self, command: WriteCommand) -> Result<(), StoreError> {
         let gone = || StoreError::Failed("the database is closed".into());

@@ -29,6 +29,7 @@ pub use open::OpenError;
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame};
+use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
@@ -53,6 +54,7 @@ pub struct SqliteStore {
     numbers: Arc<AtomicI64>,
     writing: Mutex<Option<JoinHandle<()>>>,
     closed: Arc<AtomicBool>,
+    metrics: StoreMetrics,
     /// Locks the data directory for this process.
     _lock: File,
 }
@@ -75,7 +77,14 @@ impl SqliteStore {
         let (commands, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let codec = Codec::new();
-        let writing = tokio::spawn(writer::run(opened.writer, last_listed, queue, has_failed));
+        let metrics = StoreMetrics::default();
+        let writing = tokio::spawn(writer::run(
+            opened.writer,
+            last_listed,
+            queue,
+            has_failed,
+            metrics.clone(),
+        ));
         Ok(Self {
             data_dir: data_dir.to_path_buf(),
             reader: Reader {
@@ -91,6 +100,7 @@ impl SqliteStore {
             numbers: Arc::new(AtomicI64::new(last + 1)),
             writing: Mutex::new(Some(writing)),
             closed: Arc::new(AtomicBool::new(false)),
+            metrics,
             _lock: opened.lock,
         })
     }
@@ -110,6 +120,14 @@ impl Store for SqliteStore {
             // If the free space is unknown, try.
             Err(_) => true,
         }
+    }
+
+    fn metrics(&self) -> Option<&StoreMetrics> {
+        Some(&self.metrics)
+    }
+
+    fn queue_depth(&self) -> usize {
+        self.commands.depth()
     }
 
     fn create(

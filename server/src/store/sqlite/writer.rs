@@ -11,11 +11,13 @@ use prost::Message as _;
 use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection as _, Executor as _};
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::Instant;
 use tracing::error;
 
 use super::errors::explain;
 use super::form::{self, FORM};
 use crate::clock::since_epoch_ms;
+use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
@@ -123,6 +125,7 @@ pub(super) async fn run(
     mut last_listed: i64,
     mut commands: mpsc::Receiver<Pending>,
     failed: watch::Sender<Option<StoreError>>,
+    metrics: StoreMetrics,
 ) {
     let mut pending = Vec::new();
     let mut open = true;
@@ -136,6 +139,7 @@ pub(super) async fn run(
             .iter()
             .any(|(order, _)| matches!(order, WriteCommand::Close));
         let failure = failed.borrow().clone();
+        let began = Instant::now();
         let committed = match failure {
             Some(failure) => Err(failure),
             None => commit(&mut connection, &mut pending, &mut last_listed)
@@ -147,6 +151,7 @@ pub(super) async fn run(
                     failure
                 }),
         };
+        metrics.committed(pending.len(), began.elapsed());
         for (index, (_, reply)) in pending.drain(..).enumerate() {
             let answer = match &committed {
                 Ok(taken) => taken

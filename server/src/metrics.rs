@@ -1,0 +1,542 @@
+//! What a server counts for its operator: the metrics that `scrape` serves to Prometheus. Counting
+//! takes an atomic operation or two and no lock. What can be read when it is asked for is not
+//! counted here but read by `scrape`. Labels have a fixed set of values: never names or ids.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
+
+use prometheus_client::collector::Collector;
+use prometheus_client::encoding::{EncodeMetric, MetricEncoder, text};
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::{MetricType, TypedMetric};
+use prometheus_client::registry::{Registry, Unit};
+
+use crate::outbox::Outbox;
+use chefshat_room::State;
+use chefshat_room::journal::{Decided, ParticipantKind, Source};
+
+/// Prefix of the names of all metrics.
+const PREFIX: &str = "chefshat";
+/// Upper bounds of the buckets of times in the server, microseconds.
+const SERVER_TIMES: &[u64] = &[
+    50, 100, 250, 500, 1_000, 2_500, 5_000, 10_000, 25_000, 50_000, 100_000, 250_000, 500_000,
+    1_000_000, 2_500_000, 5_000_000, 10_000_000,
+];
+/// Upper bounds of the buckets of thinking times, microseconds.
+const THINKING_TIMES: &[u64] = &[
+    1_000,
+    2_500,
+    5_000,
+    10_000,
+    25_000,
+    50_000,
+    100_000,
+    250_000,
+    500_000,
+    1_000_000,
+    2_500_000,
+    5_000_000,
+    10_000_000,
+    30_000_000,
+    60_000_000,
+    300_000_000,
+];
+/// Upper bounds of the buckets of batch sizes.
+const BATCH_SIZES: &[u64] = &[1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1_024];
+/// Microseconds of a second.
+const MICROS: f64 = 1e6;
+
+/// How a decision was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// By the answer of the seat's agent.
+    Answered,
+    /// By default: time ran out while the agent was connected.
+    Timeout,
+    /// By default: too many invalid answers.
+    Invalid,
+    /// By default: time ran out while no agent was connected.
+    Disconnected,
+    /// By a built-in agent in place of the seat's own.
+    Substitute,
+    /// By the built-in agent of the seat.
+    BuiltIn,
+    /// Taken over from a record, or reported from a physical table.
+    Recorded,
+}
+
+impl Outcome {
+    /// The values of the label, in the order of the outcomes.
+    const LABELS: [&str; 7] = [
+        "answered",
+        "timeout",
+        "invalid",
+        "disconnected",
+        "substitute",
+        "built_in",
+        "recorded",
+    ];
+
+    /// The outcome of a decision; `built_in`: the seat belongs to a built-in agent.
+    pub fn of(source: Source, built_in: bool) -> Self {
+        match source {
+            Source::Agent if built_in => Self::BuiltIn,
+            Source::Agent => Self::Answered,
+            Source::Timeout => Self::Timeout,
+            Source::Invalid => Self::Invalid,
+            Source::Disconnected => Self::Disconnected,
+            Source::Substitute => Self::Substitute,
+            Source::Recorded | Source::Table => Self::Recorded,
+        }
+    }
+
+    /// The value of the label.
+    pub fn label(self) -> &'static str {
+        Self::LABELS[self as usize]
+    }
+}
+
+/// What a stream is for.
+#[derive(Debug, Clone, Copy)]
+pub enum StreamKind {
+    /// `PlayService.Play`.
+    Play,
+    /// `PlayService.Watch`.
+    Watch,
+    /// `SpectatorService.Watch`.
+    Spectate,
+    /// `VectorService.Run`.
+    Vector,
+    /// `TournamentService.Follow`.
+    Follow,
+}
+
+impl StreamKind {
+    const LABELS: [&str; 5] = ["play", "watch", "spectate", "vector", "follow"];
+}
+
+/// The metrics of a server.
+#[derive(Debug)]
+pub struct Metrics {
+    registry: Mutex<Registry>,
+    rooms: [Gauge; 4],
+    seats: [Gauge; 3],
+    spectators: Gauge,
+    streams: [Gauge; 5],
+    connections: Gauge,
+    decisions: [Counter; 7],
+    invalid_answers: Counter,
+    thinking: Histogram,
+    answers: Histogram,
+    games_ended: [Counter; 2],
+    /// Refused requests, by reason.
+    refusals: Family<[(&'static str, String); 1], Counter>,
+    vector_decisions: Counter,
+    vector_games: Gauge,
+    outboxes: Mutex<Vec<Weak<Outbox>>>,
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        let mut registry = Registry::default();
+        let all = registry.sub_registry_with_prefix(PREFIX);
+        let rooms = ["waiting", "playing", "finished", "aborted"];
+        let kinds = ["agent", "human", "robot"];
+        Self {
+            rooms: labelled(all, "rooms", "Listed rooms", "state", rooms),
+            seats: labelled(
+                all,
+                "seats_connected",
+                "Seats with a connection",
+                "kind",
+                kinds,
+            ),
+            spectators: plain(all, "spectators", "Spectators of all rooms"),
+            streams: labelled(
+                all,
+                "streams",
+                "Open streams",
+                "service",
+                StreamKind::LABELS,
+            ),
+            connections: plain(all, "connections", "Open connections"),
+            decisions: labelled(
+                all,
+                "decisions",
+                "Decisions of rooms",
+                "outcome",
+                Outcome::LABELS,
+            ),
+            invalid_answers: plain(all, "invalid_answers", "Illegal actions that were sent"),
+            thinking: timed(
+                all,
+                "thinking",
+                "Time that participants took for a decision",
+                THINKING_TIMES,
+            ),
+            answers: timed(
+                all,
+                "answer",
+                "Time from reading an answer to publishing its result",
+                SERVER_TIMES,
+            ),
+            games_ended: labelled(
+                all,
+                "games_ended",
+                "Games that ended",
+                "result",
+                ["finished", "aborted"],
+            ),
+            refusals: plain(all, "refusals", "Refused requests"),
+            vector_decisions: plain(all, "vector_decisions", "Decisions of vector games"),
+            vector_games: plain(all, "vector_games", "Games of open vector streams"),
+            outboxes: Mutex::default(),
+            registry: Mutex::new(registry),
+        }
+    }
+}
+
+impl Metrics {
+    /// Adds metrics of the server that are read whenever all are.
+    pub fn add(&self, collector: impl Collector) {
+        self.registry(|registry| {
+            let registry = registry.sub_registry_with_prefix(PREFIX);
+            registry.register_collector(Box::new(collector));
+        });
+    }
+
+    /// Adds metrics of the process, whose names are those that other programs use, too.
+    pub fn add_process(&self, collector: impl Collector) {
+        self.registry(|registry| registry.register_collector(Box::new(collector)));
+    }
+
+    /// Adds those of a store.
+    pub fn add_store(&self, store: &StoreMetrics) {
+        self.registry(|registry| {
+            let registry = registry.sub_registry_with_prefix(PREFIX);
+            let help = "Time to commit a transaction";
+            registry.register_with_unit("commit", help, Unit::Seconds, store.commit.clone());
+            let help = "Commands of one transaction";
+            registry.register("commit_commands", help, store.commands.clone());
+        });
+    }
+
+    /// All metrics in the text format of OpenMetrics.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        self.registry(|registry| {
+            text::encode(&mut text, registry).expect("a String takes everything");
+        });
+        text
+    }
+
+    fn registry<T>(&self, work: impl FnOnce(&mut Registry) -> T) -> T {
+        work(&mut self.registry.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Counts a room in a state while the guard lives.
+    pub fn room(&self, state: State) -> Counted {
+        let index = match state {
+            State::Waiting => 0,
+            State::Playing => 1,
+            State::Finished => 2,
+            State::Aborted(_) => 3,
+        };
+        Counted::new(&self.rooms[index])
+    }
+
+    /// Counts a connected seat while the guard lives.
+    pub fn seat(&self, kind: ParticipantKind) -> Counted {
+        let index = match kind {
+            ParticipantKind::Agent => 0,
+            ParticipantKind::Human => 1,
+            ParticipantKind::Robot => 2,
+        };
+        Counted::new(&self.seats[index])
+    }
+
+    /// Counts a spectator while the guard lives.
+    pub fn spectator(&self) -> Counted {
+        Counted::new(&self.spectators)
+    }
+
+    /// Counts a stream while the guard lives.
+    pub fn stream(&self, kind: StreamKind) -> Counted {
+        Counted::new(&self.streams[kind as usize])
+    }
+
+    /// The gauge of open connections.
+    pub fn connections(&self) -> &Gauge {
+        &self.connections
+    }
+
+    /// Counts a decision.
+    pub fn decided(&self, decided: &Decided, outcome: Outcome) {
+        self.decisions[outcome as usize].inc();
+        if outcome == Outcome::Answered {
+            self.thinking.observe(decided.time_us);
+        }
+    }
+
+    /// Counts an illegal action.
+    pub fn invalid_answer(&self) {
+        self.invalid_answers.inc();
+    }
+
+    /// Counts an answer whose result was published this long after it had been read.
+    pub fn answered(&self, after: Duration) {
+        self.answers.observe_duration(after);
+    }
+
+    /// Counts the end of a game.
+    pub fn game_ended(&self, finished: bool) {
+        self.games_ended[usize::from(!finished)].inc();
+    }
+
+    /// Counts a refused request. `reason`: a constant of this server, never text of a client.
+    pub fn refused(&self, reason: &str) {
+        let labels = [("reason", reason.to_owned())];
+        self.refusals.get_or_create(&labels).inc();
+    }
+
+    /// Counts decisions of vector games.
+    pub fn vector_decided(&self, decisions: u64) {
+        self.vector_decisions.inc_by(decisions);
+    }
+
+    /// Counts the games of a vector stream while the guard lives.
+    pub fn vector_games(&self, games: u32) -> Counted {
+        Counted::several(&self.vector_games, games.into())
+    }
+
+    /// Includes an outbox in the depths of queues.
+    pub fn add_outbox(&self, outbox: &Arc<Outbox>) {
+        let mut outboxes = self.outboxes();
+        if outboxes.len() == outboxes.capacity() {
+            outboxes.retain(|outbox| outbox.strong_count() > 0);
+        }
+        outboxes.push(Arc::downgrade(outbox));
+    }
+
+    /// Updates and events in each outbox.
+    pub(crate) fn outbox_depths(&self) -> Vec<usize> {
+        let outboxes: Vec<_> = self.outboxes().iter().filter_map(Weak::upgrade).collect();
+        outboxes.iter().map(|outbox| outbox.depth()).collect()
+    }
+
+    fn outboxes(&self) -> std::sync::MutexGuard<'_, Vec<Weak<Outbox>>> {
+        (self.outboxes.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+/// The metrics of a store with a writer.
+#[derive(Debug, Clone)]
+pub struct StoreMetrics {
+    commit: Histogram,
+    commands: Histogram,
+}
+
+impl Default for StoreMetrics {
+    fn default() -> Self {
+        Self {
+            commit: Histogram::new(SERVER_TIMES, MICROS),
+            commands: Histogram::new(BATCH_SIZES, 1.0),
+        }
+    }
+}
+
+impl StoreMetrics {
+    /// Counts a transaction.
+    pub fn committed(&self, commands: usize, time: Duration) {
+        self.commit.observe_duration(time);
+        (self.commands).observe(u64::try_from(commands).unwrap_or(u64::MAX));
+    }
+}
+
+/// Counts something in a gauge while it lives.
+#[derive(Debug)]
+pub struct Counted {
+    gauge: Gauge,
+    count: i64,
+}
+
+impl Counted {
+    /// Counts one.
+    pub fn new(gauge: &Gauge) -> Self {
+        Self::several(gauge, 1)
+    }
+
+    fn several(gauge: &Gauge, count: i64) -> Self {
+        gauge.inc_by(count);
+        Self {
+            gauge: gauge.clone(),
+            count,
+        }
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.gauge.dec_by(self.count);
+    }
+}
+
+fn plain<M: prometheus_client::registry::Metric + Default + Clone>(
+    registry: &mut Registry,
+    name: &str,
+    help: &str,
+) -> M {
+    let metric = M::default();
+    registry.register(name, help, metric.clone());
+    metric
+}
+
+/// The metrics for the values of a label, in their order.
+fn labelled<M, const N: usize>(
+    registry: &mut Registry,
+    name: &str,
+    help: &str,
+    label: &'static str,
+    values: [&'static str; N],
+) -> [M; N]
+where
+    M: EncodeMetric + TypedMetric + Default + Clone + std::fmt::Debug + Send + Sync + 'static,
+{
+    let family: Family<[(&str, &str); 1], M> = plain(registry, name, help);
+    values.map(|value| family.get_or_create_owned(&[(label, value)]))
+}
+
+fn timed(registry: &mut Registry, name: &str, help: &str, bounds: &'static [u64]) -> Histogram {
+    let histogram = Histogram::new(bounds, MICROS);
+    registry.register_with_unit(name, help, Unit::Seconds, histogram.clone());
+    histogram
+}
+
+/// A histogram of integers without a lock, unlike that of the library.
+#[derive(Debug, Clone)]
+struct Histogram(Arc<Buckets>);
+
+#[derive(Debug)]
+struct Buckets {
+    /// Upper bounds; a last bucket has none.
+    bounds: &'static [u64],
+    counts: Box<[AtomicU64]>,
+    sum: AtomicU64,
+    /// How many make one unit of the metric.
+    scale: f64,
+}
+
+impl Histogram {
+    fn new(bounds: &'static [u64], scale: f64) -> Self {
+        Self(Arc::new(Buckets {
+            bounds,
+            counts: (0..=bounds.len()).map(|_| AtomicU64::new(0)).collect(),
+            sum: AtomicU64::new(0),
+            scale,
+        }))
+    }
+
+    fn observe(&self, value: u64) {
+        let bucket = self.0.bounds.partition_point(|bound| *bound < value);
+        self.0.counts[bucket].fetch_add(1, Ordering::Relaxed);
+        self.0.sum.fetch_add(value, Ordering::Relaxed);
+    }
+
+    fn observe_duration(&self, time: Duration) {
+        self.observe(u64::try_from(time.as_micros()).unwrap_or(u64::MAX));
+    }
+}
+
+impl TypedMetric for Histogram {
+    const TYPE: MetricType = MetricType::Histogram;
+}
+
+impl EncodeMetric for Histogram {
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "sums beyond 2^53 microseconds are approximate"
+    )]
+    fn encode(&self, mut encoder: MetricEncoder<'_>) -> Result<(), std::fmt::Error> {
+        let Buckets {
+            bounds,
+            counts,
+            sum,
+            scale,
+        } = &*self.0;
+        let bounds = bounds.iter().map(|bound| *bound as f64 / scale);
+        let bounds = bounds.chain([f64::INFINITY]);
+        let counts = counts.iter().map(|count| count.load(Ordering::Relaxed));
+        let buckets: Vec<(f64, u64)> = bounds.zip(counts).collect();
+        let count = buckets.iter().map(|(_, count)| count).sum();
+        let sum = sum.load(Ordering::Relaxed) as f64 / scale;
+        encoder.encode_histogram::<[(&str, &str); 0]>(sum, count, &buckets, None)
+    }
+
+    fn metric_type(&self) -> MetricType {
+        Self::TYPE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
+        let samples = text.lines().filter(|line| !line.starts_with('#'));
+        samples.filter(|line| line.starts_with(name)).collect()
+    }
+
+    #[test]
+    fn a_histogram_counts_each_value_in_the_bucket_that_it_does_not_exceed() {
+        let metrics = Metrics::default();
+        for micros in [0, 50, 51, 100, 10_000_001] {
+            metrics.answered(Duration::from_micros(micros));
+        }
+        let text = metrics.text();
+        let lines = lines(&text, "chefshat_answer_seconds");
+        for line in [
+            "chefshat_answer_seconds_count 5",
+            "chefshat_answer_seconds_sum 10.000202",
+            "chefshat_answer_seconds_bucket{le=\"5e-5\"} 2",
+            "chefshat_answer_seconds_bucket{le=\"0.0001\"} 4",
+            "chefshat_answer_seconds_bucket{le=\"10.0\"} 4",
+            "chefshat_answer_seconds_bucket{le=\"+Inf\"} 5",
+        ] {
+            assert!(lines.contains(&line), "{line} is not in {lines:#?}");
+        }
+    }
+
+    #[test]
+    fn guards_count_while_they_live() {
+        let metrics = Metrics::default();
+        let room = metrics.room(State::Playing);
+        let games = metrics.vector_games(16);
+        let text = metrics.text();
+        assert!(text.contains("chefshat_rooms{state=\"playing\"} 1\n"));
+        assert!(text.contains("chefshat_vector_games 16\n"));
+        drop((room, games));
+        let text = metrics.text();
+        assert!(text.contains("chefshat_rooms{state=\"playing\"} 0\n"));
+        assert!(text.contains("chefshat_vector_games 0\n"));
+    }
+
+    #[test]
+    fn outboxes_count_until_they_are_gone() {
+        let metrics = Metrics::default();
+        let (outbox, stream) = Outbox::new();
+        metrics.add_outbox(&outbox);
+        let mut updates = crate::wire::Updates::default();
+        updates.add_events(0, &[], 3);
+        assert!(outbox.push(&mut updates, None, None));
+        assert_eq!(metrics.outbox_depths(), [4]);
+        drop((outbox, stream));
+        assert!(metrics.outbox_depths().is_empty());
+        for _ in 0..1_000 {
+            metrics.add_outbox(&Outbox::new().0);
+        }
+        assert!(metrics.outboxes().len() <= 4, "the ones gone are forgotten");
+    }
+}
