@@ -11,14 +11,17 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::parser::ValueSource;
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, CommandFactory, FromArgMatches as _};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, Parser};
 use serde_json::{Value, json};
 use toml::de::{DeTable, DeValue};
 
-use super::{Cli, CommandError, say, serve};
+use crate::error::{CommandError, say};
+use crate::serve;
 
 /// The setting that names the file, which cannot be in the file.
 const CONFIG: &str = "config";
+/// The commands that have the settings.
+const COMMANDS: [&str; 2] = ["serve", "config"];
 /// Most bytes of a configuration file.
 const MAX_FILE_BYTES: u64 = 1024 * 1024;
 /// How similar two keys are if one may be a misspelling of the other, 0 to 1.
@@ -38,55 +41,44 @@ pub(super) struct ConfigCommand {
     json: bool,
 }
 
-/// A command line whose settings are complete.
-pub(super) struct Parsed {
-    pub(super) cli: Cli,
+/// The command line of this process, with complete settings.
+pub(super) struct Parsed<C> {
+    pub(super) cli: C,
+    /// The matches of its command.
     matches: ArgMatches,
     file: Option<SettingsFile>,
 }
 
-impl Parsed {
+impl<C: Parser> Parsed<C> {
     /// Parses the arguments of this process, and the configuration file they name. Ends the process
     /// if the arguments are wrong or ask for help.
     ///
     /// # Errors
     /// The file is unreadable, or has a wrong key or value.
     pub(super) fn from_process() -> Result<Self, CommandError> {
-        let matches = Cli::command().get_matches();
-        let cli = typed(&matches);
-        let settings = match &cli.command {
-            super::Command::Serve(serve) => &serve.settings,
-            super::Command::Config(config) => &config.settings,
-            _ => {
-                return Ok(Self {
-                    cli,
-                    matches,
-                    file: None,
-                });
-            }
+        let mut matches = C::command().get_matches();
+        let path = match matches.subcommand() {
+            Some((name, sub)) if COMMANDS.contains(&name) => sub.get_one::<PathBuf>(CONFIG),
+            _ => None,
         };
-        let Some(path) = &settings.config else {
-            return Ok(Self {
-                cli,
-                matches,
-                file: None,
-            });
+        let file = match path {
+            Some(path) => Some(SettingsFile::read(path, &settings(C::command()))?),
+            None => None,
         };
-        let file = SettingsFile::read(path)?;
-        let matches = file.as_defaults(Cli::command()).get_matches();
-        Ok(Self {
-            cli: typed(&matches),
-            matches,
-            file: Some(file),
-        })
+        if let Some(file) = &file {
+            matches = file.as_defaults(C::command()).get_matches();
+        }
+        let cli = C::from_arg_matches(&matches)
+            .unwrap_or_else(|error| error.format(&mut C::command()).exit());
+        let (_, matches) = matches.remove_subcommand().expect("there is a command");
+        Ok(Self { cli, matches, file })
     }
 
     /// Runs `chefshat config`.
     pub(super) fn print(&self, command: &ConfigCommand) -> Result<ExitCode, CommandError> {
-        let (_, matches) = self.matches.subcommand().expect("a command is required");
-        let effective: Vec<Effective> = settings()
+        let effective: Vec<Effective> = settings(C::command())
             .into_iter()
-            .map(|argument| Effective::of(argument, matches, self.file.as_ref()))
+            .map(|argument| Effective::of(argument, &self.matches, self.file.as_ref()))
             .collect();
         if command.json {
             say(as_json(&effective))?;
@@ -97,16 +89,11 @@ impl Parsed {
     }
 }
 
-fn typed(matches: &ArgMatches) -> Cli {
-    Cli::from_arg_matches(matches).unwrap_or_else(|error| error.format(&mut Cli::command()).exit())
-}
-
 /// The settings of `chefshat serve`, in the order of its help: its arguments that have an
 /// environment variable.
-fn settings() -> Vec<Arg> {
-    let mut command = Cli::command();
+fn settings(mut command: Command) -> Vec<Arg> {
     command.build();
-    let serve = (command.find_subcommand("serve")).expect("the command that has the settings");
+    let serve = (command.find_subcommand(COMMANDS[0])).expect("the command that has the settings");
     (serve.get_arguments())
         .filter(|argument| argument.get_env().is_some() && argument.get_id() != CONFIG)
         .cloned()
@@ -136,14 +123,14 @@ struct SettingsFile {
 }
 
 impl SettingsFile {
-    fn read(path: &Path) -> Result<Self, CommandError> {
+    fn read(path: &Path, settings: &[Arg]) -> Result<Self, CommandError> {
         let unreadable = |reason: String| format!("cannot read {}: {reason}", path.display());
         let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
         if size.len() > MAX_FILE_BYTES {
             return Err(unreadable("it is too large for a configuration file".to_owned()).into());
         }
         let text = std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
-        let values = parse_file(&text, &settings())
+        let values = parse_file(&text, settings)
             .map_err(|(line, reason)| format!("{}:{line}: {reason}", path.display()))?;
         Ok(Self {
             path: path.to_owned(),
@@ -362,10 +349,18 @@ fn as_json(effective: &[Effective]) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory as _;
+
     use super::*;
 
+    /// The part of the command line that this file depends on.
+    #[derive(Debug, Parser)]
+    enum Line {
+        Serve(serve::Serve),
+    }
+
     fn parsed(text: &str) -> Result<Vec<(String, Vec<String>)>, String> {
-        parse_file(text, &settings())
+        parse_file(text, &settings(Line::command()))
             .map(|values| {
                 let pairs = values.into_iter();
                 pairs
@@ -377,13 +372,12 @@ mod tests {
 
     #[test]
     fn a_file_has_strings_numbers_switches_and_lists() {
-        let text = "listen = \"127.0.0.1:0\"\nmax-rooms = 1_000\nno-records = true\nlog = \"info\"\n\
+        let text = "listen = \"127.0.0.1:0\"\nmax-rooms = 1_000\nno-records = true\n\
                     allow-origin = [\"http://a\", \"http://b\"]\ngrace = 0x10";
         let expected = [
             ("listen", vec!["127.0.0.1:0"]),
             ("max-rooms", vec!["1000"]),
             ("no-records", vec!["true"]),
-            ("log", vec!["info"]),
             ("allow-origin", vec!["http://a", "http://b"]),
             ("grace", vec!["16"]),
         ];
@@ -420,7 +414,7 @@ mod tests {
                 "1: there is no setting \"serve\"; `chefshat config` prints all settings",
             ),
             (
-                "log = \"info\"\nmax-rooms = 0",
+                "grace = 1\nmax-rooms = 0",
                 "2: max-rooms: 0 is not in 1..18446744073709551615",
             ),
             (
@@ -445,20 +439,20 @@ mod tests {
     /// A flag of `chefshat serve` without a variable is not a setting. These describe one run.
     #[test]
     fn every_flag_of_serve_is_a_setting_except_those_of_one_run() {
-        let mut command = Cli::command();
+        let mut command = Line::command();
         command.build();
         let serve = command.find_subcommand("serve").expect("the command");
-        let known: Vec<_> = settings().iter().map(|it| it.get_id().clone()).collect();
+        let known: Vec<_> = settings(Line::command())
+            .iter()
+            .map(|it| it.get_id().clone())
+            .collect();
         let others: Vec<&str> = (serve.get_arguments())
             .map(|argument| argument.get_id())
             .filter(|id| !known.contains(id))
             .map(|id| id.as_str())
             .collect();
-        assert_eq!(
-            others,
-            ["config", "until_stdin_closes", "json", "help", "version"]
-        );
-        for argument in settings() {
+        assert_eq!(others, ["config", "until_stdin_closes", "json", "help"]);
+        for argument in settings(Line::command()) {
             let variable = argument.get_env().expect("settings have one");
             let expected = format!(
                 "CHEFSHAT_{}",

@@ -5,10 +5,10 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory as _};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::{Cli, CommandError};
+use crate::error::CommandError;
 
 /// Print a completion script for a shell.
 #[derive(Debug, Args)]
@@ -21,10 +21,11 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self) -> Result<ExitCode, CommandError> {
+    /// Prints the script for a command line.
+    pub(super) fn run(&self, mut of: Command) -> Result<ExitCode, CommandError> {
         // Written at once: the generator panics if the reader of the output closes it.
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "chefshat", &mut script);
+        clap_complete::generate(self.shell, &mut of, "chefshat", &mut script);
         io::Write::write_all(&mut io::stdout().lock(), &script)?;
         Ok(ExitCode::SUCCESS)
     }
@@ -40,9 +41,10 @@ pub(super) struct Man {
 }
 
 impl Man {
-    pub(super) fn run(&self) -> Result<ExitCode, CommandError> {
+    /// Writes the pages of a command line.
+    pub(super) fn run(&self, of: Command) -> Result<ExitCode, CommandError> {
         std::fs::create_dir_all(&self.out_dir)
-            .and_then(|()| clap_mangen::generate_to(Cli::command(), &self.out_dir))
+            .and_then(|()| clap_mangen::generate_to(of, &self.out_dir))
             .map_err(|error| {
                 let folder = self.out_dir.display();
                 format!("cannot write manual pages to {folder}: {error}; choose another --out-dir")

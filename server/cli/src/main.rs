@@ -42,7 +42,7 @@ use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use error::{CommandError, say};
@@ -115,7 +115,7 @@ enum Command {
 
 /// Runs the command.
 fn main() -> ExitCode {
-    let result = config::Parsed::from_process().and_then(|parsed| {
+    let result = config::Parsed::<Cli>::from_process().and_then(|parsed| {
         start_logging(&parsed.cli)?;
         run(parsed)
     });
@@ -130,7 +130,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(parsed: config::Parsed) -> Result<ExitCode, CommandError> {
+fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
     match parsed.cli.command {
         Command::Serve(command) => in_runtime(command.run()),
         Command::Config(ref command) => parsed.print(command),
@@ -154,8 +154,8 @@ fn run(parsed: config::Parsed) -> Result<ExitCode, CommandError> {
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Participant(command) => in_runtime(command.run()),
-        Command::Completions(command) => command.run(),
-        Command::Man(command) => command.run(),
+        Command::Completions(command) => command.run(Cli::command()),
+        Command::Man(command) => command.run(Cli::command()),
     }
 }
 

@@ -21,8 +21,8 @@ use super::status::{
     disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
 };
 use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
-use crate::metrics::StreamKind;
 use crate::convert;
+use crate::metrics::StreamKind;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
     Tournaments,
