@@ -200,6 +200,11 @@ impl<'a, A: Agent> Session<'a, A> {
 
     /// Handles updates of attached seats. Ignores unknown handles.
     fn seat_update(&mut self, handle: u32, update: Update) {
+        // The end of the stream follows; the seats are attached again on the next one.
+        if matches!(&update, Update::Detached(it) if it.reason() == v1::DetachReason::ServerStopping)
+        {
+            return;
+        }
         if let (Update::Detached(detached), Some(participant)) = (&update, &mut self.participant)
             && participant.has(handle)
         {

@@ -336,6 +336,19 @@ fn handles_belong_to_the_current_stream() {
 }
 
 #[test]
+fn a_seat_resumes_after_the_server_has_stopped() {
+    let mut harness = Harness::new(&[&[20, 21]]);
+    harness.connect(&[(0, 1, 1)]);
+    assert_eq!(harness.receive(vec![(0, decision(1))]), ["0:1=20"]);
+    let stopping = detached(v1::DetachReason::ServerStopping);
+    assert!(harness.receive(vec![(0, stopping)]).is_empty());
+    assert!(!harness.session.is_over());
+    harness.session.disconnected();
+    harness.connect(&[(0, 1, 1)]);
+    assert_eq!(harness.receive(vec![(0, decision(2))]), ["0:2=21"]);
+}
+
+#[test]
 fn each_seat_has_its_own_reason_to_leave() {
     use v1::DetachReason::{GameOver, Requested, Superseded};
     let aborted = Kind::GameAborted(Box::new(v1::GameAborted {

@@ -92,6 +92,7 @@ async function playTicket(server, ticket) {
         for await (const { updates } of stream) {
           failures = 0;
           for (const { handle, update, [update]: content } of updates) {
+            if (content.reason === "DETACH_REASON_SERVER_STOPPING") continue; // The end of the stream follows.
             if (update === "attached" && content.ticket) {
               const known = seats.find(({ ticket }) => ticket === content.ticket);
               byHandle.set(handle, known ?? seatOf(content.ticket, { game_id: content.game_id }));

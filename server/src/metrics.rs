@@ -500,7 +500,7 @@ mod tests {
         for line in [
             "chefshat_answer_seconds_count 5",
             "chefshat_answer_seconds_sum 10.000202",
-            "chefshat_answer_seconds_bucket{le=\"5e-5\"} 2",
+            "chefshat_answer_seconds_bucket{le=\"0.00005\"} 2",
             "chefshat_answer_seconds_bucket{le=\"0.0001\"} 4",
             "chefshat_answer_seconds_bucket{le=\"10.0\"} 4",
             "chefshat_answer_seconds_bucket{le=\"+Inf\"} 5",

@@ -69,8 +69,8 @@ impl PlayService for Play {
         let (outbox, updates) = Outbox::new();
         let failure = Arc::new(OnceLock::new());
         let reader = self.reader(&outbox, true);
-        tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure)));
         let closing = self.closing.clone();
+        tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure), closing.clone()));
         let counted = self.rooms.metrics().stream(StreamKind::Play);
         tokio::spawn(async move {
             let _counted = counted;
@@ -109,6 +109,7 @@ impl PlayService for Play {
                 tokio::select! {
                     () = outbox.abandoned() => break,
                     () = closing.cancelled() => {
+                        reader.announce_stop();
                         outbox.end(StreamEnd::Complete);
                         break;
                     }

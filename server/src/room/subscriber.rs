@@ -276,6 +276,15 @@ impl Subscriber {
         }
     }
 
+    /// Ends the stream because the server stops, which a seat is told first.
+    pub fn stop(&mut self) {
+        if !self.ended {
+            self.detach(v1::DetachReason::ServerStopping);
+            self.ended = true;
+            self.outbox.end(StreamEnd::ShuttingDown);
+        }
+    }
+
     /// Ends the stream. Pending updates are dropped.
     pub fn end(&mut self, end: StreamEnd) {
         if !self.ended {

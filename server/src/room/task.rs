@@ -233,7 +233,7 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiv
     tokio::pin!(timer);
     while room.commit_and_publish().await {
         if room.suspended && room.over_since.is_none() {
-            room.end_streams(StreamEnd::ShuttingDown);
+            room.subscribers().for_each(Subscriber::stop);
             break;
         }
         room.set_timer(timer.as_mut());
@@ -791,10 +791,13 @@ impl Room {
 
     /// Ends the streams of all subscribers, which may reconnect.
     fn end_streams(&mut self, end: StreamEnd) {
+        self.subscribers()
+            .for_each(|subscriber| subscriber.end(end));
+    }
+
+    fn subscribers(&mut self) -> impl Iterator<Item = &mut Subscriber> {
         let seats = self.connections.iter_mut().flatten();
-        for subscriber in seats.chain(&mut self.spectators) {
-            subscriber.end(end);
-        }
+        seats.chain(&mut self.spectators)
     }
 }
 

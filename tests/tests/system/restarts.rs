@@ -14,6 +14,7 @@ use chefshat_tests::{
 use rand::rngs::SmallRng;
 use rand::{RngExt as _, SeedableRng as _};
 use tokio::task::JoinSet;
+use tonic::Code;
 
 /// Number of kills; `CHEFSHAT_KILLS` overrides it.
 const KILLS: u64 = 100;
@@ -283,6 +284,20 @@ async fn waiting_agents_return_after_a_stop_and_are_not_refused_during_it() {
     patiently("three agents to wait", all_here).await;
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
+    for seat in &mut seats {
+        let end = loop {
+            match seat.next_or_end().await {
+                Ok(Some(Update::Detached(detached))) => {
+                    assert_eq!(detached.reason(), v1::DetachReason::ServerStopping);
+                    break seat.next_or_end().await;
+                }
+                Ok(Some(Update::Decision(_))) => {}
+                other => panic!("not told that the server stops, but {other:?}"),
+            }
+        };
+        // The code after which SDKs connect again.
+        assert_eq!(end.expect_err("an error").code(), Code::Unavailable);
+    }
     let server = launch.start().await.expect("the server restarts");
     let mut left = random_agents(idle);
     left.push((last, RandomAgent::new(9)));

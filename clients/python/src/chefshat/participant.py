@@ -59,6 +59,9 @@ class Participant:
 
     def _detached(self, reason: pb.DetachReason.ValueType) -> None:
         """Ends the participation at the server's request."""
+        if reason == pb.DETACH_REASON_SERVER_STOPPING:
+            # The end of the stream follows; the participant is attached again on the next one.
+            return
         if reason == pb.DETACH_REASON_TOURNAMENT_OVER:
             self.end()
         elif reason == pb.DETACH_REASON_SUPERSEDED:

@@ -378,6 +378,9 @@ class PlaySession:
                 self._ask(seat, answered.request, attempts_left, asks)
 
     def _detached(self, seat: SeatSession, handle: int, detached: pb.Detached) -> None:
+        if detached.reason == pb.DETACH_REASON_SERVER_STOPPING:
+            # The end of the stream follows; the seat is attached again on the next one.
+            return
         del self._by_handle[handle]
         seat.handle = None
         seat.substituted = False

@@ -138,6 +138,8 @@ function presenceAfter({ update }: SeatUpdate, before: Presence): Presence {
     case "refused":
       return "refused";
     case "detached":
+      // The end of the stream follows, after which the page enters again.
+      if (update.value.reason === DetachReason.SERVER_STOPPING) return before;
       return update.value.reason === DetachReason.TOURNAMENT_OVER ? "over" : "superseded";
     default:
       return before;

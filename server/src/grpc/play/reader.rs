@@ -13,6 +13,7 @@ use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
 use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
@@ -107,6 +108,7 @@ impl Reader {
         mut self,
         mut requests: Streaming<v1::PlayRequest>,
         failure: Arc<OnceLock<Status>>,
+        closing: CancellationToken,
     ) {
         let outbox = Arc::clone(&self.outbox);
         let end = loop {
@@ -145,6 +147,9 @@ impl Reader {
                 Err(status) => break Err(status),
             }
         };
+        if closing.is_cancelled() {
+            self.announce_stop();
+        }
         Box::pin(self.leave_all()).await;
         self.outbox.end(match end {
             Ok(()) => StreamEnd::Complete,
@@ -327,6 +332,13 @@ impl Reader {
         }
     }
 
+    /// Tells the participants of tournaments that the server stops. Rooms tell their seats.
+    pub(super) fn announce_stop(&self) {
+        for handle in self.participants.keys() {
+            self.detach_participant(*handle, v1::DetachReason::ServerStopping);
+        }
+    }
+
     fn refuse_field(&self, handle: u32, request_id: u32, reason: &str, problem: &FieldProblem) {
         self.refuse(handle, request_id, &field(reason, problem));
     }
@@ -465,12 +477,16 @@ impl Reader {
     /// Detaches a participant from this stream. Its seats stay attached.
     fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
         if self.participants.remove(&handle).is_some() {
-            let reason = reason.into();
-            let mut last = Updates::default();
-            last.add(handle, Update::Detached(v1::Detached { reason }));
-            // At most one for each participant: even a full outbox has space for it.
-            self.outbox.push_last(&mut last);
+            self.detach_participant(handle, reason);
         }
+    }
+
+    fn detach_participant(&self, handle: u32, reason: v1::DetachReason) {
+        let reason = reason.into();
+        let mut last = Updates::default();
+        last.add(handle, Update::Detached(v1::Detached { reason }));
+        // At most one for each participant: even a full outbox has space for it.
+        self.outbox.push_last(&mut last);
     }
 }
 

@@ -90,6 +90,8 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
       return { ...live, decision: undefined };
     }
     case "detached": {
+      // The end of the stream follows, after which the page attaches the seat again.
+      if (payload.value.reason === DetachReason.SERVER_STOPPING) return live;
       const kind = DETACHED[payload.value.reason] ?? "over";
       return { ...live, decision: undefined, attachment: { kind } };
     }

@@ -256,6 +256,10 @@ impl Connection {
                 stream.place = Some(handle);
                 PartInput::Entered(entered.clone())
             }
+            // The end of the stream follows, after which everything is attached again.
+            Update::Detached(detached) if detached.reason() == v1::DetachReason::ServerStopping => {
+                return None;
+            }
             Update::Detached(detached) if stream.place == Some(handle) => {
                 return Some(Stopped::Over(match detached.reason() {
                     v1::DetachReason::TournamentOver => None,

@@ -65,6 +65,10 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     """The game is over and all its events have been sent."""
     DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
     """The tournament is over. Its participant is not seated again."""
+    DETACH_REASON_SERVER_STOPPING: _DetachReason.ValueType  # 6
+    """The server stops, and the game continues when it is started again. The stream ends after this:
+    connect again, and attach with the same ticket.
+    """
 
 class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
     """Why a seat was detached."""
@@ -79,6 +83,10 @@ DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
 """The game is over and all its events have been sent."""
 DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
 """The tournament is over. Its participant is not seated again."""
+DETACH_REASON_SERVER_STOPPING: DetachReason.ValueType  # 6
+"""The server stops, and the game continues when it is started again. The stream ends after this:
+connect again, and attach with the same ticket.
+"""
 Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 
 @_typing.final
