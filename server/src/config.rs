@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::access::AccessSettings;
+use crate::tls::TlsFiles;
 
 /// Largest message a client may send, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
@@ -109,6 +110,11 @@ pub struct ServerConfig {
     pub allow_import: bool,
     /// Who may call.
     pub access: AccessSettings,
+    /// The files for TLS; `None`: connections are not encrypted.
+    pub tls: Option<TlsFiles>,
+    /// How long a client may use one connection before it is asked to open another; its streams may
+    /// finish on the old one. `None`: for ever.
+    pub max_connection_age: Option<Duration>,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
@@ -125,6 +131,8 @@ impl Default for ServerConfig {
             first_byte_timeout: Duration::from_secs(10),
             allow_import: false,
             access: AccessSettings::default(),
+            tls: None,
+            max_connection_age: None,
             allowed_origins: Vec::new(),
         }
     }

@@ -18,6 +18,7 @@ pub mod rooms;
 pub mod scrape;
 pub mod serve;
 pub mod store;
+pub mod tls;
 pub mod tournaments;
 pub mod web;
 pub mod wire;

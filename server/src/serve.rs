@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use futures::Stream;
+use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpListener;
@@ -32,6 +32,7 @@ use crate::metrics::Metrics;
 use crate::rooms::Rooms;
 use crate::scrape;
 use crate::store::{Store, StoreError};
+use crate::tls::{Secured, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::PageLayer;
 
@@ -56,6 +57,9 @@ pub enum ServeError {
     /// The tokens file is unreadable.
     #[error(transparent)]
     Tokens(#[from] TokenFileError),
+    /// The files for TLS cannot be used.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// A setting is not a web origin.
     #[error("{0:?} is not a web origin; an example is https://example.org")]
     Origin(String),
@@ -84,6 +88,7 @@ pub struct Server {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
     access: Arc<Access>,
+    tls: Option<Arc<Tls>>,
     tracker: TaskTracker,
     games: usize,
 }
@@ -95,6 +100,7 @@ impl Server {
     /// The store failed.
     pub async fn restored(config: ServerConfig, store: Arc<dyn Store>) -> Result<Self, ServeError> {
         let access = Access::open(&config.access, config.data_dir.as_ref())?;
+        let tls = config.tls.clone().map(Tls::open).transpose()?;
         let tracker = TaskTracker::new();
         let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
         let games = rooms.restore().await?;
@@ -107,6 +113,7 @@ impl Server {
             rooms,
             tournaments,
             access: Arc::new(access),
+            tls,
             tracker,
             games,
         })
@@ -141,6 +148,10 @@ impl Server {
             first_byte_timeout: self.config.first_byte_timeout,
         };
         let incoming = connections::accept(listener, limits, self.metrics().connections().clone());
+        let incoming = match self.tls.clone() {
+            None => incoming.map_ok(Secured::Plain).left_stream(),
+            Some(tls) => tls.secure(incoming).right_stream(),
+        };
         self.serve_incoming(incoming, shutdown).await
     }
 
@@ -163,6 +174,7 @@ impl Server {
             rooms,
             tournaments,
             access,
+            tls,
             tracker,
             ..
         } = self;
@@ -180,8 +192,15 @@ impl Server {
                 .clone()
                 .run_until_cancelled_owned(Arc::clone(&access).follow()),
         );
+        if let Some(tls) = tls {
+            tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
+        }
         let closed = closing.clone();
-        let serving = transport::Server::builder()
+        let mut builder = transport::Server::builder();
+        if let Some(age) = config.max_connection_age {
+            builder = builder.max_connection_age(age);
+        }
+        let serving = builder
             .accept_http1(true)
             .tcp_nodelay(true)
             .http2_max_header_list_size(MAX_HEADER_BYTES)

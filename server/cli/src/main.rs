@@ -34,6 +34,7 @@ mod serve;
 mod simulate;
 mod table;
 mod threads;
+mod token;
 mod tournament;
 mod tui;
 mod verify;
@@ -107,6 +108,8 @@ enum Command {
     Import(import::Import),
     /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
+    /// Create, list and revoke the tokens of a server.
+    Token(token::TokenCommand),
     /// Print a completion script for a shell.
     Completions(generate::Completions),
     /// Write manual pages.
@@ -154,6 +157,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Participant(command) => in_runtime(command.run()),
+        Command::Token(command) => command.run(),
         Command::Completions(command) => command.run(Cli::command()),
         Command::Man(command) => command.run(Cli::command()),
     }

@@ -1,5 +1,6 @@
 //! `chefshat serve`: runs a server until it is stopped.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -13,10 +14,12 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
 use super::{CommandError, data_dir, say};
+use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
+use chefshat_server::tls::TlsFiles;
 use chefshat_server::web;
 
 /// The settings of a server. Each has a flag, an environment variable, a key in the file of
@@ -64,6 +67,96 @@ pub(super) struct Settings {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
+    /// Whether calls need a token (see `chefshat token`): open or tokens. Default: tokens if the data
+    /// directory has any. An open server is refused on addresses that others reach, unless this
+    /// says open.
+    #[arg(long, env = "CHEFSHAT_ACCESS", value_name = "open|tokens", value_parser = mode)]
+    access: Option<Mode>,
+    /// What callers without a token may do where tokens are needed: none, spectator or player.
+    #[arg(long, env = "CHEFSHAT_ANONYMOUS", value_name = "none|spectator|player", default_value = "none", value_parser = anonymous)]
+    anonymous: Role,
+    /// The role needed to list and read records of games: spectator, player, host or admin.
+    #[arg(
+        long,
+        env = "CHEFSHAT_RECORDS",
+        value_name = "ROLE",
+        default_value = "spectator"
+    )]
+    records: Role,
+    /// Encrypt connections (https): file with the certificate of the server and those that lead to
+    /// its authority, PEM. Read again when it changes.
+    #[arg(long, env = "CHEFSHAT_TLS_CERT", value_name = "FILE")]
+    tls_cert: Option<PathBuf>,
+    /// File with the private key of the certificate, PEM.
+    #[arg(long, env = "CHEFSHAT_TLS_KEY", value_name = "FILE")]
+    tls_key: Option<PathBuf>,
+    /// Require a certificate of every client: file with the authorities that sign them, PEM.
+    #[arg(long, env = "CHEFSHAT_TLS_CLIENT_CA", value_name = "FILE")]
+    tls_client_ca: Option<PathBuf>,
+    /// Seconds after which a client on an encrypted connection is asked to open another, so that it
+    /// meets the present certificate; what it does on the old one continues. 0 means never.
+    #[arg(long, env = "CHEFSHAT_CONNECTION_AGE", default_value_t = 43_200)]
+    connection_age: u64,
+}
+
+impl Settings {
+    /// The files for TLS, if connections are encrypted. Warns if others may read along.
+    ///
+    /// # Errors
+    /// One is missing.
+    fn tls(&self, address: SocketAddr) -> Result<Option<TlsFiles>, CommandError> {
+        match (&self.tls_cert, &self.tls_key, &self.tls_client_ca) {
+            (Some(certificate), Some(key), authority) => Ok(Some(TlsFiles {
+                certificate: certificate.clone(),
+                key: key.clone(),
+                client_authority: authority.clone(),
+            })),
+            (None, None, None) => {
+                if !address.ip().is_loopback() {
+                    eprintln!(
+                        "WARNING: connections to {address} are not encrypted: others can read tokens and tickets on the way; use \
+                         --tls-cert and --tls-key, or a proxy with TLS"
+                    );
+                }
+                Ok(None)
+            }
+            (None, None, Some(_)) => Err("--tls-client-ca needs --tls-cert and --tls-key".into()),
+            _ => Err("--tls-cert and --tls-key must be given together".into()),
+        }
+    }
+
+    /// Who may call, for a server with this data directory and address.
+    ///
+    /// # Errors
+    /// Strangers would reach a server that is not meant for them.
+    fn access(
+        &self,
+        data_dir: Option<&PathBuf>,
+        address: SocketAddr,
+    ) -> Result<AccessSettings, CommandError> {
+        let settings = AccessSettings {
+            mode: self.access,
+            anonymous: self.anonymous,
+            records: self.records,
+        };
+        if settings.mode == Some(Mode::Tokens) && data_dir.is_none() {
+            return Err("--access tokens needs a data directory, which has the tokens; leave --no-records out".into());
+        }
+        if Access::open(&settings, data_dir)?.mode() == Mode::Open && !address.ip().is_loopback() {
+            if settings.mode.is_none() {
+                return Err(format!(
+                    "refusing to listen on {address} without tokens: anyone who reaches it could create rooms; create a token with \
+                     `chefshat token create --role admin`, or say --access open"
+                )
+                .into());
+            }
+            eprintln!(
+                "WARNING: {address} is open: anyone who reaches it can create rooms, play, and read records; create tokens with \
+                 `chefshat token create`"
+            );
+        }
+        Ok(settings)
+    }
 }
 
 /// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the
@@ -88,7 +181,7 @@ impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let settings = self.settings;
         // Not a clap conflict: clap would treat a variable that is set to false as present.
-        let data_dir = match (settings.no_records, settings.data_dir) {
+        let data_dir = match (settings.no_records, settings.data_dir.clone()) {
             (true, None) => None,
             (true, Some(_)) => {
                 return Err("--no-records and --data-dir cannot be used together".into());
@@ -100,11 +193,14 @@ impl Serve {
             Some(address) => Some(listen(address, "--metrics-listen").await?),
             None => None,
         };
+        let address = listener.local_addr()?;
+        let tls = settings.tls(address)?;
+        let scheme = if tls.is_some() { "https" } else { "http" };
+        let access = settings.access(data_dir.as_ref(), address)?;
         let store: Arc<dyn Store> = match &data_dir {
             Some(folder) => Arc::new(SqliteStore::open(folder).await?),
             None => Arc::new(MemoryStore::default()),
         };
-        let address = listener.local_addr()?;
         let metrics_address = (metrics_listener.as_ref())
             .map(TcpListener::local_addr)
             .transpose()?;
@@ -118,6 +214,10 @@ impl Serve {
             max_rooms: settings.max_rooms,
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,
+            access,
+            max_connection_age: (tls.is_some() && settings.connection_age > 0)
+                .then(|| Duration::from_secs(settings.connection_age)),
+            tls,
             grace: Duration::from_secs(settings.grace),
             allowed_origins: (settings.allowed_origins.into_iter())
                 .filter(|origin| !origin.is_empty())
@@ -131,6 +231,10 @@ impl Serve {
         if server.games() > 0 {
             eprintln!("resumed games: {}", server.games());
         }
+        if server.access().mode() == Mode::Tokens {
+            let tokens = server.access().tokens();
+            eprintln!("calls need a token; tokens: {tokens} (see `chefshat token`)");
+        }
         if self.json {
             say(serde_json::json!({
                 "event": "listening",
@@ -139,7 +243,7 @@ impl Serve {
                 "games": server.games(),
             }))?;
         }
-        eprintln!("listening on http://{address}");
+        eprintln!("listening on {scheme}://{address}");
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
             eprintln!("metrics at http://{address}/metrics");
             let metrics = Arc::clone(server.metrics());
@@ -198,6 +302,23 @@ fn end_of_input() -> oneshot::Receiver<()> {
         let _ = sender.send(());
     });
     closed
+}
+
+fn mode(text: &str) -> Result<Mode, String> {
+    match text {
+        "open" => Ok(Mode::Open),
+        "tokens" => Ok(Mode::Tokens),
+        _ => Err("use open or tokens".to_owned()),
+    }
+}
+
+fn anonymous(text: &str) -> Result<Role, String> {
+    match text {
+        "none" => Ok(Role::Anyone),
+        "spectator" => Ok(Role::Spectator),
+        "player" => Ok(Role::Player),
+        _ => Err("use none, spectator or player".to_owned()),
+    }
 }
 
 /// Checks the form of an address; the host is resolved later.

@@ -23,6 +23,7 @@ mod cli {
     mod run;
     mod simulate;
     mod terminal;
+    mod token;
     mod tournament;
     mod tournament_simulate;
     mod verify;

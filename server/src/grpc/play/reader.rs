@@ -572,6 +572,9 @@ mod tests {
         let mut older = Reader::new(&rooms, &tournaments, &outbox, true);
         drop(updates);
         older.attach(attach).await;
-        assert!(older.participants.is_empty(), "it would supersede the newer");
+        assert!(
+            older.participants.is_empty(),
+            "it would supersede the newer"
+        );
     }
 }

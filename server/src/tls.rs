@@ -1,0 +1,288 @@
+//! TLS on the server's connections. Each handshake is a task of its own beside the accept loop, so a
+//! peer that stalls delays nobody. The certificate is read again when its files change; existing
+//! connections keep theirs.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use arc_swap::ArcSwap;
+use futures::{Stream, StreamExt as _, stream};
+use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::server::WebPkiClientVerifier;
+use rustls::{RootCertStore, ServerConfig};
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::task::JoinSet;
+use tokio::time::timeout;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::server::TlsStream;
+use tonic::transport::server::Connected;
+use tracing::{debug, error, info};
+
+use crate::file_watch::FileWatch;
+
+/// How long a client may take for the handshake.
+const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
+/// How often the files are looked at.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// The files that make a server use TLS.
+#[derive(Debug, Clone)]
+pub struct TlsFiles {
+    /// The certificate of the server and those that lead to its authority, PEM.
+    pub certificate: PathBuf,
+    /// Its private key, PEM.
+    pub key: PathBuf,
+    /// Certificates of the authorities whose clients are admitted, PEM; `None`: clients need no
+    /// certificate.
+    pub client_authority: Option<PathBuf>,
+}
+
+/// Why the files cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// A file is unreadable or is not PEM.
+    #[error("cannot read {path}: {problem}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The certificate and the key cannot be used together.
+    #[error("cannot use the certificate {path} with its key: {source}")]
+    Certificate {
+        /// The file of the certificate.
+        path: PathBuf,
+        /// The reason.
+        source: rustls::Error,
+    },
+    /// The certificates of the authorities cannot be used.
+    #[error("cannot use the authorities in {path}: {problem}")]
+    Authority {
+        /// The file of the authorities.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl TlsFiles {
+    fn paths(&self) -> impl Iterator<Item = &Path> {
+        let always = [self.certificate.as_path(), self.key.as_path()];
+        always.into_iter().chain(self.client_authority.as_deref())
+    }
+
+    fn read(&self) -> Result<Arc<ServerConfig>, TlsError> {
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let chain = certificates(&self.certificate)?;
+        let key =
+            PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
+        let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
+            .with_safe_default_protocol_versions()
+            .expect("ring supports the default versions");
+        let builder = match &self.client_authority {
+            None => builder.with_no_client_auth(),
+            Some(path) => {
+                let wrong = |problem: &dyn std::fmt::Display| TlsError::Authority {
+                    path: path.clone(),
+                    problem: problem.to_string(),
+                };
+                let mut roots = RootCertStore::empty();
+                for certificate in certificates(path)? {
+                    roots.add(certificate).map_err(|error| wrong(&error))?;
+                }
+                let verifier = WebPkiClientVerifier::builder_with_provider(roots.into(), provider);
+                builder.with_client_cert_verifier(verifier.build().map_err(|error| wrong(&error))?)
+            }
+        };
+        let mut config = builder.with_single_cert(chain, key).map_err(|source| {
+            let path = self.certificate.clone();
+            TlsError::Certificate { path, source }
+        })?;
+        config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
+        Ok(Arc::new(config))
+    }
+}
+
+/// The certificates of a file, at least one.
+fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    let read = CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
+    let found: Vec<_> = read.map_err(|error| unreadable(path, &error))?;
+    match found.is_empty() {
+        true => Err(unreadable(path, &"it has no certificate in PEM")),
+        false => Ok(found),
+    }
+}
+
+fn unreadable(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
+    TlsError::File {
+        path: path.to_path_buf(),
+        problem: problem.to_string(),
+    }
+}
+
+/// The certificate of a server, as its files are.
+#[derive(Debug)]
+pub struct Tls {
+    files: TlsFiles,
+    current: ArcSwap<ServerConfig>,
+}
+
+impl Tls {
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// They cannot be used.
+    pub fn open(files: TlsFiles) -> Result<Arc<Self>, TlsError> {
+        let current = ArcSwap::new(files.read()?);
+        Ok(Arc::new(Self { files, current }))
+    }
+
+    /// Reads the files again whenever they change, until it is dropped. If they cannot be used, the
+    /// certificate stays as it was.
+    pub async fn follow(self: Arc<Self>) {
+        let mut watch = FileWatch::of(self.files.paths());
+        // They may have changed since the server read them.
+        let mut changed = true;
+        loop {
+            tokio::time::sleep(INTERVAL).await;
+            changed |= watch.has_changed();
+            if std::mem::take(&mut changed) {
+                match self.files.read() {
+                    Ok(config) => {
+                        self.current.store(config);
+                        info!("the certificate was read again");
+                    }
+                    Err(error) => error!(%error, "the certificate stays as it was"),
+                }
+            }
+        }
+    }
+
+    /// These connections, encrypted. Those whose handshake fails are dropped.
+    pub fn secure<C>(
+        self: Arc<Self>,
+        incoming: impl Stream<Item = io::Result<C>> + Send,
+    ) -> impl Stream<Item = io::Result<Secured<C>>> + Send
+    where
+        C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+    {
+        let state = (Box::pin(incoming), JoinSet::new());
+        stream::unfold(state, move |(mut incoming, mut handshakes)| {
+            let tls = Arc::clone(&self);
+            async move {
+                loop {
+                    tokio::select! {
+                        Some(done) = handshakes.join_next() => {
+                            if let Ok(Some(secured)) = done {
+                                return Some((Ok(secured), (incoming, handshakes)));
+                            }
+                        }
+                        next = incoming.next() => match next? {
+                            Ok(connection) => drop(handshakes.spawn(tls.handshake(connection))),
+                            Err(error) => return Some((Err(error), (incoming, handshakes))),
+                        },
+                    }
+                }
+            }
+        })
+    }
+
+    fn handshake<C>(&self, connection: C) -> impl Future<Output = Option<Secured<C>>> + use<C>
+    where
+        C: AsyncRead + AsyncWrite + Unpin,
+    {
+        let acceptor = TlsAcceptor::from(self.current.load_full());
+        async move {
+            let shaken = timeout(HANDSHAKE_TIMEOUT, acceptor.accept(connection)).await;
+            let stream = shaken.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
+            stream
+                .map(|stream| Secured::Tls(Box::new(stream)))
+                .inspect_err(|error| debug!(%error, "a TLS handshake failed"))
+                .ok()
+        }
+    }
+}
+
+/// A connection, encrypted or not.
+#[derive(Debug)]
+pub enum Secured<C> {
+    /// Not encrypted.
+    Plain(C),
+    /// Encrypted.
+    Tls(Box<TlsStream<C>>),
+}
+
+impl<C: Connected> Connected for Secured<C> {
+    type ConnectInfo = C::ConnectInfo;
+
+    fn connect_info(&self) -> Self::ConnectInfo {
+        match self {
+            Self::Plain(connection) => connection.connect_info(),
+            Self::Tls(stream) => stream.get_ref().0.connect_info(),
+        }
+    }
+}
+
+impl<C: AsyncRead + AsyncWrite + Unpin> AsyncRead for Secured<C> {
+    fn poll_read(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        match self.get_mut() {
+            Self::Plain(connection) => Pin::new(connection).poll_read(context, buffer),
+            Self::Tls(stream) => Pin::new(stream).poll_read(context, buffer),
+        }
+    }
+}
+
+impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Secured<C> {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        match self.get_mut() {
+            Self::Plain(connection) => Pin::new(connection).poll_write(context, bytes),
+            Self::Tls(stream) => Pin::new(stream).poll_write(context, bytes),
+        }
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match self.get_mut() {
+            Self::Plain(connection) => Pin::new(connection).poll_flush(context),
+            Self::Tls(stream) => Pin::new(stream).poll_flush(context),
+        }
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match self.get_mut() {
+            Self::Plain(connection) => Pin::new(connection).poll_shutdown(context),
+            Self::Tls(stream) => Pin::new(stream).poll_shutdown(context),
+        }
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        match self.get_mut() {
+            Self::Plain(connection) => Pin::new(connection).poll_write_vectored(context, bytes),
+            Self::Tls(stream) => Pin::new(stream).poll_write_vectored(context, bytes),
+        }
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        match self {
+            Self::Plain(connection) => connection.is_write_vectored(),
+            Self::Tls(stream) => stream.is_write_vectored(),
+        }
+    }
+}
