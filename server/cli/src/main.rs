@@ -1,6 +1,7 @@
 //! The command line of `chefshat`: its arguments and one module per command.
 
 mod agent;
+mod backup;
 mod board;
 mod check_agent;
 mod compare;
@@ -13,6 +14,7 @@ mod error;
 mod experiment;
 mod export;
 mod generate;
+mod health;
 mod import;
 mod kind;
 mod leaderboard;
@@ -110,6 +112,12 @@ enum Command {
     Participant(participant::ParticipantCommand),
     /// Create, list and revoke the tokens of a server.
     Token(token::TokenCommand),
+    /// Copy a data directory while a server uses it.
+    Backup(backup::Backup),
+    /// Create a data directory from a copy that `chefshat backup` made.
+    Restore(backup::Restore),
+    /// Check that a server answers and takes new games.
+    Health(health::Health),
     /// Print a completion script for a shell.
     Completions(generate::Completions),
     /// Write manual pages.
@@ -158,6 +166,9 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Import(command) => command.run(),
         Command::Participant(command) => in_runtime(command.run()),
         Command::Token(command) => command.run(),
+        Command::Backup(command) => in_runtime(command.run()),
+        Command::Restore(command) => in_runtime(command.run()),
+        Command::Health(command) => in_runtime(command.run()),
         Command::Completions(command) => command.run(Cli::command()),
         Command::Man(command) => command.run(Cli::command()),
     }

@@ -15,7 +15,10 @@ use futures::future::BoxFuture;
 
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
-pub use sqlite::{ForgetError, Forgetting, Forgotten, OpenError, SqliteStore};
+pub use sqlite::{
+    DatabaseCopy, ForgetError, Forgetting, Forgotten, OpenError, SqliteStore, check_copy,
+    copy_database,
+};
 
 use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;

@@ -22,7 +22,17 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
     schema(places, steps, "vendor.compose-spec", "docker/compose.yaml")?;
-    // Only parsed, not built: no container engine is needed.
+    // Kinds of the Gateway API are not among the schemas.
+    let manifests = [
+        "--strict",
+        "docker/kubernetes/chefshat.yaml",
+        "docker/kubernetes/ingress.yaml",
+    ];
+    steps.program(
+        "kubernetes-validate",
+        tool(places, "kubernetes-validate").args(manifests),
+    )?;
+    // The tests of docker/ build the images.
     steps.program(
         "hadolint",
         tool(places, "hadolint").arg("docker/Dockerfile"),

@@ -12,9 +12,10 @@ const BUSY: i32 = 5;
 const LOCKED: i32 = 6;
 const READ_ONLY: i32 = 8;
 const IO_ERROR: i32 = 10;
-const CORRUPT: i32 = 11;
+pub(super) const CORRUPT: i32 = 11;
 const FULL: i32 = 13;
 const CANNOT_OPEN: i32 = 14;
+pub(super) const NOT_A_DATABASE: i32 = 26;
 
 /// The primary result code of an error; extended codes carry it in their lowest byte.
 fn primary_code(error: &sqlx::Error) -> Option<i32> {

@@ -1,6 +1,7 @@
 //! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer`
-//! write, `form` encodes; this file joins them into a store.
+//! write, `form` encodes, `backup` copies; this file joins them into a store.
 
+mod backup;
 mod codec;
 mod errors;
 mod forget;
@@ -24,6 +25,7 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tracing::error;
 
+pub use backup::{DatabaseCopy, check_copy, copy_database};
 pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::OpenError;
 

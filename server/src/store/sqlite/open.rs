@@ -12,13 +12,13 @@ use sqlx::sqlite::{
 };
 use sqlx::{Connection as _, SqlSafeStr as _};
 
-use super::errors::{BUSY_LIMIT, FILE, explain, has_code};
+use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
 use crate::store::StoreError;
 
 /// The file that a server locks while it uses the data directory.
 const LOCK_FILE: &str = "games.lock";
 /// Identifies our databases: `PRAGMA application_id` of the first migration.
-const APPLICATION_ID: i64 = 0x4368_4874;
+pub(super) const APPLICATION_ID: i64 = 0x4368_4874;
 /// Connections for reading.
 const READERS: u32 = 4;
 /// Prepared statements per connection.
@@ -33,9 +33,6 @@ const MIGRATIONS: [(i64, &str, &str); 3] = [
     ),
     (3, "listed", include_str!("migrations/0003_listed.sql")),
 ];
-/// SQLite's codes for a file that is not a database, and for a damaged one.
-const NOT_A_DATABASE: i32 = 26;
-const CORRUPT: i32 = 11;
 
 /// Why a data directory cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -228,7 +225,7 @@ fn check_log(path: &Path) -> Result<(), OpenError> {
 
 /// Creates the database file, if it is missing, unreadable for other users: it contains the seeds
 /// of running games.
-fn make_private(path: &Path) -> Result<(), OpenError> {
+pub(super) fn make_private(path: &Path) -> Result<(), OpenError> {
     File::options()
         .create(true)
         .append(true)

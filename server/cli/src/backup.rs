@@ -1,0 +1,220 @@
+//! `chefshat backup` and `chefshat restore`: copy a data directory while a server uses it, and put
+//! a copy in place. The database is copied by [`chefshat_server::store`]; everything else in the
+//! directory are files that are written once or replaced atomically.
+
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, Permissions};
+use std::io;
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_record::atomic_file::sync_folder_of;
+use chefshat_server::store::{check_copy, copy_database};
+use clap::Args;
+use serde_json::json;
+
+use super::numbers::counted;
+use super::{CommandError, data_dir, say};
+
+/// The folder of records in a data directory.
+const RECORDS: &str = "records";
+/// The database, which SQLite copies, with what lies beside it while a server runs.
+const DATABASE: &str = "games.sqlite3";
+/// Locked while a server runs.
+const LOCK: &str = "games.lock";
+/// Ending of files that are being written.
+const PART: &str = "part";
+
+/// Copy a data directory while a server uses it.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "The copy contains secrets: seeds of unfinished games, the signing key. Only you can read it; keep it so.\n\n\
+                  Example:\n  chefshat backup /backups/chefshat-2027-03-01 --data-dir ./chefshat-data"
+)]
+pub(super) struct Backup {
+    /// Folder to create. It appears when the copy is complete.
+    #[arg(value_name = "TARGET")]
+    target: PathBuf,
+    /// Data directory. Default: chefshat in the user's data directory.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Backup {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let source = data_dir::name(self.data_dir)?;
+        let target = self.target;
+        if target.exists() {
+            let target = target.display();
+            return Err(format!("{target} exists already; name a new folder").into());
+        }
+        let name = target
+            .file_name()
+            .ok_or("name the folder to create, for example backups/monday")?;
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        // Only its owner can open it. Removed if anything fails.
+        let part = tempfile::Builder::new()
+            .prefix(&[name, OsStr::new(".")].join(OsStr::new("")))
+            .suffix(".part")
+            .permissions(Permissions::from_mode(0o700))
+            .tempdir_in(parent)
+            .map_err(|error| at(parent, &error))?;
+        // A record that is written later belongs to a game that the copy of the database may know
+        // as unfinished.
+        let mut records = names(&source.join(RECORDS))?;
+        let copied = copy_database(&source, part.path()).await?;
+        records.extend(
+            copied
+                .recorded
+                .iter()
+                .map(|id| format!("{id}.jsonl").into()),
+        );
+        let others = names(&source)?;
+        copy_files(&source, part.path(), &others)?;
+        let records = copy_files(&source.join(RECORDS), &part.path().join(RECORDS), &records)?;
+        // One call for any number of files.
+        rustix::fs::sync();
+        fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
+        sync_folder_of(&target).map_err(|error| at(&target, &error))?;
+        if self.json {
+            say(json!({
+                "backup": target.display().to_string(),
+                "finished_games": copied.finished,
+                "unfinished_games": copied.unfinished,
+                "records": records,
+            }))?;
+        } else {
+            say(format_args!(
+                "{}: {}, {} unfinished, {}",
+                target.display(),
+                counted(copied.finished, "finished game"),
+                copied.unfinished,
+                counted(records, "record"),
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Create a data directory from a copy that `chefshat backup` made.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Unfinished games resume when a server is started on the directory. Restart their agents with their tickets: they may \
+                  have seen more than the copy knows.\n\nExample:\n  chefshat restore /backups/chefshat-2027-03-01 --data-dir ./chefshat-data"
+)]
+pub(super) struct Restore {
+    /// The copy.
+    #[arg(value_name = "SOURCE")]
+    source: PathBuf,
+    /// Data directory, which must be missing or empty. Default: chefshat in the user's data
+    /// directory.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Restore {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let (source, target) = (self.source, data_dir::name(self.data_dir)?);
+        let copied = check_copy(&source).await?;
+        let in_the_way = names(&target)?.into_iter().next();
+        if in_the_way.is_some() || target.join(RECORDS).exists() {
+            let target = target.display();
+            return Err(format!(
+                "{target} is not empty; choose another folder with --data-dir, or move it away. Nothing was changed"
+            )
+            .into());
+        }
+        copy_files(&source, &target, &names(&source)?)?;
+        let records = names(&source.join(RECORDS))?;
+        let records = copy_files(&source.join(RECORDS), &target.join(RECORDS), &records)?;
+        // Last, under its name only when complete: a directory without a database is refused by
+        // another attempt, and used by no server.
+        let part = target.join(format!("{DATABASE}.{PART}"));
+        copy_file(&source.join(DATABASE), &part)?;
+        rustix::fs::sync();
+        let database = target.join(DATABASE);
+        fs::rename(&part, &database).map_err(|error| at(&database, &error))?;
+        sync_folder_of(&database).map_err(|error| at(&database, &error))?;
+        if self.json {
+            say(json!({
+                "data_dir": target.display().to_string(),
+                "finished_games": copied.finished,
+                "unfinished_games": copied.unfinished,
+                "records": records,
+            }))?;
+        } else {
+            say(format_args!(
+                "{}: {}, {} unfinished, {}; `chefshat verify {}` checks the records",
+                target.display(),
+                counted(copied.finished, "finished game"),
+                copied.unfinished,
+                counted(records, "record"),
+                target.join(RECORDS).display(),
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The files of a folder to copy one by one; none if it does not exist.
+fn names(folder: &Path) -> Result<BTreeSet<OsString>, CommandError> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
+        entries => entries.map_err(|error| at(folder, &error))?,
+    };
+    let mut names = BTreeSet::new();
+    for entry in entries {
+        let entry = entry.map_err(|error| at(folder, &error))?;
+        let name = entry.file_name();
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        let own = name.to_string_lossy();
+        let elsewhere = own.starts_with(DATABASE) || own == LOCK;
+        let unfinished = Path::new(&name).extension() == Some(OsStr::new(PART));
+        if is_file && !elsewhere && !unfinished {
+            names.insert(name);
+        }
+    }
+    Ok(names)
+}
+
+/// Copies files into a folder, which is created. Skips those that have been deleted meanwhile.
+/// Returns the number of copied files.
+fn copy_files(from: &Path, to: &Path, names: &BTreeSet<OsString>) -> Result<u64, CommandError> {
+    let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(to);
+    made.map_err(|error| at(to, &error))?;
+    let mut copied = 0;
+    for name in names {
+        copied += u64::from(copy_file(&from.join(name), &to.join(name))?);
+    }
+    Ok(copied)
+}
+
+/// Copies a file so that only its owner can read it. Returns `false` if it does not exist.
+fn copy_file(from: &Path, to: &Path) -> Result<bool, CommandError> {
+    let mut source = match File::open(from) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        source => source.map_err(|error| at(from, &error))?,
+    };
+    let mut copy = || {
+        let mut options = File::options();
+        let mut target = options.write(true).create_new(true).mode(0o600).open(to)?;
+        io::copy(&mut source, &mut target).map(drop)
+    };
+    copy().map_err(|error| at(to, &error))?;
+    Ok(true)
+}
+
+fn at(path: &Path, error: &io::Error) -> CommandError {
+    format!("{}: {error}", path.display()).into()
+}
