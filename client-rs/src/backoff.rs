@@ -15,8 +15,7 @@ pub const MAX_DELAY: Duration = Duration::from_secs(5);
 /// Default time without a connection after which the client gives up.
 pub const GIVE_UP_AFTER: Duration = Duration::from_secs(600);
 
-/// The delays between connection attempts: they double from `first` to `max`, each shortened at
-/// random by up to a half, so that many clients do not reconnect at the same instant.
+/// The delays between connection attempts: they double from `first` to `max`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Backoff {
     /// Delay before the first attempt.
@@ -26,6 +25,9 @@ pub struct Backoff {
     pub max: Duration,
     /// Length of an outage after which the client gives up; zero disables reconnecting.
     pub give_up_after: Duration,
+    /// Shortens each delay at random by up to a half, so that many clients do not reconnect at the
+    /// same instant. Without it the delays are the same every time, as a simulation needs them.
+    pub jitter: bool,
 }
 
 impl Default for Backoff {
@@ -34,6 +36,7 @@ impl Default for Backoff {
             first: FIRST_DELAY,
             max: MAX_DELAY,
             give_up_after: GIVE_UP_AFTER,
+            jitter: true,
         }
     }
 }
@@ -43,7 +46,10 @@ impl Backoff {
     fn delay(&self, attempt: u32, rng: &mut impl Rng) -> Duration {
         let factor = 2u32.saturating_pow(attempt);
         let full = self.first.saturating_mul(factor).min(self.max);
-        full.mul_f64(rng.random_range(0.5..=1.0))
+        match self.jitter {
+            true => full.mul_f64(rng.random_range(0.5..=1.0)),
+            false => full,
+        }
     }
 }
 

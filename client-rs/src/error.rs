@@ -129,7 +129,10 @@ impl From<Status> for Error {
                 message = format!("{message}: {causes}");
             }
         }
-        if info.as_ref().is_some_and(|info| info.reason == "TOKEN_MISSING") {
+        if info
+            .as_ref()
+            .is_some_and(|info| info.reason == "TOKEN_MISSING")
+        {
             message += "; give it with --token, CHEFSHAT_TOKEN or `ConnectOptions`";
         }
         let (reason, metadata) = match info {

@@ -24,6 +24,7 @@ const BACKOFF: Backoff = Backoff {
     first: Duration::from_millis(5),
     max: Duration::from_millis(40),
     give_up_after: PATIENCE,
+    jitter: true,
 };
 
 /// The games of a regular room.

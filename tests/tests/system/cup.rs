@@ -38,6 +38,7 @@ fn options() -> PlayOptions {
             first: Duration::from_millis(5),
             max: Duration::from_millis(40),
             give_up_after: PATIENCE,
+            ..Backoff::default()
         },
         ..PlayOptions::default()
     }

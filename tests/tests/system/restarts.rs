@@ -263,6 +263,7 @@ async fn waiting_agents_return_after_a_stop_and_are_not_refused_during_it() {
             first: Duration::from_millis(5),
             max: Duration::from_millis(50),
             give_up_after: PATIENCE,
+            ..Backoff::default()
         },
         ..PlayOptions::default()
     };
