@@ -12,9 +12,10 @@ use futures::{Stream, stream};
 use prometheus_client::metrics::gauge::Gauge;
 use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Sleep;
+use tokio_util::either::Either;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::debug;
 
@@ -36,6 +37,44 @@ const KEEPALIVE_RETRIES: u32 = 2;
 #[cfg(target_os = "linux")]
 const UNACKNOWLEDGED_LIMIT: Duration = Duration::from_secs(90);
 
+/// A socket that accepts connections.
+#[derive(Debug)]
+pub enum Listener {
+    /// On an address and port.
+    Tcp(TcpListener),
+    /// On a path of this machine, for a proxy.
+    Unix(UnixListener),
+}
+
+impl From<TcpListener> for Listener {
+    fn from(listener: TcpListener) -> Self {
+        Self::Tcp(listener)
+    }
+}
+
+impl From<UnixListener> for Listener {
+    fn from(listener: UnixListener) -> Self {
+        Self::Unix(listener)
+    }
+}
+
+impl Listener {
+    async fn accept(&self) -> io::Result<Socket> {
+        match self {
+            Self::Tcp(listener) => {
+                let (stream, _) = listener.accept().await?;
+                if let Err(error) = set_options(&stream) {
+                    debug!(%error, "could not set the options of a connection");
+                }
+                Ok(Either::Left(stream))
+            }
+            Self::Unix(listener) => Ok(Either::Right(listener.accept().await?.0)),
+        }
+    }
+}
+
+type Socket = Either<TcpStream, UnixStream>;
+
 /// Limits of connections.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -55,7 +94,7 @@ pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
 
 /// The connections of a listening socket. `open`: gauge of open connections.
 pub fn accept(
-    listener: TcpListener,
+    listener: Listener,
     limits: Limits,
     open: Gauge,
 ) -> impl Stream<Item = io::Result<Connection>> {
@@ -69,16 +108,13 @@ pub fn accept(
                 .expect("the semaphore is never closed");
             let stream = loop {
                 match listener.accept().await {
-                    Ok((stream, _)) => break stream,
+                    Ok(stream) => break stream,
                     Err(error) => {
                         debug!(%error, "accepting a connection failed");
                         tokio::time::sleep(ACCEPT_PAUSE).await;
                     }
                 }
             };
-            if let Err(error) = set_options(&stream) {
-                debug!(%error, "could not set the options of a connection");
-            }
             let connection = Connection {
                 stream,
                 silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
@@ -106,7 +142,7 @@ fn set_options(stream: &TcpStream) -> io::Result<()> {
 /// A connection that is dropped unless it sends its first bytes in time.
 #[derive(Debug)]
 pub struct Connection {
-    stream: TcpStream,
+    stream: Socket,
     /// Fires unless something has been read.
     silence: Option<Pin<Box<Sleep>>>,
     _permit: OwnedSemaphorePermit,
@@ -117,7 +153,13 @@ impl Connected for Connection {
     type ConnectInfo = TcpConnectInfo;
 
     fn connect_info(&self) -> Self::ConnectInfo {
-        self.stream.connect_info()
+        match &self.stream {
+            Either::Left(stream) => stream.connect_info(),
+            Either::Right(_) => TcpConnectInfo {
+                local_addr: None,
+                remote_addr: None,
+            },
+        }
     }
 }
 
@@ -184,10 +226,13 @@ mod tests {
             max_connections: 1,
             first_byte_timeout: Duration::from_secs(60),
         };
-        let mut connections = std::pin::pin!(accept(listener, limits, Gauge::default()));
+        let mut connections = std::pin::pin!(accept(listener.into(), limits, Gauge::default()));
         let _client = TcpStream::connect(address).await.expect("it listens");
         let connection = connections.next().await.expect("endless").expect("one");
-        let socket = SockRef::from(&connection.stream);
+        let Either::Left(stream) = &connection.stream else {
+            panic!("not a TCP connection");
+        };
+        let socket = SockRef::from(stream);
         assert!(socket.keepalive().expect("an option"));
         assert_eq!(
             socket.tcp_keepalive_time().expect("an option"),

@@ -12,7 +12,6 @@ use chefshat_proto::v1;
 use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tonic::service::Routes;
@@ -26,7 +25,7 @@ use crate::config::{
     DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
     ServerConfig,
 };
-use crate::connections::{self, Limits};
+use crate::connections::{self, Limits, Listener};
 use crate::grpc;
 use crate::metrics::Metrics;
 use crate::rooms::Rooms;
@@ -71,7 +70,7 @@ pub enum ServeError {
 /// # Errors
 /// The transport or store failed, or an allowed origin is not a web origin.
 pub async fn serve(
-    listener: TcpListener,
+    listener: impl Into<Listener>,
     config: ServerConfig,
     store: Arc<dyn Store>,
     shutdown: impl Future<Output = ()> + Send,
@@ -140,14 +139,18 @@ impl Server {
     /// The transport or store failed, or an allowed origin is not a web origin.
     pub async fn serve(
         self,
-        listener: TcpListener,
+        listener: impl Into<Listener>,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
         let limits = Limits {
             max_connections: self.config.max_connections,
             first_byte_timeout: self.config.first_byte_timeout,
         };
-        let incoming = connections::accept(listener, limits, self.metrics().connections().clone());
+        let incoming = connections::accept(
+            listener.into(),
+            limits,
+            self.metrics().connections().clone(),
+        );
         let incoming = match self.tls.clone() {
             None => incoming.map_ok(Secured::Plain).left_stream(),
             Some(tls) => tls.secure(incoming).right_stream(),

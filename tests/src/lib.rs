@@ -17,7 +17,7 @@ mod server;
 pub use busy_rooms::{BusyRooms, RoomKind};
 pub use disk::{SmallDisk, skip};
 pub use ledger::{Ledger, Recorded};
-pub use process::{Ended, Launch, Process, set_up};
+pub use process::{Ended, Launch, Process, own_address, set_up};
 pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
 pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
 

@@ -200,7 +200,7 @@ impl Process {
 /// A loopback address that no other test of this machine listens on. Connections come from
 /// 127.0.0.1, so a client that tries to connect while the server is down never gets the server's
 /// port.
-fn own_address() -> Ipv4Addr {
+pub fn own_address() -> Ipv4Addr {
     static NEXT: AtomicU8 = AtomicU8::new(1);
     let [_, _, high, low] = std::process::id().to_be_bytes();
     let number = NEXT.fetch_add(1, Ordering::Relaxed);

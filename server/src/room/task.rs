@@ -20,7 +20,7 @@ use smallvec::SmallVec;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
-use tracing::{debug, error, info};
+use tracing::{Instrument as _, Span, debug, debug_span, error, info, info_span};
 
 use super::message::{
     Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
@@ -82,6 +82,8 @@ pub(super) fn spawn(
     let seats = core.header().fills.len();
     let physical = core.header().is_physical();
     let (state, core_changes) = (core.state(), core.changes());
+    let header = core.header();
+    let span = info_span!(parent: None, "room", room = %header.room_id, game = %header.game_id);
     let room = Box::new(Room {
         core,
         journal,
@@ -103,11 +105,13 @@ pub(super) fn spawn(
         counted_changes: core_changes,
         counted_state: (state, context.metrics.room(state)),
         answers_read: SmallVec::new(),
+        span,
+        traced: (None, Span::none()),
         context: context.clone(),
     });
-    context
-        .tracker
-        .spawn(run(room, Arc::clone(&resting), inbox));
+    let span = room.span.clone();
+    let running = run(room, Arc::clone(&resting), inbox).instrument(span);
+    context.tracker.spawn(running);
     (mailbox, resting)
 }
 
@@ -173,6 +177,10 @@ pub(super) struct Room {
     counted_state: (State, Counted),
     /// When the answers were read whose results are not published.
     answers_read: SmallVec<[Instant; 1]>,
+    /// The span of the room.
+    span: Span,
+    /// The open decision and its span. One that is taken as soon as it is opened has none.
+    traced: (Option<(Seat, u64)>, Span),
     context: TaskContext,
 }
 
@@ -283,6 +291,8 @@ impl Room {
         answer: Answer,
         arrived: Instant,
     ) -> bool {
+        let span = self.span.clone();
+        let _entered = span.enter();
         self.now = self.now.max(self.clock.at(arrived));
         self.execute(seat, connection, SeatAction::Answer(answer), arrived);
         if !self.commit_now() || self.core.state().is_over() {
@@ -582,7 +592,12 @@ impl Room {
     fn count_changes(&mut self) {
         let new = self.core.changes() - self.counted_changes;
         self.counted_changes += new;
-        let Self { core, context, .. } = self;
+        let Self {
+            core,
+            context,
+            traced: (open, span),
+            ..
+        } = self;
         let header = Arc::clone(core.header());
         let metrics = &context.metrics;
         let pending = core.pending();
@@ -591,11 +606,29 @@ impl Room {
             match &entry.change {
                 Change::Decided(decided) => {
                     let built_in = header.fills[decided.seat.index()].is_built_in();
-                    metrics.decided(decided, Outcome::of(decided.source, built_in));
+                    let outcome = Outcome::of(decided.source, built_in);
+                    metrics.decided(decided, outcome);
+                    if open.take_if(|(seat, _)| *seat == decided.seat).is_some() {
+                        let (outcome, thinking_us) = (outcome.label(), decided.time_us);
+                        debug!(parent: &*span, outcome, thinking_us, "a decision was taken");
+                        *span = Span::none();
+                    }
                 }
                 Change::Attempted { .. } => metrics.invalid_answer(),
                 _ => {}
             }
+        }
+    }
+
+    /// Starts the span of the open decision.
+    fn trace_decision(&mut self) {
+        let open = (self.core.open()).map(|open| (open.decision.seat, open.id));
+        if open != self.traced.0 {
+            let span = open.map_or_else(Span::none, |(seat, decision)| {
+                let seat = seat.index();
+                debug_span!(parent: &self.span, "decision", seat, decision)
+            });
+            self.traced = (open, span);
         }
     }
 
@@ -650,6 +683,7 @@ impl Room {
             table.follow(&self.core, self.now);
         }
         self.deliver();
+        self.trace_decision();
         self.count_published();
     }
 

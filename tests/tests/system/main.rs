@@ -12,6 +12,7 @@ mod examiner;
 mod faults;
 mod languages;
 mod lists;
+mod observing;
 mod physical;
 mod played;
 mod records;

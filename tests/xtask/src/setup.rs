@@ -122,6 +122,14 @@ pub(crate) fn strace() -> Result<(), Failure> {
     debian_package("strace")
 }
 
+/// Prometheus, which loads the shipped dashboard and alerts in a test.
+pub(crate) fn prometheus() -> Result<(), Failure> {
+    if succeeds("promtool", &["--version"]) {
+        return Ok(());
+    }
+    debian_package("prometheus")
+}
+
 /// tmux, for the tests of terminal commands.
 pub(crate) fn tmux() -> Result<(), Failure> {
     if succeeds("tmux", &["-V"]) {

@@ -61,6 +61,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Res
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
         }
+        if let Err(failure) = setup::prometheus() {
+            steps.skip("the dashboard in Prometheus", &failure.to_string());
+        }
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }

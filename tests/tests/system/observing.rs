@@ -1,0 +1,395 @@
+//! What an operator sees: the metrics of a server while games are played, the table of them in the
+//! docs, and the shipped rules and dashboard in a real Prometheus.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::Client;
+use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::scrape;
+use chefshat_server::serve::Server;
+use chefshat_server::store::SqliteStore;
+use chefshat_tests::{
+    StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
+};
+use http_body_util::{BodyExt as _, Full};
+use hyper_util::client::legacy::Client as HttpClient;
+use hyper_util::rt::TokioExecutor;
+use serde_json::Value;
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio::process::{Child, Command};
+
+/// A server with a database and its metrics.
+struct Observed {
+    url: String,
+    metrics: SocketAddr,
+    _data: TempDir,
+}
+
+impl Observed {
+    async fn start() -> Self {
+        let data = tempfile::tempdir().expect("a temporary folder");
+        let config = ServerConfig {
+            data_dir: Some(data.path().to_path_buf()),
+            ..ServerConfig::default()
+        };
+        let store = SqliteStore::open(data.path()).await.expect("a store");
+        let server = Server::restored(config, Arc::new(store)).await;
+        let server = server.expect("an empty database");
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let scraped = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let metrics = scraped.local_addr().expect("bound");
+        tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics())));
+        tokio::spawn(server.serve(listener, std::future::pending()));
+        Self {
+            url: format!("http://{address}"),
+            metrics,
+            _data: data,
+        }
+    }
+
+    async fn client(&self) -> Client {
+        Client::connect(&self.url).await.expect("it listens")
+    }
+
+    /// The metrics as Prometheus gets them.
+    async fn text(&self) -> String {
+        get(&format!("http://{}/metrics", self.metrics)).await
+    }
+
+    /// Plays a game of random agents and returns its id.
+    async fn play(&self) -> String {
+        let client = self.client().await;
+        let (created, tickets) =
+            room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+        for outcome in patiently("the game", client.play_many(random_agents(tickets))).await {
+            outcome.expect("it ends");
+        }
+        created.room.expect("a room").game_id
+    }
+}
+
+async fn get(url: &str) -> String {
+    let http = HttpClient::builder(TokioExecutor::new()).build_http::<Full<bytes::Bytes>>();
+    let answer = http.get(url.parse().expect("a URL")).await;
+    let body = answer.expect("an answer").into_body().collect().await;
+    String::from_utf8(body.expect("complete").to_bytes().to_vec()).expect("text")
+}
+
+/// The value of a sample.
+fn value(text: &str, sample: &str) -> f64 {
+    let line = text.lines().find_map(|line| line.strip_prefix(sample));
+    let value = line.unwrap_or_else(|| panic!("{sample} is not in {text}"));
+    value.trim().parse().expect("a number")
+}
+
+#[tokio::test]
+async fn every_decision_answer_and_refusal_of_a_game_is_counted() {
+    let server = Observed::start().await;
+    let client = server.client().await;
+    let game = server.play().await;
+    let unknown = client.get_room("0000").await;
+    let refused = unknown.expect_err("there is no such room");
+    assert_eq!(refused.reason(), Some("ROOM_UNKNOWN"));
+
+    let record = client.record(&game).await.expect("the game has ended");
+    let is_decision = |line: &&v1::RecordLine| matches!(line.line, Some(Line::Decision(_)));
+    #[allow(clippy::cast_precision_loss, reason = "a game has few decisions")]
+    let decisions = record.iter().filter(is_decision).count() as f64;
+
+    let text = server.text().await;
+    for (sample, expected) in [
+        ("chefshat_decisions_total{outcome=\"answered\"}", decisions),
+        ("chefshat_decisions_total{outcome=\"timeout\"}", 0.0),
+        ("chefshat_thinking_seconds_count", decisions),
+        ("chefshat_answer_seconds_count", decisions),
+        ("chefshat_answer_seconds_bucket{le=\"+Inf\"}", decisions),
+        ("chefshat_invalid_answers_total", 0.0),
+        ("chefshat_games_ended_total{result=\"finished\"}", 1.0),
+        ("chefshat_rooms{state=\"finished\"}", 1.0),
+        ("chefshat_rooms{state=\"playing\"}", 0.0),
+        ("chefshat_refusals_total{reason=\"ROOM_UNKNOWN\"}", 1.0),
+        ("chefshat_queue_depth{queue=\"outbox\"}", 0.0),
+        ("chefshat_draining", 0.0),
+    ] {
+        assert_eq!(value(&text, sample), expected, "{sample}");
+    }
+    for sample in [
+        "chefshat_commit_seconds_count",
+        "chefshat_connections",
+        "chefshat_disk_free_bytes",
+        "chefshat_database_bytes",
+        "process_resident_memory_bytes",
+        "process_open_fds",
+    ] {
+        assert!(value(&text, sample) > 0.0, "{sample}");
+    }
+    for secret in [game.as_str(), "agent 0"] {
+        assert!(!text.contains(secret), "no names and no ids: {secret}");
+    }
+    assert!(text.ends_with("# EOF\n"));
+}
+
+#[tokio::test]
+async fn connected_seats_streams_and_late_decisions_are_counted() {
+    let server = Observed::start().await;
+    let client = server.client().await;
+    // Nobody answers: each decision ends at once by default, then substitutes play.
+    let policy = v1::RoomPolicy {
+        decision_time_ms: Some(10),
+        bank_ms: Some(0),
+        ..v1::RoomPolicy::default()
+    };
+    let (_, tickets) = room_of_four(&client, one_shift(), policy).await;
+    let mut seats = Vec::new();
+    for ticket in &tickets[..3] {
+        seats.push(StreamSeat::attached(client.channel(), ticket).await);
+    }
+    let text = server.text().await;
+    let connected = "chefshat_seats_connected{kind=\"agent\"}";
+    assert_eq!(value(&text, connected), 3.0);
+    assert_eq!(value(&text, "chefshat_streams{service=\"play\"}"), 3.0);
+    assert_eq!(value(&text, "chefshat_rooms{state=\"waiting\"}"), 1.0);
+
+    seats.push(StreamSeat::attached(client.channel(), &tickets[3]).await);
+    let over = "chefshat_games_ended_total{result=\"finished\"}";
+    let aborted = "chefshat_games_ended_total{result=\"aborted\"}";
+    let text = patiently("the game to end", async {
+        loop {
+            let text = server.text().await;
+            if value(&text, over) + value(&text, aborted) > 0.0 {
+                return text;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    })
+    .await;
+    assert!(value(&text, "chefshat_decisions_total{outcome=\"timeout\"}") > 0.0);
+    assert_eq!(
+        value(&text, "chefshat_decisions_total{outcome=\"answered\"}"),
+        0.0
+    );
+    drop(seats);
+    patiently("the seats to leave", async {
+        while value(&server.text().await, "chefshat_streams{service=\"play\"}") > 0.0 {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    })
+    .await;
+    assert_eq!(value(&server.text().await, connected), 0.0);
+}
+
+/// A file of the source tree.
+fn source(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+fn read(path: &str) -> String {
+    let path = source(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The rows of the table in the docs that these metrics should have.
+fn rows(text: &str) -> BTreeSet<String> {
+    let mut helps = BTreeMap::new();
+    let mut types = BTreeMap::new();
+    let mut labels: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for line in text.lines() {
+        if let Some((name, help)) = line
+            .strip_prefix("# HELP ")
+            .and_then(|it| it.split_once(' '))
+        {
+            helps.insert(name, help.trim_end_matches('.'));
+        } else if let Some((name, kind)) = line
+            .strip_prefix("# TYPE ")
+            .and_then(|it| it.split_once(' '))
+        {
+            types.insert(name, kind);
+        } else if let Some((sample, rest)) = line.split_once('{') {
+            let names = rest
+                .split('"')
+                .step_by(2)
+                .map(|it| it.trim_matches(['}', ',', '=']));
+            let names =
+                names.filter(|it| !it.starts_with('}') && it.chars().all(char::is_alphabetic));
+            let names = names.filter(|name| !name.is_empty() && *name != "le");
+            labels.entry(sample).or_default().extend(names);
+        }
+    }
+    helps
+        .into_iter()
+        .map(|(name, help)| {
+            let kind = types[name];
+            let sample = match kind {
+                "counter" => format!("{name}_total"),
+                "info" => format!("{name}_info"),
+                _ => name.to_owned(),
+            };
+            let labels = labels.get(sample.as_str()).into_iter().flatten();
+            let labels: Vec<String> = labels.map(|label| format!("`{label}`")).collect();
+            format!("| `{sample}` | {kind} | {} | {help} |", labels.join(", "))
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn the_docs_list_every_metric() {
+    let server = Observed::start().await;
+    server.play().await;
+    let unknown = server.client().await.get_room("0000").await;
+    unknown.expect_err("there is no such room");
+    let expected = rows(&server.text().await);
+    let docs = read("docs/observing.md");
+    let is_row = |line: &&str| line.starts_with("| `chefshat_") || line.starts_with("| `process_");
+    let listed: BTreeSet<String> = docs.lines().filter(is_row).map(str::to_owned).collect();
+    assert_eq!(listed, expected);
+}
+
+/// A Prometheus that scrapes a server by the shipped configuration, only more often.
+struct Prometheus {
+    url: String,
+    _process: Child,
+    _folder: TempDir,
+}
+
+impl Prometheus {
+    /// Starts it, unless it is not installed.
+    async fn start(scraped: SocketAddr) -> Option<Self> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let config = read("docker/prometheus/prometheus.yml")
+            .replace("server:9464", &scraped.to_string())
+            .replace("15s", "100ms");
+        let config_file = folder.path().join("prometheus.yml");
+        std::fs::write(&config_file, config).expect("written");
+        let rules = source("docker/prometheus/alerts.yml");
+        std::fs::copy(rules, folder.path().join("alerts.yml")).expect("copied");
+
+        let checked = Command::new("promtool")
+            .arg("check")
+            .arg("config")
+            .arg(&config_file)
+            .output()
+            .await;
+        let Ok(checked) = checked else {
+            return None;
+        };
+        assert!(checked.status.success(), "{checked:?}");
+
+        // The port is free: no other program of this machine listens on this address.
+        let address = format!("{}:9090", own_address());
+        let process = Command::new("prometheus")
+            .arg(format!("--config.file={}", config_file.display()))
+            .arg(format!(
+                "--storage.tsdb.path={}",
+                folder.path().join("data").display()
+            ))
+            .arg(format!("--web.listen-address={address}"))
+            .current_dir(folder.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .kill_on_drop(true)
+            .spawn()
+            .expect("promtool and prometheus are one package");
+        patiently("Prometheus to listen", async {
+            while tokio::net::TcpStream::connect(&address).await.is_err() {
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+        })
+        .await;
+        Some(Self {
+            url: format!("http://{address}/api/v1"),
+            _process: process,
+            _folder: folder,
+        })
+    }
+
+    async fn api(&self, path: &str) -> Value {
+        serde_json::from_str(&get(&format!("{}/{path}", self.url)).await).expect("JSON")
+    }
+
+    /// Evaluates an expression until it has data.
+    async fn has_data(&self, expression: &str) {
+        let escaped: String = (expression.bytes())
+            .map(|byte| format!("%{byte:02x}"))
+            .collect();
+        patiently(expression, async {
+            loop {
+                let answer = self.api(&format!("query?query={escaped}")).await;
+                assert_eq!(answer["status"], "success", "{expression}: {answer}");
+                let result = answer["data"]["result"].as_array().expect("a result");
+                if !result.is_empty() {
+                    return;
+                }
+                tokio::time::sleep(Duration::from_millis(100)).await;
+            }
+        })
+        .await;
+    }
+}
+
+#[tokio::test]
+async fn the_shipped_dashboard_and_alerts_have_data_in_a_real_prometheus() {
+    let server = Observed::start().await;
+    server.play().await;
+    let unknown = server.client().await.get_room("0000").await;
+    unknown.expect_err("there is no such room");
+    let Some(prometheus) = Prometheus::start(server.metrics).await else {
+        return skip("the_shipped_dashboard…", "Prometheus is not installed");
+    };
+
+    let dashboard: Value =
+        serde_json::from_str(&read("docker/prometheus/dashboard.json")).expect("JSON");
+    let panels = dashboard["panels"].as_array().expect("panels");
+    let targets = panels
+        .iter()
+        .filter_map(|panel| panel["targets"].as_array());
+    let expressions: Vec<String> = (targets.flatten())
+        .map(|target| target["expr"].as_str().expect("an expression"))
+        .map(|expr| {
+            expr.replace("$instance", ".*")
+                .replace("$__rate_interval", "30s")
+        })
+        .collect();
+    assert!(expressions.len() > 30, "{expressions:#?}");
+    for expression in &expressions {
+        prometheus.has_data(expression).await;
+    }
+
+    // An alert has data when its threshold is left out, and is evaluated without an error.
+    let groups = prometheus.api("rules").await;
+    let rules = groups["data"]["groups"][0]["rules"]
+        .as_array()
+        .expect("rules")
+        .clone();
+    assert!(rules.len() >= 10, "{groups}");
+    for rule in &rules {
+        let expression = rule["query"].as_str().expect("an expression");
+        let (measured, _) = expression
+            .rsplit_once(['<', '>', '='])
+            .expect("a threshold");
+        prometheus.has_data(measured.trim_end_matches('=')).await;
+    }
+    patiently("all rules to be evaluated", async {
+        loop {
+            let groups = prometheus.api("rules").await;
+            let rules = groups["data"]["groups"][0]["rules"]
+                .as_array()
+                .expect("rules");
+            let health = |rule: &Value| rule["health"].as_str().expect("a text").to_owned();
+            assert!(rules.iter().all(|rule| health(rule) != "err"), "{groups}");
+            if rules.iter().all(|rule| health(rule) == "ok") {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    })
+    .await;
+}
