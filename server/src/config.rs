@@ -115,6 +115,9 @@ pub struct ServerConfig {
     /// How long a client may use one connection before it is asked to open another; its streams may
     /// finish on the old one. `None`: for ever.
     pub max_connection_age: Option<Duration>,
+    /// Names of hosts under which the server may be reached, besides those of this machine; `None`:
+    /// any.
+    pub allowed_hosts: Option<Vec<String>>,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
@@ -133,6 +136,7 @@ impl Default for ServerConfig {
             access: AccessSettings::default(),
             tls: None,
             max_connection_age: None,
+            allowed_hosts: None,
             allowed_origins: Vec::new(),
         }
     }

@@ -33,7 +33,7 @@ use crate::scrape;
 use crate::store::{Store, StoreError};
 use crate::tls::{Secured, Tls, TlsError};
 use crate::tournaments::Tournaments;
-use crate::web::PageLayer;
+use crate::web::{OriginLayer, Origins, PageLayer};
 
 /// Largest request headers, bytes.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
@@ -199,6 +199,7 @@ impl Server {
             tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
         }
         let closed = closing.clone();
+        let origins = Origins::new(config.allowed_origins.clone(), config.allowed_hosts.clone());
         let mut builder = transport::Server::builder();
         if let Some(age) = config.max_connection_age {
             builder = builder.max_connection_age(age);
@@ -208,6 +209,7 @@ impl Server {
             .tcp_nodelay(true)
             .http2_max_header_list_size(MAX_HEADER_BYTES)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
+            .layer(OriginLayer::new(origins))
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())

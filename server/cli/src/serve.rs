@@ -67,6 +67,15 @@ pub(super) struct Settings {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
+    /// Name of a host under which an open server on a loopback address may be reached, besides
+    /// localhost and addresses; for a proxy that passes it on. Repeatable.
+    #[arg(
+        long = "allow-host",
+        env = "CHEFSHAT_ALLOW_HOST",
+        value_name = "HOST",
+        value_delimiter = ','
+    )]
+    allowed_hosts: Vec<String>,
     /// Whether calls need a token (see `chefshat token`): open or tokens. Default: tokens if the data
     /// directory has any. An open server is refused on addresses that others reach, unless this
     /// says open.
@@ -125,7 +134,7 @@ impl Settings {
         }
     }
 
-    /// Who may call, for a server with this data directory and address.
+    /// Who may call, and the mode that follows, for a server with this data directory and address.
     ///
     /// # Errors
     /// Strangers would reach a server that is not meant for them.
@@ -133,7 +142,7 @@ impl Settings {
         &self,
         data_dir: Option<&PathBuf>,
         address: SocketAddr,
-    ) -> Result<AccessSettings, CommandError> {
+    ) -> Result<(AccessSettings, Mode), CommandError> {
         let settings = AccessSettings {
             mode: self.access,
             anonymous: self.anonymous,
@@ -142,7 +151,8 @@ impl Settings {
         if settings.mode == Some(Mode::Tokens) && data_dir.is_none() {
             return Err("--access tokens needs a data directory, which has the tokens; leave --no-records out".into());
         }
-        if Access::open(&settings, data_dir)?.mode() == Mode::Open && !address.ip().is_loopback() {
+        let mode = Access::open(&settings, data_dir)?.mode();
+        if mode == Mode::Open && !address.ip().is_loopback() {
             if settings.mode.is_none() {
                 return Err(format!(
                     "refusing to listen on {address} without tokens: anyone who reaches it could create rooms; create a token with \
@@ -155,7 +165,7 @@ impl Settings {
                  `chefshat token create`"
             );
         }
-        Ok(settings)
+        Ok((settings, mode))
     }
 }
 
@@ -196,7 +206,9 @@ impl Serve {
         let address = listener.local_addr()?;
         let tls = settings.tls(address)?;
         let scheme = if tls.is_some() { "https" } else { "http" };
-        let access = settings.access(data_dir.as_ref(), address)?;
+        let (access, mode) = settings.access(data_dir.as_ref(), address)?;
+        // Pages of other names must not reach a server that trusts everybody on this machine.
+        let is_local = mode == Mode::Open && address.ip().is_loopback();
         let store: Arc<dyn Store> = match &data_dir {
             Some(folder) => Arc::new(SqliteStore::open(folder).await?),
             None => Arc::new(MemoryStore::default()),
@@ -214,6 +226,7 @@ impl Serve {
             max_rooms: settings.max_rooms,
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,
+            allowed_hosts: is_local.then_some(settings.allowed_hosts),
             access,
             max_connection_age: (tls.is_some() && settings.connection_age > 0)
                 .then(|| Duration::from_secs(settings.connection_age)),

@@ -22,6 +22,8 @@ use tracing::info;
 use super::status::status;
 use crate::access::{Access, Call, Caller, Ended, Granted, Refusal};
 use crate::connections::peer_address;
+use crate::rooms::Rooms;
+use chefshat_room::ids::Id;
 
 /// Where the services of this project are.
 const OWN_PACKAGE: &str = "/chefshat.";
@@ -177,6 +179,26 @@ impl HttpBody for EndingBody {
                 Poll::Ready(Some(written.map(|()| Frame::trailers(trailers))))
             }
         }
+    }
+}
+
+/// Checks that the scope of a caller includes a room.
+pub(super) fn check_room(caller: &Caller, rooms: &Rooms, room: Id) -> Result<(), Status> {
+    check(caller, |caller| {
+        caller.reaches_room(room, rooms.tournament_of(room))
+    })
+}
+
+/// Checks that the scope of a caller includes a tournament.
+pub(super) fn check_tournament(caller: &Caller, tournament: Id) -> Result<(), Status> {
+    check(caller, |caller| caller.reaches_tournament(tournament))
+}
+
+/// Checks that the scope of a caller includes something.
+pub(super) fn check(caller: &Caller, reaches: impl FnOnce(&Caller) -> bool) -> Result<(), Status> {
+    match caller.scope {
+        Some(scope) if !reaches(caller) => Err(refused(Refusal::OutOfScope { scope })),
+        _ => Ok(()),
     }
 }
 

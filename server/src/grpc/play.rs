@@ -14,7 +14,9 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::access::check_room;
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
+use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
 use crate::metrics::StreamKind;
@@ -51,9 +53,15 @@ impl Play {
     }
 
     /// Creates the reader of a new stream.
-    fn reader(&self, outbox: &Arc<Outbox>, with_decisions: bool) -> Reader {
+    fn reader(&self, caller: Caller, outbox: &Arc<Outbox>, with_decisions: bool) -> Reader {
         self.rooms.metrics().add_outbox(outbox);
-        Reader::new(&self.rooms, &self.tournaments, outbox, with_decisions)
+        Reader::new(
+            &self.rooms,
+            &self.tournaments,
+            caller,
+            outbox,
+            with_decisions,
+        )
     }
 }
 
@@ -68,7 +76,7 @@ impl PlayService for Play {
     ) -> Result<Response<Self::PlayStream>, Status> {
         let (outbox, updates) = Outbox::new();
         let failure = Arc::new(OnceLock::new());
-        let reader = self.reader(&outbox, true);
+        let reader = self.reader(Caller::of(request.extensions()), &outbox, true);
         let closing = self.closing.clone();
         tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure), closing.clone()));
         let counted = self.rooms.metrics().stream(StreamKind::Play);
@@ -86,6 +94,7 @@ impl PlayService for Play {
         &self,
         request: Request<v1::PlayServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let seats = request.into_inner().seats;
         if !(1..=MAX_SEATS_PER_WATCH).contains(&seats.len()) {
             return Err(field(
@@ -94,7 +103,7 @@ impl PlayService for Play {
             ));
         }
         let (outbox, updates) = Outbox::new();
-        let mut reader = self.reader(&outbox, false);
+        let mut reader = self.reader(caller, &outbox, false);
         let closing = self.closing.clone();
         let counted = self.rooms.metrics().stream(StreamKind::Watch);
         tokio::spawn(async move {
@@ -128,9 +137,11 @@ impl PlayService for Play {
         request: Request<v1::ActRequest>,
     ) -> Result<Response<v1::ActResponse>, Status> {
         let arrived = Instant::now();
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
         let room = self.rooms.get(token.room).ok_or_else(ticket_unknown)?;
+        check_room(&caller, &self.rooms, token.room)?;
         let action = match request.command {
             Some(act_request::Command::Answer(answer)) => {
                 SeatAction::Answer(convert::answer_from_proto(answer))

@@ -4,7 +4,9 @@ use std::iter::Peekable;
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{self, record_service_server::RecordService};
+use chefshat_proto::v1::{
+    self, game_event::Kind, record_line::Line, record_service_server::RecordService,
+};
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::jsonl::excess;
 use chefshat_record::replay;
@@ -16,9 +18,11 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::access::check;
 use super::pages;
 use super::recorded::{Recorded, SERIES_OPEN, permit, read_failed};
 use super::status::{disk_nearly_full, field, has_reason, status};
+use crate::access::{Caller, Role};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
     RECORD_SEND_TIMEOUT,
@@ -71,6 +75,7 @@ impl Records {
     /// received the last one.
     async fn send_all(
         &self,
+        caller: &Caller,
         filter: &v1::RecordFilter,
         sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
     ) -> Result<(), Status> {
@@ -82,8 +87,13 @@ impl Records {
             };
             after = *last;
             for (_, summary) in page {
+                if !reaches(caller, &summary.room_id, &summary.tournament_id) {
+                    continue;
+                }
                 let _permit = permit(&self.sending).await;
-                let lines = self.recorded.of_game(&summary.game_id, |lines| lines).await;
+                let role = caller.role;
+                let shown = move |lines| seen_by(role, lines);
+                let lines = self.recorded.of_game(&summary.game_id, shown).await;
                 let lines = match lines {
                     // Withheld while games with the same deals are being played.
                     Err(status) if has_reason(&status, SERIES_OPEN) => continue,
@@ -107,6 +117,7 @@ impl RecordService for Records {
         &self,
         request: Request<v1::ListRecordsRequest>,
     ) -> Result<Response<v1::ListRecordsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let filter = checked(request.filter)?;
         let last = pages::last_shown(&request.page_token)?;
@@ -124,7 +135,9 @@ impl RecordService for Records {
             _ => String::new(),
         };
         Ok(Response::new(v1::ListRecordsResponse {
-            records: found.into_iter().map(|(_, summary)| summary).collect(),
+            records: (found.into_iter().map(|(_, summary)| summary))
+                .filter(|it| reaches(&caller, &it.room_id, &it.tournament_id))
+                .collect(),
             next_page_token,
         }))
     }
@@ -133,9 +146,20 @@ impl RecordService for Records {
         &self,
         request: Request<v1::GetRecordRequest>,
     ) -> Result<Response<Self::GetRecordStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let permit = permit(&self.sending).await;
         let game_id = request.into_inner().game_id;
-        let lines = self.recorded.of_game(&game_id, |lines| lines).await?;
+        let shown = move |lines: Vec<v1::RecordLine>| {
+            let header = lines.first().and_then(|line| match &line.line {
+                Some(Line::Header(header)) => Some(header),
+                _ => None,
+            });
+            check(&caller, |caller| {
+                header.is_some_and(|it| reaches(caller, &it.room_id, &it.tournament_id))
+            })?;
+            Ok::<_, Status>(seen_by(caller.role, lines))
+        };
+        let lines = self.recorded.of_game(&game_id, shown).await??;
         let (sender, responses) = channel();
         tokio::spawn(async move {
             let response = |lines| v1::GetRecordResponse { lines };
@@ -150,11 +174,12 @@ impl RecordService for Records {
         &self,
         request: Request<v1::StreamRecordsRequest>,
     ) -> Result<Response<Self::StreamRecordsStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let filter = checked(request.into_inner().filter)?;
         let service = self.clone();
         let (sender, responses) = channel();
         tokio::spawn(async move {
-            let sent = service.send_all(&filter, &sender).await;
+            let sent = service.send_all(&caller, &filter, &sender).await;
             end(&sender, sent).await;
         });
         Ok(Response::new(responses))
@@ -206,6 +231,37 @@ impl RecordService for Records {
             record: Some(summary),
         }))
     }
+}
+
+/// Whether the scope of a caller includes the game of this room and tournament.
+fn reaches(caller: &Caller, room: &str, tournament: &str) -> bool {
+    match Id::parse(room) {
+        Some(room) => caller.reaches_room(room, Id::parse(tournament)),
+        None => caller.scope.is_none(),
+    }
+}
+
+/// A record as a role may see it: what was only for the record, and references to media, are for
+/// hosts.
+fn seen_by(role: Role, mut lines: Vec<v1::RecordLine>) -> Vec<v1::RecordLine> {
+    if role >= Role::Host {
+        return lines;
+    }
+    lines.retain(|line| !matches!(line.line, Some(Line::PrivateExpression(_))));
+    for line in &mut lines {
+        match &mut line.line {
+            Some(Line::Decision(decision)) => decision.annotations = None,
+            Some(Line::Event(event)) => {
+                if let Some(Kind::ExpressionShown(shown)) = &mut event.kind
+                    && let Some(expression) = &mut shown.expression
+                {
+                    expression.media.clear();
+                }
+            }
+            _ => {}
+        }
+    }
+    lines
 }
 
 /// Checks that the enum values of a filter are known.

@@ -8,10 +8,12 @@ use chefshat_record::convert::{FieldProblem, seat_number};
 use futures::{Stream, StreamExt as _};
 use tonic::{Code, Request, Response, Status};
 
+use super::access::check_room;
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, request_id, room_unknown, ticket_unknown};
+use crate::access::Caller;
 use crate::convert;
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
@@ -100,11 +102,13 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::GetRoomRequest>,
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
             "" => self.find(&request.room_id)?,
             code => self.find_by_code(&request.room_id, code)?,
         };
+        check_room(&caller, &self.rooms, handle.id())?;
         let room = handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
     }
@@ -113,6 +117,7 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::ListRoomsRequest>,
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let page_size = pages::page_size(request.page_size);
         let before = pages::last_shown(&request.page_token)?;
@@ -130,7 +135,11 @@ impl RoomService for RoomCalls {
         let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
-        let describe = |handle: Handle| async move { handle.describe().await.ok() };
+        let is_listed = |id| check_room(&caller, &self.rooms, id).is_ok();
+        let describe = |handle: Handle| {
+            let listed = is_listed(handle.id());
+            async move { handle.describe().await.ok().filter(|_| listed) }
+        };
         let mut rooms = pin!(described(looked_at, describe));
         while let Some((number, room)) = rooms.next().await {
             if response.rooms.len() == page_size {
@@ -138,7 +147,7 @@ impl RoomService for RoomCalls {
                 break;
             }
             last = Some(number);
-            // A room that has just gone is no longer listed.
+            // A room that has just gone, or is beyond the caller's scope, is not listed.
             if let Some(room) = room
                 && (request.state == 0 || request.state == room.state)
             {
@@ -155,11 +164,13 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::JoinRoomRequest>,
     ) -> Result<Response<v1::JoinRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         if self.rooms.is_shutting_down() {
             return Err(status::shutting_down());
         }
         let handle = self.find_by_code(&request.room_id, &request.join_code)?;
+        check_room(&caller, &self.rooms, handle.id())?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
@@ -187,8 +198,10 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::LeaveRoomRequest>,
     ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
         let handle = self.rooms.get(ticket.room).ok_or_else(ticket_unknown)?;
+        check_room(&caller, &self.rooms, handle.id())?;
         let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
         let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))
@@ -198,8 +211,10 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::CloseRoomRequest>,
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let handle = self.find(&request.room_id)?;
+        check_room(&caller, &self.rooms, handle.id())?;
         let wrong = || {
             status::status(
                 Code::PermissionDenied,

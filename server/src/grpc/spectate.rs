@@ -8,9 +8,11 @@ use futures::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
+use super::access::check_room;
 use super::play::with_heartbeats;
 use super::room_service::find;
 use super::status::Refusal;
+use crate::access::Caller;
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::SpectateRequest;
@@ -40,8 +42,10 @@ impl SpectatorService for Spectate {
         &self,
         request: Request<SpectatorServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let room = find(&self.rooms, &request.room_id)?;
+        check_room(&caller, &self.rooms, room.id())?;
         let (outbox, messages) = Outbox::new();
         let from = request.from_sequence.saturating_sub(1);
         room.spectate(SpectateRequest {

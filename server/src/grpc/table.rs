@@ -9,7 +9,9 @@ use tokio::sync::watch;
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
+use super::access::check_room;
 use super::status::{Refusal, room_gone, table_unknown};
+use crate::access::Caller;
 use crate::config::HEARTBEAT;
 use crate::room::{Handle, SentState};
 use crate::rooms::Rooms;
@@ -28,9 +30,10 @@ impl TableCalls {
     }
 
     /// The room of a table's ticket, and the ticket's secret.
-    fn find(&self, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
+    fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
         let token = Token::parse(ticket).ok_or_else(table_unknown)?;
         let room = self.rooms.get(token.room).ok_or_else(table_unknown)?;
+        check_room(caller, &self.rooms, token.room)?;
         Ok((room, token.secret))
     }
 }
@@ -44,8 +47,9 @@ impl TableService for TableCalls {
         &self,
         request: Request<v1::ReportRequest>,
     ) -> Result<Response<v1::ReportResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let (room, secret) = self.find(&request.table_ticket)?;
+        let (room, secret) = self.find(&caller, &request.table_ticket)?;
         let ruled = room.report(secret, request).await.map_err(Refusal::from)?;
         let response = ruled.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(*response))
@@ -55,7 +59,8 @@ impl TableService for TableCalls {
         &self,
         request: Request<v1::TableServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let (room, secret) = self.find(&request.into_inner().table_ticket)?;
+        let caller = Caller::of(request.extensions());
+        let (room, secret) = self.find(&caller, &request.into_inner().table_ticket)?;
         let watching = room.watch_table(secret).await.map_err(Refusal::from)?;
         let states = watching.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(Box::pin(followed(states))))

@@ -13,6 +13,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
+use super::access::check_tournament;
 use super::follow::{compute_failed, end, follow};
 use super::new_room::{supported_policy, too_long};
 use super::pages;
@@ -20,6 +21,7 @@ use super::recorded::Recorded;
 use super::status::{
     disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
 };
+use crate::access::Caller;
 use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
 use crate::convert;
 use crate::metrics::StreamKind;
@@ -66,29 +68,44 @@ impl TournamentCalls {
         }
     }
 
-    fn find(&self, id: &str) -> Result<Arc<TournamentHandle>, Status> {
-        (Id::parse(id).and_then(|id| self.tournaments.get(id))).ok_or_else(unknown)
+    fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
+        let found = Id::parse(id).and_then(|id| self.tournaments.get(id));
+        let handle = found.ok_or_else(unknown)?;
+        check_tournament(caller, handle.id())?;
+        Ok(handle)
     }
 
     /// The tournament with a join code; if an id is given too, it must match.
-    fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<TournamentHandle>, Status> {
+    fn find_by_code(
+        &self,
+        caller: &Caller,
+        id: &str,
+        join_code: &str,
+    ) -> Result<Arc<TournamentHandle>, Status> {
         let handle = match id {
             "" => self.tournaments.by_code(join_code),
-            id => Some(self.find(id)?)
+            id => Some(self.find(caller, id)?)
                 .filter(|handle| chefshat_room::ids::normal_code(join_code) == handle.join_code()),
         };
-        handle.ok_or_else(|| {
+        let handle = handle.ok_or_else(|| {
             status(
                 Code::PermissionDenied,
                 "JOIN_CODE_WRONG",
                 "no tournament has this join code; ask its owner for it",
                 [("field", "join_code")],
             )
-        })
+        })?;
+        check_tournament(caller, handle.id())?;
+        Ok(handle)
     }
 
-    fn find_owned(&self, id: &str, owner_token: &str) -> Result<Arc<TournamentHandle>, Status> {
-        let handle = self.find(id)?;
+    fn find_owned(
+        &self,
+        caller: &Caller,
+        id: &str,
+        owner_token: &str,
+    ) -> Result<Arc<TournamentHandle>, Status> {
+        let handle = self.find(caller, id)?;
         if handle.is_owner(owner_token) {
             return Ok(handle);
         }
@@ -141,10 +158,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentRequest>,
     ) -> Result<Response<v1::GetTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
-            "" => self.find(&request.tournament_id)?,
-            code => self.find_by_code(&request.tournament_id, code)?,
+            "" => self.find(&caller, &request.tournament_id)?,
+            code => self.find_by_code(&caller, &request.tournament_id, code)?,
         };
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
@@ -154,6 +172,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::ListTournamentsRequest>,
     ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let before = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
@@ -167,6 +186,7 @@ impl TournamentService for TournamentCalls {
             _ => String::new(),
         };
         let tournaments = (found.iter())
+            .filter(|(_, handle)| caller.reaches_tournament(handle.id()))
             .map(|(_, handle)| handle.describe_briefly())
             .collect();
         Ok(Response::new(v1::ListTournamentsResponse {
@@ -179,11 +199,12 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::JoinTournamentRequest>,
     ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let handle = self.find_by_code(&request.tournament_id, &request.join_code)?;
+        let handle = self.find_by_code(&caller, &request.tournament_id, &request.join_code)?;
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !handle.admits(kind) {
@@ -218,8 +239,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::AddTableParticipantRequest>,
     ) -> Result<Response<v1::AddTableParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Human);
@@ -245,8 +267,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetPhysicalTableRequest>,
     ) -> Result<Response<v1::GetPhysicalTableResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
         let game = usize::try_from(request.game).unwrap_or(usize::MAX);
         let owner = handle.physical_room(game).map_err(table_problem)?;
         // It is created after its id is committed.
@@ -264,8 +287,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::StartTournamentRequest>,
     ) -> Result<Response<v1::StartTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
         let started = handle.begin().await.map_err(stopped)?;
         started.map_err(|problem| {
             let reason = match problem {
@@ -282,8 +306,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CloseTournamentRequest>,
     ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&request.tournament_id, &request.owner_token)?;
+        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
         handle.close().await.map_err(stopped)?;
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::CloseTournamentResponse { tournament }))
@@ -293,7 +318,8 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::FollowTournamentRequest>,
     ) -> Result<Response<Self::FollowTournamentStream>, Status> {
-        let handle = self.find(&request.into_inner().tournament_id)?;
+        let caller = Caller::of(request.extensions());
+        let handle = self.find(&caller, &request.into_inner().tournament_id)?;
         let place = Arc::clone(&self.followers).try_acquire_owned();
         let place = place.map_err(|_| {
             status(
@@ -321,7 +347,8 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
-        let handle = self.find(&request.into_inner().tournament_id)?;
+        let caller = Caller::of(request.extensions());
+        let handle = self.find(&caller, &request.into_inner().tournament_id)?;
         let results = handle.results(&self.result_permits).await;
         let results = results.map_err(compute_failed)?.message.clone();
         Ok(Response::new(results))
@@ -331,8 +358,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::ListTournamentGamesRequest>,
     ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find(&request.tournament_id)?;
+        let handle = self.find(&caller, &request.tournament_id)?;
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
         let size = match request.page_size {

@@ -202,6 +202,11 @@ impl Rooms {
             .collect()
     }
 
+    /// The tournament that a room belongs to.
+    pub fn tournament_of(&self, id: Id) -> Option<Id> {
+        self.lock().get(id)?.tournament
+    }
+
     /// Whether a game is running or waiting to start here.
     pub fn is_running(&self, game: Id) -> bool {
         self.lock()
@@ -462,6 +467,7 @@ impl Reservation {
                 game_id: header.game_id,
                 owner: header.owner,
                 join_code: header.join_code.clone(),
+                tournament: header.tournament.map(|game| game.tournament),
                 durable: rooms.is_durable(&header),
                 over: false,
                 suspended: false,

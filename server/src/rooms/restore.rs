@@ -85,6 +85,7 @@ impl Rooms {
             game_id: header.game_id,
             owner: header.owner,
             join_code: header.join_code.clone(),
+            tournament: header.tournament.map(|game| game.tournament),
             durable: true,
             over: game.concluded,
             suspended: false,

@@ -44,6 +44,8 @@ pub(super) struct Entry {
     /// The hash of the owner token.
     pub(super) owner: SecretHash,
     pub(super) join_code: String,
+    /// The tournament that it belongs to.
+    pub(super) tournament: Option<Id>,
     /// Whether the game survives a restart of the server.
     pub(super) durable: bool,
     /// The game has ended.

@@ -4,6 +4,7 @@
 //! `clients/web/vite.config.ts` decides which files there are.
 
 mod answer;
+mod origin;
 
 use std::borrow::Cow;
 use std::future::{Ready, ready};
@@ -17,6 +18,7 @@ use tonic::body::Body;
 use tower::{Layer, Service};
 
 use answer::{File, answer};
+pub use origin::{OriginLayer, Origins};
 
 #[derive(RustEmbed)]
 #[folder = "../clients/web/dist"]

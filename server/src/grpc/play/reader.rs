@@ -16,8 +16,10 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
+use crate::access::Caller;
 use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
 use crate::convert;
+use crate::grpc::access::{check_room, check_tournament};
 use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
 use crate::outbox::{Outbox, StreamEnd};
@@ -61,6 +63,7 @@ impl BoundSeat {
 pub(super) struct Reader {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    caller: Caller,
     pub(super) outbox: Arc<Outbox>,
     /// The attached seats, by handle.
     pub(super) seats: BTreeMap<u32, BoundSeat>,
@@ -85,6 +88,7 @@ impl Reader {
     pub(super) fn new(
         rooms: &Arc<Rooms>,
         tournaments: &Arc<Tournaments>,
+        caller: Caller,
         outbox: &Arc<Outbox>,
         with_decisions: bool,
     ) -> Self {
@@ -92,6 +96,7 @@ impl Reader {
         Self {
             rooms: Arc::clone(rooms),
             tournaments: Arc::clone(tournaments),
+            caller,
             outbox: Arc::clone(outbox),
             seats: BTreeMap::new(),
             participants: BTreeMap::new(),
@@ -234,10 +239,18 @@ impl Reader {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
-        if let Some(token) = Token::parse(&attach.ticket)
-            && let Some(tournament) = self.tournaments.get(token.room)
-        {
-            return self.enter(tournament, token, attach, handle).await;
+        if let Some(token) = Token::parse(&attach.ticket) {
+            let tournament = self.tournaments.get(token.room);
+            let in_scope = match &tournament {
+                Some(_) => check_tournament(&self.caller, token.room),
+                None => check_room(&self.caller, &self.rooms, token.room),
+            };
+            if let Err(status) = in_scope {
+                return self.refuse(handle, request_id, &status);
+            }
+            if let Some(tournament) = tournament {
+                return self.enter(tournament, token, attach, handle).await;
+            }
         }
         match self.bind(attach, handle, None).await {
             Ok(Some(bound)) => {
@@ -518,7 +531,7 @@ mod tests {
         let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let (outbox, _updates) = Outbox::new();
-        let mut reader = Reader::new(&rooms, &tournaments, &outbox, true);
+        let mut reader = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
         let flood = tokio::spawn(async move {
             for _ in 0..10_000 {
                 let command = v1::SeatCommand {
@@ -564,12 +577,12 @@ mod tests {
             ..v1::Attach::default()
         };
         let (outbox, _updates) = Outbox::new();
-        let mut newer = Reader::new(&rooms, &tournaments, &outbox, true);
+        let mut newer = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
         newer.attach(attach.clone()).await;
         assert_eq!(newer.participants.len(), 1);
         // The messages of a lost connection may be read after those of the next.
         let (outbox, updates) = Outbox::new();
-        let mut older = Reader::new(&rooms, &tournaments, &outbox, true);
+        let mut older = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
         drop(updates);
         older.attach(attach).await;
         assert!(
