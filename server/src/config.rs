@@ -1,7 +1,10 @@
 //! The settings of a server and its limits.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
+
+use chefshat_record::signature::SigningKey;
 
 use crate::access::AccessSettings;
 use crate::tls::TlsFiles;
@@ -94,6 +97,8 @@ pub const HEARTBEAT: Duration = Duration::from_secs(15);
 pub struct ServerConfig {
     /// Folder for the records of finished games; `None` disables them.
     pub data_dir: Option<PathBuf>,
+    /// The key that signs records; `None`: they are not signed.
+    pub signing_key: Option<Arc<SigningKey>>,
     /// Most rooms at a time, including ended ones that are still listed.
     pub max_rooms: usize,
     /// Most connections at a time.
@@ -126,6 +131,7 @@ impl Default for ServerConfig {
     fn default() -> Self {
         Self {
             data_dir: None,
+            signing_key: None,
             max_rooms: 10_000,
             max_connections: 10_000,
             vector_threads: 0,

@@ -17,6 +17,7 @@ pub mod room;
 pub mod rooms;
 pub mod scrape;
 pub mod serve;
+pub mod signing;
 pub mod store;
 pub mod tls;
 pub mod tournaments;

@@ -16,6 +16,7 @@ mod export;
 mod generate;
 mod health;
 mod import;
+mod key;
 mod kind;
 mod leaderboard;
 mod narration;
@@ -108,6 +109,8 @@ enum Command {
     Verify(verify::Verify),
     /// Import a record from elsewhere, including games at a physical table.
     Import(import::Import),
+    /// Show the key that signs a server's records.
+    Key(key::KeyCommand),
     /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
     /// Create, list and revoke the tokens of a server.
@@ -164,6 +167,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Conformance(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
+        Command::Key(command) => command.run(),
         Command::Participant(command) => in_runtime(command.run()),
         Command::Token(command) => command.run(),
         Command::Backup(command) => in_runtime(command.run()),

@@ -18,6 +18,7 @@ use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
+use chefshat_server::signing::key_or_new;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_server::tls::TlsFiles;
 use chefshat_server::web;
@@ -221,8 +222,10 @@ impl Serve {
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
         let grace = settings.grace;
+        let signing_key = data_dir.as_deref().map(key_or_new).transpose()?;
         let config = ServerConfig {
             data_dir,
+            signing_key: signing_key.map(Arc::new),
             max_rooms: settings.max_rooms,
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,

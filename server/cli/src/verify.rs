@@ -10,6 +10,7 @@ use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
 use chefshat_record::replay::{Replayed, replay};
+use chefshat_record::signature::PublicKey;
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -20,13 +21,14 @@ use super::{CommandError, progress};
 
 const HELP: &str = "\
 All contents are checked: the seed against the commitment, every deal, the seat and the legal actions of each decision, every event, \
-reward, score and count. docs/records.md describes the format.
+reward, score and count, and the signature, if there is one. docs/records.md describes the format, and what a record cannot prove.
 
 Exit code 0: all records fit. 1: one does not, or there is none.
 
 Examples:
   chefshat verify
   chefshat verify ./chefshat-data/records game.jsonl
+  chefshat verify game.jsonl --key ed25519:4b1f...
   chefshat verify --data-dir ./chefshat-data --json";
 
 /// Records checked per batch: enough for all cores, with results printed as they come.
@@ -38,6 +40,9 @@ const AT_A_TIME: usize = 64;
 pub(super) struct Verify {
     #[command(flatten)]
     records: RecordsArg,
+    /// Accept only records that this key signed, as `chefshat key show` prints it. Can be repeated.
+    #[arg(long = "key", value_name = "KEY")]
+    keys: Vec<PublicKey>,
     /// Print one JSON object per record.
     #[arg(long)]
     json: bool,
@@ -70,7 +75,7 @@ impl Verify {
             let checked: Vec<_> = files
                 .par_iter()
                 .map(|file| {
-                    let checked = check(file);
+                    let checked = check(file, &self.keys);
                     bar.inc(1);
                     (file, checked)
                 })
@@ -107,7 +112,7 @@ impl Verify {
 }
 
 /// Reads and replays a record.
-fn check(file: &Path) -> Result<Fits, Problem> {
+fn check(file: &Path, keys: &[PublicKey]) -> Result<Fits, Problem> {
     let lines = jsonl::read(file).map_err(|error| match error {
         RecordFileError::Io { source, .. } => Problem {
             line: None,
@@ -122,6 +127,16 @@ fn check(file: &Path) -> Result<Fits, Problem> {
         line: Some(error.line),
         problem: error.problem,
     })?;
+    let trusted = replayed.signed_by.is_some_and(|key| keys.contains(&key));
+    if !keys.is_empty() && !trusted {
+        return Err(Problem {
+            line: Some(lines.len()),
+            problem: match replayed.signed_by {
+                Some(key) => format!("signed by {key}, which is not the key asked for"),
+                None => "unsigned, but a signature was asked for with --key".into(),
+            },
+        });
+    }
     match lines.into_iter().next().and_then(|line| line.line) {
         Some(Line::Header(header)) => Ok(Fits { header, replayed }),
         _ => unreachable!("a record that replays begins with its header"),
@@ -159,11 +174,15 @@ fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<()
             (checked, true) => writeln!(out, "{}", json_report(file, checked))?,
             (Ok(Fits { header, replayed }), false) => writeln!(
                 out,
-                "{name}: fits: {}, {} decisions, {} events, {}",
+                "{name}: fits: {}, {} decisions, {} events, {}, {}",
                 ending(replayed),
                 replayed.decisions,
                 replayed.events,
-                deals(header)
+                deals(header),
+                match replayed.signed_by {
+                    Some(key) => format!("signed by {key}"),
+                    None => "unsigned".into(),
+                }
             )?,
             (
                 Err(Problem {
@@ -198,6 +217,7 @@ fn json_report(file: &Path, checked: &Result<Fits, Problem>) -> Value {
             "events": replayed.events,
             "origin": header.origin().as_str_name(),
             "seed_committed": !header.seed_commitment.is_empty(),
+            "signed_by": replayed.signed_by.map(|key| key.to_string()),
             "line": null,
             "problem": null,
         }),

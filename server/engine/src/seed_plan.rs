@@ -1,5 +1,5 @@
 //! Where a game's seed comes from. A server commits to its part before the seats add theirs, so
-//! that anyone can check afterwards that neither chose the deals.
+//! that anyone can check afterwards that neither side alone chose the deals.
 
 use crate::Seed;
 use sha2::{Digest as _, Sha256};

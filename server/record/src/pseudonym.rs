@@ -90,7 +90,8 @@ impl ParticipantSeats {
 }
 
 impl Pseudonym {
-    /// Pseudonymizes a record. Built-in agents of the same name are unaffected.
+    /// Pseudonymizes a record. Built-in agents of the same name are unaffected. A record that
+    /// changes loses its signature: nobody can vouch for it any longer.
     pub fn redact(&self, lines: &mut Vec<v1::RecordLine>) -> Redactions {
         let mut out = Redactions::default();
         let mut own = ParticipantSeats::at_start(lines, &self.name);
@@ -145,6 +146,11 @@ impl Pseudonym {
                 lines.first_mut().and_then(|line| line.line.as_mut())
         {
             out.names += self.in_text(&mut header.room_name);
+        }
+        if out != Redactions::default()
+            && let Some(Line::Footer(footer)) = lines.last_mut().and_then(|line| line.line.as_mut())
+        {
+            footer.signature = None;
         }
         out
     }

@@ -32,7 +32,7 @@ pub use room::{
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
-pub use summary::summary;
+pub use summary::{SERVER_VERSION, summary};
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,

@@ -13,7 +13,7 @@ use super::event::event_to_proto;
 use super::physical_record::physical_record_lines;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
-use crate::store::StoredGame;
+use crate::store::{Signed, StoredGame};
 use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
@@ -58,6 +58,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         state: state_to_proto(core.state()).into(),
         events: u64::try_from(core.log().len()).unwrap_or(u64::MAX),
         decisions,
+        signature: None,
     });
     std::iter::once(Line::Header(record_header(&core)))
         .chain(body)
@@ -69,8 +70,25 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
 /// All lines of the record of a stored game.
 pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match stored {
-        StoredGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
+        StoredGame::Hosted(header, journal, signed) => {
+            let mut lines = record_lines(header, journal);
+            if let Some(signed) = signed {
+                put_signature(&mut lines, signed);
+            }
+            Cow::Owned(lines)
+        }
         StoredGame::Imported(lines) => Cow::Borrowed(lines),
+    }
+}
+
+/// Makes the lines those that were signed when the game ended, by an earlier version perhaps.
+fn put_signature(lines: &mut [v1::RecordLine], signed: &Signed) {
+    for line in lines {
+        match &mut line.line {
+            Some(Line::Header(header)) => header.server_version.clone_from(&signed.server_version),
+            Some(Line::Footer(footer)) => footer.signature = Some(signed.signature.clone()),
+            _ => {}
+        }
     }
 }
 

@@ -13,6 +13,9 @@ use super::room::{
 };
 use super::start::{origin, start_to_proto};
 
+/// Version of this server, as its records name it.
+pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// The header of a record.
 pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
     let header = core.header();
@@ -28,7 +31,7 @@ pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
         seats: participants(core),
         seed_commitment: seed_commitment(header),
         created_at_ms: header.created_at_ms,
-        server_version: env!("CARGO_PKG_VERSION").into(),
+        server_version: SERVER_VERSION.into(),
         action_space: Some(action_space(&header.rules.actions())),
         start: start_to_proto(&header.start, header.rules.faces()),
         tournament_id: tournament_id(header),

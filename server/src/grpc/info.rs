@@ -98,6 +98,7 @@ impl ServerService for Info {
             limits: self.limits.clone(),
             open_rooms: convert::number(self.rooms.open_count()),
             shutting_down: self.rooms.is_shutting_down(),
+            signing_key: (self.rooms.signing_key()).map_or_else(String::new, |key| key.to_string()),
         }))
     }
 

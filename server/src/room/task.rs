@@ -36,7 +36,8 @@ use crate::convert::{self, Deck};
 use crate::metrics::{Counted, Metrics, Outcome};
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
-use crate::store::{Journal, Store, StoreError};
+use crate::signing::Signer;
+use crate::store::{Journal, Signed, Store, StoreError};
 
 /// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;
@@ -48,6 +49,8 @@ pub struct TaskContext {
     pub store: Arc<dyn Store>,
     /// Writes records to files.
     pub record_writer: RecordWriter,
+    /// Signs records.
+    pub signer: Signer,
     /// How long an ended room stays listed.
     pub retention: Duration,
     /// Source of connection ids.
@@ -798,7 +801,11 @@ impl Room {
         let summary = self.core.game().map(|_| convert::summary(&self.core));
         let has_record = summary.is_some();
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
-        if let Err(error) = self.journal.finish(summary.map(Box::new)).await {
+        let finished = match self.sign(has_record).await {
+            Ok(signed) => self.journal.finish(summary.map(Box::new), signed).await,
+            Err(error) => Err(error),
+        };
+        if let Err(error) = finished {
             self.fail(&error);
             return false;
         }
@@ -813,6 +820,16 @@ impl Room {
             self.context.record_writer.write_record(header.game_id);
         }
         true
+    }
+
+    /// Signs the record of the game, if there is one and the server has a key.
+    async fn sign(&mut self, has_record: bool) -> Result<Option<Signed>, StoreError> {
+        let signer = &self.context.signer;
+        if !has_record || signer.public().is_none() {
+            return Ok(None);
+        }
+        let entries = self.journal.entries().await?;
+        Ok(signer.sign(Arc::clone(self.core.header()), entries).await)
     }
 
     /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that

@@ -24,7 +24,8 @@ use crate::clock::RoomClock;
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
-use crate::store::{Journal, MemoryStore, Store as _, StoreError};
+use crate::signing::Signer;
+use crate::store::{Journal, MemoryStore, Signed, Store as _, StoreError};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, Policy};
@@ -82,6 +83,7 @@ async fn room_with(
         change(journal),
         TaskContext {
             record_writer: RecordWriter::new(store.clone(), None, TaskTracker::new()),
+            signer: Signer::new(None),
             store,
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
@@ -338,11 +340,16 @@ impl Journal for PanicsAfter {
         self.journal.append(entries)
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        self.journal.entries()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.journal.finish(summary)
+        self.journal.finish(summary, signed)
     }
 }
 

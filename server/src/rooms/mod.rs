@@ -13,6 +13,7 @@ use std::time::Duration;
 use chefshat_agents::RecordedPlayer;
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSet, Seat};
+use chefshat_record::signature::PublicKey;
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
@@ -22,6 +23,7 @@ use crate::config::ServerConfig;
 use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
+use crate::signing::Signer;
 use crate::store::{Store, StoreError};
 use chefshat_room::Core;
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
@@ -119,6 +121,7 @@ impl Rooms {
                     tracker.clone(),
                 ),
                 store,
+                signer: Signer::new(config.signing_key.clone()),
                 retention: config.retention,
                 connections: Arc::new(AtomicU64::new(1)),
                 tracker,
@@ -127,6 +130,11 @@ impl Rooms {
             },
             max_rooms: config.max_rooms,
         })
+    }
+
+    /// The public key that signs records, if the server has one.
+    pub fn signing_key(&self) -> Option<PublicKey> {
+        self.context.signer.public()
     }
 
     /// Creates a room.
@@ -479,7 +487,7 @@ impl Reservation {
             });
         }
         // No client knows it: it must not be restored with the server.
-        journal.finish(None).await?;
+        journal.finish(None, None).await?;
         Err(CreateError::ShuttingDown)
     }
 }

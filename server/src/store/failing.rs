@@ -9,7 +9,7 @@ use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
+use super::{Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -169,10 +169,15 @@ impl Journal for FailingJournal {
         ready(Err(injected_failure())).boxed()
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        self.inner.entries()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.finish(summary)
+        self.inner.finish(summary, signed)
     }
 }

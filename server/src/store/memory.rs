@@ -8,7 +8,7 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame, matches_filter};
+use super::{Journal, Part, ResumableGame, Signed, Store, StoreError, StoredGame, matches_filter};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -44,7 +44,7 @@ struct FinishedGame {
 impl FinishedGame {
     fn entries(&self) -> usize {
         match &self.stored {
-            StoredGame::Hosted(_, entries) => entries.len(),
+            StoredGame::Hosted(_, entries, _) => entries.len(),
             StoredGame::Imported(lines) => lines.len(),
         }
     }
@@ -198,16 +198,21 @@ impl Journal for MemoryJournal {
         ready(Ok(())).boxed()
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        ready(Ok(self.entries.clone())).boxed()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let entries = std::mem::take(&mut self.entries).into();
         if let Some(summary) = summary {
             lock(&self.finished).insert(FinishedGame {
                 id: self.header.game_id,
                 summary: *summary,
-                stored: StoredGame::Hosted(Arc::clone(&self.header), entries),
+                stored: StoredGame::Hosted(Arc::clone(&self.header), entries, signed.map(Arc::new)),
             });
         }
         ready(Ok(())).boxed()

@@ -36,11 +36,20 @@ pub enum StoreError {
     Taken(Id),
 }
 
+/// The signature of the record of a hosted game.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signed {
+    /// Version of the server that signed it, which the record's header names.
+    pub server_version: String,
+    /// The signature.
+    pub signature: v1::RecordSignature,
+}
+
 /// A finished game in the store.
 #[derive(Debug, Clone)]
 pub enum StoredGame {
-    /// A hosted game: its header and its journal.
-    Hosted(Arc<GameHeader>, Arc<[Entry]>),
+    /// A hosted game: its header, its journal, and the signature of its record, if it has one.
+    Hosted(Arc<GameHeader>, Arc<[Entry]>, Option<Arc<Signed>>),
     /// An imported game: the lines of its record.
     Imported(Arc<[v1::RecordLine]>),
 }
@@ -49,7 +58,7 @@ impl StoredGame {
     /// Its tournament, if it belongs to one of this server's.
     pub fn tournament(&self) -> Option<TournamentGame> {
         match self {
-            Self::Hosted(header, _) => header.tournament,
+            Self::Hosted(header, ..) => header.tournament,
             Self::Imported(_) => None,
         }
     }
@@ -178,10 +187,13 @@ pub trait Journal: Send + 'static {
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>>;
+    /// Reads back all committed entries.
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>>;
     /// Marks the game as over; nothing can be added afterwards. Without a summary it has no record.
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
 }
 

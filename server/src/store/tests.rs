@@ -67,7 +67,7 @@ async fn created(store: &dyn Store, game: u8, durability: Durability) -> Box<dyn
 }
 
 async fn finish(journal: &mut Box<dyn Journal>, game: u8) {
-    let finished = journal.finish(Some(summary(&header(game, Durability::Durable))));
+    let finished = journal.finish(Some(summary(&header(game, Durability::Durable))), None);
     finished.await.expect("committed");
 }
 
@@ -109,6 +109,33 @@ async fn a_cursor_reaches_every_game_that_finishes_later() {
             };
             assert_eq!(*name, format!("game {base}"));
             assert!(number > cursor);
+        }
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_signature_is_stored_with_the_end_of_its_game() {
+    with_each_store(async |store| {
+        for (game, durability) in [(1, Durability::Durable), (2, Durability::Ephemeral)] {
+            let signed = Signed {
+                server_version: "0.0.1".into(),
+                signature: v1::RecordSignature {
+                    public_key: vec![game; 32],
+                    signature: vec![game; 64],
+                },
+            };
+            let mut journal = created(store, game, durability).await;
+            let entries = journal.entries().await.expect("readable");
+            assert_eq!(entries.len(), 1, "what is signed can be read back");
+            let header = header(game, durability);
+            let finished = journal.finish(Some(summary(&header)), Some(signed.clone()));
+            finished.await.expect("committed");
+            let stored = store.finished(header.game_id).await.expect("readable");
+            let Some(StoredGame::Hosted(_, _, Some(stored))) = stored else {
+                panic!("{stored:?}");
+            };
+            assert_eq!(*stored, signed);
         }
     })
     .await;

@@ -10,7 +10,7 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_server::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_server::store::{
-    Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
+    Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
 };
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
@@ -137,8 +137,9 @@ impl Store for DiskStore {
 
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         let games = self.disk.games();
-        let stored = (games.get(&game).filter(|game| game.finished))
-            .map(|game| StoredGame::Hosted(Arc::clone(&game.header), game.entries.clone().into()));
+        let stored = (games.get(&game).filter(|game| game.finished)).map(|game| {
+            StoredGame::Hosted(Arc::clone(&game.header), game.entries.clone().into(), None)
+        });
         async move { Ok(stored) }.boxed()
     }
 
@@ -223,9 +224,15 @@ impl Journal for DiskJournal {
         .boxed()
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        let entries = self.disk.games()[&self.game].entries.clone();
+        async move { Ok(entries) }.boxed()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        _signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let (id, aborted) = (self.game, summary.is_none());
         let finish = move |games: &mut BTreeMap<Id, OnDisk>| {

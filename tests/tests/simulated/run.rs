@@ -302,8 +302,11 @@ fn check_end(disk: &Disk, ledger: &Ledger, outcomes: &[Outcome], trace: &Trace, 
     let [(header, journal)] = finished.as_slice() else {
         panic!("{} finished games", finished.len());
     };
-    let stored =
-        chefshat_server::store::StoredGame::Hosted(Arc::clone(header), journal.clone().into());
+    let stored = chefshat_server::store::StoredGame::Hosted(
+        Arc::clone(header),
+        journal.clone().into(),
+        None,
+    );
     let lines = lines_of(&stored);
     replay(&lines).expect("the record verifies");
     run.acknowledged = ledger.assert_committed(&header.game_id.to_string(), &lines);

@@ -9,6 +9,8 @@ use chefshat_proto::v1::{
     self, record_line::Line, record_service_client::RecordServiceClient,
     tournament_service_client::TournamentServiceClient,
 };
+use chefshat_record::signature::SigningKey;
+use chefshat_server::config::ServerConfig;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
 use futures::TryStreamExt as _;
@@ -20,9 +22,18 @@ use crate::played::{built_in, ended};
 
 const GAMES: usize = 5;
 
+/// The key that signs them.
+fn key() -> SigningKey {
+    SigningKey::from_seed(&[3; 32])
+}
+
 /// A server with some finished games of one Shift, and their ids in the order of creation.
 async fn server_with_games(store: Arc<dyn Store>) -> (TestServer, Vec<String>) {
-    let server = TestServer::with(|config| config.allow_import = true, store).await;
+    let configure = |config: &mut ServerConfig| {
+        config.allow_import = true;
+        config.signing_key = Some(Arc::new(key()));
+    };
+    let server = TestServer::with(configure, store).await;
     let client = server.client().await;
     let mut games = Vec::new();
     for number in 0..GAMES {
@@ -155,6 +166,7 @@ async fn records_are_listed_in_pages_and_streamed_completely() {
                 .expect("a stored record");
             let replayed = chefshat_record::replay::replay(&lines).expect("a valid record");
             assert_eq!(replayed.standings, summary.standings);
+            assert_eq!(replayed.signed_by, Some(key().public()));
             assert_eq!(replayed.decisions, summary.decisions);
             assert_eq!(summary.shifts, 1);
             assert_eq!(summary.state(), v1::RoomState::Finished);
@@ -242,6 +254,13 @@ async fn a_record_is_copied_from_one_server_to_another() {
             refused.message().contains(&format!("line {}", line + 1)),
             "{refused}"
         );
+        let mut forged = lines.clone();
+        if let Some(Line::Header(header)) = &mut forged[0].line {
+            header.created_at_ms += 1;
+        }
+        let refused = import(&mut service, &forged).await.expect_err("forged");
+        assert_eq!(reason(&refused), "RECORD_REFUSED");
+        assert!(refused.message().contains("signature"), "{refused}");
         let folder = second.stop().await;
         let file = chefshat_record::jsonl::path_of(folder.path(), &games[0]);
         assert_eq!(chefshat_record::jsonl::read(&file).expect("written"), lines);

@@ -24,8 +24,8 @@ class SeatResult:
         game_id: the game; empty if the seat was never attached.
         seat: number of the seat, from 0; -1 if the seat was never attached.
         standings: the final table, best first; empty unless the game finished.
-        reveal: proves the deals, if the server revealed it: `reveal.seat_entropy[seat]` is then this seat's `entropy` (unless the
-            game's seed was fixed).
+        reveal: what the deals can be checked with, if the server revealed it: `reveal.seat_entropy[seat]` is then this seat's
+            `entropy` (unless the game's seed was fixed).
         abort_reason: why the game was aborted, for example "SHUTDOWN"; empty unless it was.
         decisions: accepted answers.
         invalid: illegal answers.

@@ -20,7 +20,7 @@ use chefshat_server::store::Forgetting;
 const HELP: &str = "\
 The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl; expressions of the \
 participant and annotations of its decisions (times measured at its side among them) are dropped. What was played stays, so that the \
-games of the others can still be replayed and checked. Copies elsewhere (datasets, backups, other servers) are not touched, nor is what \
+games of the others can still be replayed and checked; a record that changes loses its signature. Copies elsewhere (datasets, backups, other servers) are not touched, nor is what \
 others wrote in theirs. The server must be stopped; while a game or tournament with the name is not over, nothing is changed.
 
 This cannot be undone. `chefshat participant export` first, if the data are still wanted.

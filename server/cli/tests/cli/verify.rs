@@ -43,12 +43,14 @@ fn valid_records_verify() {
     };
     assert!(
         first.ends_with(
-            "committed.jsonl: fits: finished, 207 decisions, 284 events, committed seed"
+            "committed.jsonl: fits: finished, 207 decisions, 284 events, committed seed, unsigned"
         ),
         "{first}"
     );
     assert!(
-        second.ends_with("fixed.jsonl: fits: finished, 96 decisions, 130 events, fixed seed"),
+        second.ends_with(
+            "fixed.jsonl: fits: finished, 96 decisions, 130 events, fixed seed, unsigned"
+        ),
         "{second}"
     );
     assert_eq!(last, "2 records fit, 303 decisions");
@@ -85,6 +87,7 @@ fn a_damaged_record_is_reported() {
             "events": 284,
             "origin": "GAME_ORIGIN_DEALT",
             "seed_committed": true,
+            "signed_by": null,
             "line": null,
             "problem": null,
         })
@@ -125,4 +128,32 @@ fn missing_records_are_reported() {
         "{}",
         ended.stdout
     );
+}
+
+#[test]
+fn a_pinned_key_accepts_only_what_it_signed() {
+    let key = "ed25519:ea4a6c63e29c520abef5507b132ec5f9954776aebebe7b92421eea691446d22c";
+    let other = format!("ed25519:{}", "00".repeat(32));
+    let signed = fixture("signed.jsonl");
+    let signed = signed.to_str().unwrap();
+    let ended = chefshat(&["verify", signed]);
+    assert!(
+        ended.stdout.contains(&format!("signed by {key}")),
+        "{}",
+        ended.stdout
+    );
+    chefshat(&["verify", signed, "--key", &other, "--key", key]).ended_with(0);
+    let ended = chefshat(&["verify", signed, "--key", &other]).ended_with(1);
+    assert!(ended.stdout.contains("not the key asked for"));
+    let unsigned = fixture("records/fixed.jsonl");
+    let ended = chefshat(&["verify", unsigned.to_str().unwrap(), "--key", key]).ended_with(1);
+    assert!(ended.stdout.contains("unsigned, but a signature"));
+    chefshat(&["verify", signed, "--key", "ed25519:12"]).assert_failed("64 hexadecimal digits");
+}
+
+#[test]
+fn a_data_directory_without_a_key_says_where_keys_come_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path().to_str().unwrap();
+    chefshat(&["key", "show", "--data-dir", folder]).assert_failed("a server creates it");
 }

@@ -384,6 +384,7 @@ impl Importer {
             state: state.into(),
             events: self.events,
             decisions: self.decisions.values().sum(),
+            signature: None,
         }));
     }
 

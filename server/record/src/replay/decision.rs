@@ -2,6 +2,7 @@
 
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Game, Mask, Seat};
 use chefshat_proto::v1::{self, DecisionSource as Source};
+use prost::Message;
 
 use super::difference::must_be;
 use super::header::Setup;
@@ -9,6 +10,10 @@ use crate::convert::{action_id, decision_kind, has_real_cards, invalid_reward, s
 
 /// Invalid attempts before the default decision, even if the policy sets no limit.
 const MAX_ATTEMPTS: u32 = 10_000;
+/// Most annotations of one decision, bytes.
+pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
+/// Most annotations of one seat in one game, bytes.
+pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
 
 /// The state of a seat between its decisions.
 #[derive(Debug, Clone)]
@@ -25,6 +30,28 @@ pub(super) struct SeatClock {
     pub(super) at_table: bool,
     /// Whether a substitute plays for the seat.
     pub(super) substituted: bool,
+    /// Whether its participant is connected; `None` if the events do not tell.
+    pub(super) connected: Option<bool>,
+    /// Timeouts in a row, as far as they certainly count.
+    pub(super) timeouts: u32,
+    /// Bytes of its annotations so far.
+    pub(super) annotation_bytes: usize,
+}
+
+impl SeatClock {
+    /// Counts a decision of the seat.
+    pub(super) fn count(&mut self, kind: DecisionKind, record: &v1::DecisionRecord) {
+        self.decisions += 1;
+        self.bank_ms = record.bank_left_ms;
+        self.annotation_bytes += (record.annotations.as_ref()).map_or(0, Message::encoded_len);
+        match record.source() {
+            Source::Agent => self.timeouts = 0,
+            Source::Timeout | Source::Disconnected if kind != DecisionKind::SpecialAction => {
+                self.timeouts += 1;
+            }
+            _ => {}
+        }
+    }
 }
 
 /// The context of a decision.
@@ -40,6 +67,8 @@ pub(super) struct OpenDecision<'a> {
     pub(super) hand_known: bool,
     /// Milliseconds since the previous decision or the start of the game.
     pub(super) since_last_ms: u64,
+    /// The longest time per decision of any seat, milliseconds.
+    pub(super) longest_decision_ms: u32,
 }
 
 impl OpenDecision<'_> {
@@ -68,7 +97,7 @@ impl OpenDecision<'_> {
         self.check_attempts(record)?;
         self.check_source(record, action)?;
         self.check_times(record)?;
-        check_annotations(record.annotations.as_ref())?;
+        self.check_annotations(record.annotations.as_ref())?;
         Ok(action)
     }
 
@@ -164,6 +193,18 @@ impl OpenDecision<'_> {
             0 => MAX_ATTEMPTS,
             limit => limit,
         };
+        let connected = self.clock.connected;
+        let alone = match source {
+            Source::Timeout => connected == Some(false),
+            Source::Disconnected => connected == Some(true),
+            _ => false,
+        };
+        if alone {
+            return Err(format!(
+                "source is {name}, but by the events the seat was {}connected",
+                if connected == Some(true) { "" } else { "not " }
+            ));
+        }
         let exhausted = record.invalid_attempts.len() >= limit as usize;
         if record.invalid_attempts.len() > limit as usize
             || exhausted != (source == Source::Invalid)
@@ -217,6 +258,13 @@ impl OpenDecision<'_> {
                 false => Err(must_be("bankLeftMs", record.bank_left_ms, bank_ms)),
             };
         }
+        if !has_real_cards(self.setup.origin) && !self.clock.built_in {
+            self.check_limit(record)?;
+        }
+        if self.kind == DecisionKind::SpecialAction && record.bank_left_ms == bank_ms {
+            // It does not use the bank, since others see what is left of it. It once did.
+            return Ok(());
+        }
         let beyond_us = time.saturating_sub(u64::from(self.clock.decision_time_ms) * 1000);
         let bank_us = u64::from(bank_ms) * 1000;
         let left = bank_us.saturating_sub(beyond_us) / 1000;
@@ -231,6 +279,56 @@ impl OpenDecision<'_> {
         } else {
             Err(must_be("bankLeftMs", record.bank_left_ms, left))
         }
+    }
+}
+
+impl OpenDecision<'_> {
+    /// Checks that a decision was taken before the time was up, and a timeout after it.
+    fn check_limit(&self, record: &v1::DecisionRecord) -> Result<(), String> {
+        let clock = self.clock;
+        let special = self.kind == DecisionKind::SpecialAction;
+        let in_time = |ms: u64| record.decision_time_us < ms * 1000;
+        let (own, bank) = (u64::from(clock.decision_time_ms), u64::from(clock.bank_ms));
+        // The longest time of any seat limits a special action, without the bank.
+        let (least, most) = match special {
+            true => (own, u64::from(self.longest_decision_ms).max(own + bank)),
+            false => (own + bank, own + bank),
+        };
+        match record.source() {
+            Source::Timeout | Source::Disconnected if in_time(least) => Err(format!(
+                "source is {}, but after {} microseconds the time was not up: the seat had {least} ms",
+                record.source().as_str_name(),
+                record.decision_time_us
+            )),
+            Source::Agent | Source::Invalid if !in_time(most) => Err(format!(
+                "decisionTimeUs is {}, but the seat had only {most} ms",
+                record.decision_time_us
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_annotations(&self, annotations: Option<&v1::Annotations>) -> Result<(), String> {
+        let Some(annotations) = annotations else {
+            return Ok(());
+        };
+        let mut numbers = (annotations.action_scores.iter()).chain(&annotations.value_estimate);
+        if !numbers.all(|number| number.is_finite()) {
+            return Err("annotations contain a number that is not finite".into());
+        }
+        let bytes = annotations.encoded_len();
+        if bytes > MAX_ANNOTATION_BYTES {
+            return Err(format!(
+                "annotations have {bytes} bytes, of at most {MAX_ANNOTATION_BYTES}"
+            ));
+        }
+        let all = self.clock.annotation_bytes + bytes;
+        if all > MAX_ANNOTATION_BYTES_PER_GAME {
+            return Err(format!(
+                "the seat's annotations have {all} bytes so far, of at most {MAX_ANNOTATION_BYTES_PER_GAME} in a game"
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -262,16 +360,4 @@ fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), Stri
         ),
         None => "actionMask has bits beyond the last action".into(),
     })
-}
-
-fn check_annotations(annotations: Option<&v1::Annotations>) -> Result<(), String> {
-    let finite = annotations.is_none_or(|annotations| {
-        let mut numbers = (annotations.action_scores.iter()).chain(&annotations.value_estimate);
-        numbers.all(|number| number.is_finite())
-    });
-    if finite {
-        Ok(())
-    } else {
-        Err("annotations contain a number that is not finite".into())
-    }
 }

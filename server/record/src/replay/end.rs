@@ -8,6 +8,7 @@ use super::fault::Fault;
 use super::game::Replay;
 use super::seed::{check_reveal, dealing_seed, reveal};
 use crate::convert::final_table;
+use crate::signature::signer;
 
 const NOT_OVER: &str = "the footer comes here, but the game is not over";
 
@@ -106,10 +107,12 @@ impl Replay<'_> {
             state: state.into(),
             events: self.events,
             decisions: self.decisions,
+            signature: footer.signature.clone(),
         };
         if let Some(problem) = difference(footer, &expected) {
             return Err(format!("footer.{problem}").into());
         }
+        self.signed_by = signer(self.lines).map_err(|problem| format!("footer.{problem}"))?;
         self.seats.end(self.header)?;
         self.ended = true;
         Ok(())

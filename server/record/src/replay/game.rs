@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use chefshat_engine::{BySeat, Event, Game};
+use chefshat_engine::{BySeat, DecisionKind, Event, Game};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_referee::PhysicalGame;
 
@@ -13,8 +13,9 @@ use super::fault::Fault;
 use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
-use crate::convert::{By, LAST_MS, event_kind, final_table, with_rewards};
+use crate::convert::{By, LAST_MS, event_kind, final_table, seat_number, with_rewards};
 use crate::import::facts_of_record;
+use crate::signature::PublicKey;
 
 /// The cause of the first deal, which follows from no decision.
 const NO_DECISION: By = By {
@@ -33,6 +34,8 @@ pub struct Replayed {
     pub events: u64,
     /// The final standings, best first; empty for an aborted game.
     pub standings: Vec<v1::Standing>,
+    /// The key that signed it; `None` if it is unsigned.
+    pub signed_by: Option<PublicKey>,
 }
 
 /// A record being replayed.
@@ -47,12 +50,15 @@ pub(super) struct Replay<'a> {
     pub(super) game: Option<Game>,
     /// Events that must follow, with their rewards.
     expected: VecDeque<(Kind, Vec<v1::SeatReward>)>,
+    /// A seat that was late too often, until it is substituted.
+    lost: Option<u32>,
     pub(super) decisions: u64,
     pub(super) events: u64,
     elapsed_ms: u64,
     last_decision_ms: u64,
     pub(super) over: Option<v1::RoomState>,
     pub(super) ended: bool,
+    pub(super) signed_by: Option<PublicKey>,
 }
 
 impl<'a> Replay<'a> {
@@ -73,12 +79,14 @@ impl<'a> Replay<'a> {
             setup,
             game: None,
             expected: VecDeque::new(),
+            lost: None,
             decisions: 0,
             events: 0,
             elapsed_ms: 0,
             last_decision_ms: 0,
             over: None,
             ended: false,
+            signed_by: None,
         })
     }
 
@@ -111,6 +119,7 @@ impl<'a> Replay<'a> {
             decisions: self.decisions,
             events: self.events,
             standings: standings.as_ref().map_or_else(Vec::new, final_table),
+            signed_by: self.signed_by,
         })
     }
 
@@ -138,6 +147,9 @@ impl<'a> Replay<'a> {
         }
         self.not_over()?;
         self.check_complete()?;
+        if let Some(seat) = self.lost {
+            return Err(must_be_substituted(seat));
+        }
         self.time(record.elapsed_ms)?;
         self.check_facts(line)?;
         let (known, _) = self.known();
@@ -161,6 +173,7 @@ impl<'a> Replay<'a> {
             .iter()
             .map(|part| part.decisions)
             .sum();
+        let longest_decision_ms = self.seats.longest_decision_ms();
         let clock = self.seats.clock(open.seat);
         let open_decision = OpenDecision {
             setup: &self.setup,
@@ -171,10 +184,28 @@ impl<'a> Replay<'a> {
             taken_over: self.decisions < taken_over,
             hand_known: known[open.seat],
             since_last_ms: record.elapsed_ms.saturating_sub(self.last_decision_ms),
+            longest_decision_ms,
         };
         let action = open_decision.check(record)?;
-        clock.decisions += 1;
-        clock.bank_ms = record.bank_left_ms;
+        clock.count(open.kind, record);
+        // A seat that was late too often is substituted at once. In a physical room a correction
+        // may have voided some of its timeouts.
+        let limit = self
+            .header
+            .policy
+            .as_ref()
+            .map(v1::RoomPolicy::max_timeouts);
+        let is_late = matches!(
+            record.source(),
+            v1::DecisionSource::Timeout | v1::DecisionSource::Disconnected
+        );
+        if is_late
+            && open.kind != DecisionKind::SpecialAction
+            && self.physical.is_none()
+            && limit.is_some_and(|limit| clock.timeouts >= limit)
+        {
+            self.lost = Some(seat_number(open.seat));
+        }
         let mut events = Vec::new();
         game.apply(action, |event| events.push(event))
             .map_err(|error| error.to_string())?;
@@ -219,6 +250,15 @@ impl<'a> Replay<'a> {
         }
         self.time(event.elapsed_ms)?;
         let kind = event.kind.as_ref().ok_or("the event is empty")?;
+        if self.expected.is_empty()
+            && let Some(seat) = self.lost.take()
+        {
+            match kind {
+                Kind::Substituted(substituted) if substituted.seat == seat => {}
+                Kind::GameAborted(_) | Kind::GameEnded(_) => {}
+                _ => return Err(must_be_substituted(seat)),
+            }
+        }
         let is_room_event = match kind {
             Kind::GameStarted(started) => {
                 self.begin(started)?;
@@ -367,4 +407,8 @@ impl<'a> Replay<'a> {
             }
         }
     }
+}
+
+fn must_be_substituted(seat: u32) -> Fault {
+    format!("`substituted` must come here: seat {seat} has reached the limit of timeouts").into()
 }

@@ -8,6 +8,9 @@ use super::decision::SeatClock;
 use super::difference::{difference, must_be};
 use crate::convert::{check_expression, seat_from_number};
 
+/// Most events of lost and new connections of one seat; later ones are not published.
+const MAX_CONNECTION_EVENTS: u32 = 1_000;
+
 /// The seats of a recorded room after the events so far.
 #[derive(Debug)]
 pub(super) struct Seats {
@@ -15,6 +18,9 @@ pub(super) struct Seats {
     occupants: Vec<Option<(String, i32)>>,
     clocks: Vec<SeatClock>,
     begun: bool,
+    /// Events of lost and new connections, by seat. A server publishes at most
+    /// [`MAX_CONNECTION_EVENTS`].
+    connection_events: Vec<u32>,
 }
 
 impl Seats {
@@ -41,11 +47,28 @@ impl Seats {
                         built_in,
                         at_table: seat.at_table,
                         substituted: false,
+                        connected: None,
+                        timeouts: 0,
+                        annotation_bytes: 0,
                     }
                 })
                 .collect(),
             begun: false,
+            connection_events: vec![0; header.seats.len()],
         }
+    }
+
+    fn connection_event(&mut self, seat: usize) {
+        self.connection_events[seat] += 1;
+        if self.connection_events[seat] >= MAX_CONNECTION_EVENTS {
+            self.clocks[seat].connected = None;
+        }
+    }
+
+    /// The longest time per decision of any seat that participants can take, milliseconds.
+    pub(super) fn longest_decision_ms(&self) -> u32 {
+        let times = self.clocks.iter().filter(|clock| !clock.built_in);
+        times.map(|clock| clock.decision_time_ms).max().unwrap_or(0)
     }
 
     pub(super) fn clock(&mut self, seat: Seat) -> &mut SeatClock {
@@ -74,11 +97,19 @@ impl Seats {
                 }
             }
             Kind::Disconnected(lost) => {
-                self.of_an_agent("disconnected", lost.seat)?;
+                let seat = self.of_an_agent("disconnected", lost.seat)?;
+                self.clocks[seat].connected = Some(false);
+                self.connection_event(seat);
             }
             Kind::Returned(returned) => {
                 let seat = self.of_an_agent("returned", returned.seat)?;
-                self.clocks[seat].substituted = false;
+                let clock = &mut self.clocks[seat];
+                // A seat can take its decisions back from a substitute without attaching.
+                let is_attached = !clock.substituted || clock.connected == Some(true);
+                clock.connected = is_attached.then_some(true);
+                clock.substituted = false;
+                clock.timeouts = 0;
+                self.connection_event(seat);
             }
             Kind::Substituted(substituted) => {
                 let seat = self.of_an_agent("substituted", substituted.seat)?;
@@ -93,6 +124,13 @@ impl Seats {
                         }
                     ));
                 }
+                if header.policy.as_ref().map(v1::RoomPolicy::abort)
+                    == Some(v1::AbortPolicy::AnyLost)
+                {
+                    return Err(format!(
+                        "seat {seat} is substituted, but by the policy the game is aborted instead"
+                    ));
+                }
                 if policy != Some(&substituted.built_in_agent) {
                     return Err(must_be(
                         "substituted.builtInAgent",
@@ -102,7 +140,11 @@ impl Seats {
                 }
                 self.clocks[seat].substituted = true;
             }
-            Kind::ServerRestarted(_) => {}
+            Kind::ServerRestarted(_) => {
+                for clock in &mut self.clocks {
+                    clock.connected = Some(false);
+                }
+            }
             Kind::ExpressionShown(shown) => {
                 self.seat("expressionShown", shown.seat)?;
                 check_shown("expressionShown", shown.expression.as_ref(), false)?;
@@ -155,6 +197,9 @@ impl Seats {
         self.check_occupants(header)?;
         let expected = game_started(header, rules);
         self.begun = true;
+        for clock in &mut self.clocks {
+            clock.connected.get_or_insert(true);
+        }
         match difference(started, &expected) {
             Some(problem) => Err(format!("gameStarted.{problem}, as in the header")),
             None => Ok(()),

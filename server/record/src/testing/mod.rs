@@ -21,6 +21,8 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 /// Invalid attempts after which the default decision is taken.
 const ATTEMPTS: u32 = 10;
+/// Time for a decision, without a bank.
+const DECISION_TIME_MS: u32 = 10_000;
 
 /// A game to play and record.
 pub struct TestGame<'a> {
@@ -49,6 +51,7 @@ impl TestGame<'_> {
         let mut lines = Lines {
             lines: vec![Line::Header(self.header())],
             events: 0,
+            elapsed_ms: 0,
         };
         for seat in self.header().seats {
             lines.event(Kind::Seated(Box::new(v1::Seated {
@@ -77,10 +80,11 @@ impl TestGame<'_> {
             None => Game::new(self.rules, first, push),
             Some(script) => Game::scripted(self.rules, first, script, push).unwrap(),
         };
-        self.push_events(&mut lines, &mut events, v1::DecisionSource::Agent);
+        self.push_events(&mut lines, &mut events, v1::DecisionSource::Agent, 0);
         let mut random = self.choices;
         let mut numbers = BySeat::filled(self.rules.players(), 0);
         let mut substituted = BySeat::filled(self.rules.players(), false);
+        let mut connected = BySeat::filled(self.rules.players(), true);
         let mut decisions: u64 = 0;
         while let Some(open) = game.decision() {
             let index = usize::try_from(decisions).unwrap();
@@ -113,6 +117,23 @@ impl TestGame<'_> {
                     Kind::Returned(v1::Returned { seat })
                 });
             }
+            let seat = seat_number(open.seat);
+            match source {
+                v1::DecisionSource::Disconnected if connected[open.seat] => {
+                    connected[open.seat] = false;
+                    lines.event(Kind::Disconnected(v1::Disconnected { seat }));
+                }
+                v1::DecisionSource::Timeout if !connected[open.seat] => {
+                    connected[open.seat] = true;
+                    lines.event(Kind::Returned(v1::Returned { seat }));
+                }
+                _ => {}
+            }
+            let took_ms = match source {
+                v1::DecisionSource::Timeout | v1::DecisionSource::Disconnected => DECISION_TIME_MS,
+                _ => 0,
+            };
+            lines.elapsed_ms += u64::from(took_ms);
             numbers[open.seat] += 1;
             decisions += 1;
             let space = self.rules.actions();
@@ -135,12 +156,14 @@ impl TestGame<'_> {
                 action: action.index().into(),
                 text: space.text(action).unwrap(),
                 source: source.into(),
+                decision_time_us: u64::from(took_ms) * 1000,
+                elapsed_ms: lines.elapsed_ms,
                 invalid_attempts: vec![illegal.into(); attempts],
                 action_mask: legal.to_bytes(space.size()),
                 ..v1::DecisionRecord::default()
             }));
             game.apply(action, |event| events.push(event)).unwrap();
-            self.push_events(&mut lines, &mut events, source);
+            self.push_events(&mut lines, &mut events, source, took_ms);
         }
         if let Line::Header(header) = &mut lines.lines[0] {
             for (seat, substituted) in header.seats.iter_mut().zip(substituted.values()) {
@@ -166,6 +189,7 @@ impl TestGame<'_> {
             state: v1::RoomState::Finished.into(),
             events: lines.events,
             decisions,
+            signature: None,
         }));
         lines
             .lines
@@ -174,10 +198,16 @@ impl TestGame<'_> {
             .collect()
     }
 
-    fn push_events(&self, lines: &mut Lines, events: &mut Vec<Event>, source: v1::DecisionSource) {
+    fn push_events(
+        &self,
+        lines: &mut Lines,
+        events: &mut Vec<Event>,
+        source: v1::DecisionSource,
+        took_ms: u32,
+    ) {
         let by = By {
             source,
-            decision_time_us: 0,
+            decision_time_us: u64::from(took_ms) * 1000,
         };
         for event in events.drain(..) {
             if let Some(kind) = event_kind(&event, self.rules.actions(), by) {
@@ -215,10 +245,11 @@ impl TestGame<'_> {
             rules_version: chefshat_engine::RULES_VERSION,
             room_id: "fedcba9876543210fedcba9876543210".into(),
             policy: Some(v1::RoomPolicy {
-                decision_time_ms: Some(10_000),
+                decision_time_ms: Some(DECISION_TIME_MS),
                 bank_ms: Some(0),
                 max_invalid_attempts: Some(ATTEMPTS),
-                max_timeouts: Some(3),
+                // No seat is substituted because of its timeouts.
+                max_timeouts: Some(1_000),
                 substitute: "random".into(),
                 pace_ms: Some(0),
                 waiting_time_ms: Some(1_000),
@@ -304,8 +335,13 @@ pub fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLi
     let events = count(|line| matches!(line, Line::Event(_))) + 1;
     let decisions = count(|line| matches!(line, Line::Decision(_)));
     let dealt = |line: &Line| matches!(line, Line::Event(event) if matches!(event.kind, Some(Kind::ShiftStarted(_))));
+    let elapsed_ms = (lines.iter().rev()).find_map(|line| match line.line.as_ref()? {
+        Line::Event(event) => Some(event.elapsed_ms),
+        _ => None,
+    });
     let end = v1::GameEvent {
         sequence: events,
+        elapsed_ms: elapsed_ms.unwrap_or_default(),
         kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
             reason: v1::AbortReason::Closed.into(),
             reveal: reveal.filter(|_| count(dealt) > 0),
@@ -316,6 +352,7 @@ pub fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLi
         state: v1::RoomState::Aborted.into(),
         events,
         decisions,
+        signature: None,
     };
     let end = [Line::Event(end), Line::Footer(footer)];
     lines.extend(end.map(|line| v1::RecordLine { line: Some(line) }));
@@ -342,6 +379,7 @@ pub fn taken_over(branch: &Branch) -> u64 {
 struct Lines {
     lines: Vec<Line>,
     events: u64,
+    elapsed_ms: u64,
 }
 
 impl Lines {
@@ -349,6 +387,7 @@ impl Lines {
         self.events += 1;
         self.lines.push(Line::Event(v1::GameEvent {
             sequence: self.events,
+            elapsed_ms: self.elapsed_ms,
             kind: Some(kind),
             ..v1::GameEvent::default()
         }));

@@ -8,6 +8,7 @@
 mod branches;
 mod damage;
 mod files;
+mod forgeries;
 mod fuzz;
 mod import;
 mod outcome;

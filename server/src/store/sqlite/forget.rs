@@ -173,7 +173,7 @@ impl Forgetting {
     }
 }
 
-/// Removes a participant from one game.
+/// Removes a participant from one game, which loses its signature if it changes.
 async fn forget_game(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
@@ -214,7 +214,7 @@ async fn forget_game(
             .map_err(|error| unreadable(error.into()))?;
         who.in_seats(&mut summary.seats);
         who.in_text(&mut summary.room_name);
-        sqlx::query("UPDATE games SET summary = $2, room_name = $3, filed = 0 WHERE number = $1")
+        sqlx::query("UPDATE games SET summary = $2, room_name = $3, filed = 0, signature = NULL WHERE number = $1")
             .bind(number)
             .bind(summary.encode_to_vec())
             .bind(summary.room_name.as_str())

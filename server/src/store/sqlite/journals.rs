@@ -6,13 +6,15 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
+use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
 use tracing::error;
 
 use super::codec::Codec;
 use super::form;
+use super::rows;
 use super::writer::{Pending, Row, WriteCommand};
-use crate::store::{Journal, StoreError};
+use crate::store::{Journal, Signed, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// The queue of the writer.
@@ -56,6 +58,8 @@ pub(super) struct DurableJournal {
     /// Its last row so far.
     pub(super) last_row: Option<i64>,
     pub(super) queue: WriteQueue,
+    pub(super) readers: SqlitePool,
+    pub(super) codec: Codec,
 }
 
 impl DurableJournal {
@@ -102,9 +106,24 @@ impl Journal for DurableJournal {
         self.queue.send(WriteCommand::Append(row)).boxed()
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        async move {
+            let read = rows::journal(&self.readers, &self.codec, self.number, self.last_row);
+            match read.await? {
+                Ok(read) => Ok(read.entries),
+                Err(problem) => Err(StoreError::Failed(format!(
+                    "the journal of game number {} cannot be read back: {problem}",
+                    self.number
+                ))),
+            }
+        }
+        .boxed()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         self.queue
             .send(WriteCommand::Finish {
@@ -113,6 +132,7 @@ impl Journal for DurableJournal {
                 state: v1::RoomState::Aborted.into(),
                 last_row: self.last_row,
                 summary,
+                signature: signed.as_ref().map(form::signed_to_bytes),
             })
             .boxed()
     }
@@ -141,9 +161,14 @@ impl Journal for EphemeralJournal {
         ready(Ok(())).boxed()
     }
 
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        ready(Ok(self.entries.clone())).boxed()
+    }
+
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let Some(summary) = summary else {
             return ready(Ok(())).boxed();
@@ -162,6 +187,7 @@ impl Journal for EphemeralJournal {
                 row: self.queue.new_row(),
                 entries,
                 summary,
+                signature: signed.as_ref().map(form::signed_to_bytes),
             };
             match self.queue.send(game).await {
                 // The game was played anyway; the record that was stored first stays.

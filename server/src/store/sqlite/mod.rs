@@ -9,6 +9,7 @@ mod form;
 mod journals;
 mod open;
 mod reader;
+mod rows;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -138,14 +139,15 @@ impl Store for SqliteStore {
         mut entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
-        let commands = self.commands.clone();
+        let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
+        let codec = self.codec.clone();
         if header.policy.durability == Durability::Ephemeral {
             let journal = EphemeralJournal {
                 number,
                 header,
                 entries,
                 queue: commands,
-                codec: self.codec.clone(),
+                codec,
             };
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
         }
@@ -155,6 +157,8 @@ impl Store for SqliteStore {
                 position: 0,
                 last_row: None,
                 queue: commands,
+                readers,
+                codec,
             };
             journal.begin(&header, &mut entries).await?;
             Ok(Box::new(journal) as Box<dyn Journal>)

@@ -24,7 +24,7 @@ const READERS: u32 = 4;
 /// Prepared statements per connection.
 const STATEMENTS: usize = 64;
 /// The migrations, oldest first. A released one never changes.
-const MIGRATIONS: [(i64, &str, &str); 3] = [
+const MIGRATIONS: [(i64, &str, &str); 4] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (
         2,
@@ -32,6 +32,11 @@ const MIGRATIONS: [(i64, &str, &str); 3] = [
         include_str!("migrations/0002_tournaments.sql"),
     ),
     (3, "listed", include_str!("migrations/0003_listed.sql")),
+    (
+        4,
+        "signature",
+        include_str!("migrations/0004_signature.sql"),
+    ),
 ];
 
 /// Why a data directory cannot be used.

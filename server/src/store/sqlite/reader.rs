@@ -14,10 +14,11 @@ use super::codec::Codec;
 use super::errors::explain;
 use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, WriteQueue};
+use super::rows::{self, Read};
 use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Entry, GameHeader};
+use chefshat_room::journal::GameHeader;
 
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
 /// older ones.
@@ -88,6 +89,8 @@ impl Reader {
                         position: read.rows,
                         last_row: read.last_row,
                         queue: commands.clone(),
+                        readers: self.pool.clone(),
+                        codec: self.codec.clone(),
                     }),
                     entries: read.entries,
                     concluded,
@@ -104,7 +107,7 @@ impl Reader {
     /// See `Store::finished`.
     pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
         let row = sqlx::query(
-            "SELECT number, form, header, record, last_row
+            "SELECT number, form, header, record, last_row, signature
              FROM games LEFT JOIN added_records ON game = number
              WHERE game_id = $1 AND summary IS NOT NULL",
         )
@@ -128,9 +131,12 @@ impl Reader {
         let header = header_of(&row).map_err(unreadable)?;
         let journal = self.journal(row.get(0), row.get(4)).await?;
         let journal = journal.map_err(unreadable)?;
+        let signature: Option<&[u8]> = row.get(5);
+        let signed = signature.map(form::signed_from_bytes).transpose();
         Ok(Some(StoredGame::Hosted(
             Arc::new(header),
             journal.entries.into(),
+            signed.map_err(unreadable)?.map(Arc::new),
         )))
     }
 
@@ -209,36 +215,12 @@ impl Reader {
         Ok(journals)
     }
 
-    /// The journal of a finished game, found from its last row back to its first; the inner result
-    /// says why it cannot be read.
     async fn journal(
         &self,
         number: i64,
         last_row: Option<i64>,
     ) -> Result<Result<Read, Unreadable>, StoreError> {
-        let rows = sqlx::query(
-            "WITH RECURSIVE own (row, position, entries, previous) AS (
-                 SELECT row, position, entries, previous FROM journal WHERE row = $1 AND game = $2
-                 UNION ALL
-                 SELECT journal.row, journal.position, journal.entries, journal.previous
-                 FROM own JOIN journal ON journal.row = own.previous
-                 WHERE journal.row < own.row AND journal.game = $2)
-             SELECT row, position, entries FROM own ORDER BY row",
-        )
-        .bind(last_row)
-        .bind(number)
-        .fetch_all(&self.pool)
-        .await
-        .map_err(failure)?;
-        if rows.is_empty() && last_row.is_some() {
-            return Ok(Err(Unreadable("its journal is missing".into())));
-        }
-        let bytes: usize = rows.iter().map(|row| row.get::<&[u8], _>(2).len()).sum();
-        let decoding = self.codec.run(bytes / 64, move || {
-            let mut read = Read::default();
-            rows.iter().try_for_each(|row| read.add(row)).map(|()| read)
-        });
-        decoding.await
+        rows::journal(&self.pool, &self.codec, number, last_row).await
     }
 
     /// See `Store::list`.
@@ -288,28 +270,6 @@ impl Reader {
         .map_err(failure)?;
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
-    }
-}
-
-/// A decoded journal.
-#[derive(Default)]
-struct Read {
-    entries: Vec<Entry>,
-    rows: i64,
-    last_row: Option<i64>,
-}
-
-impl Read {
-    /// Adds the next row: its number, position and entries.
-    fn add(&mut self, row: &SqliteRow) -> Result<(), Unreadable> {
-        if row.get::<i64, _>(1) != self.rows {
-            let gap = format!("a part of its journal is missing at {}", self.rows);
-            return Err(Unreadable(gap));
-        }
-        form::read_entries(row.get(2), &mut self.entries)?;
-        self.rows += 1;
-        self.last_row = Some(row.get(0));
-        Ok(())
     }
 }
 

@@ -169,7 +169,7 @@ async fn opened(folder: &Path) -> SqliteStore {
 /// The journal of a hosted game that has ended.
 async fn finished_journal(store: &SqliteStore, game: Id) -> Vec<Entry> {
     let stored = store.finished(game).await.expect("readable");
-    let Some(StoredGame::Hosted(_, journal)) = stored else {
+    let Some(StoredGame::Hosted(_, journal, _)) = stored else {
         panic!("not stored: {stored:?}");
     };
     journal.to_vec()
@@ -215,7 +215,7 @@ async fn an_unfinished_game_resumes_where_it_stopped() {
         .await
         .expect("committed");
     game.journal
-        .finish(Some(summary(&header)))
+        .finish(Some(summary(&header)), None)
         .await
         .expect("committed");
     store.close().await;
@@ -229,7 +229,7 @@ async fn an_unfinished_game_resumes_where_it_stopped() {
             .is_empty()
     );
     let stored = store.finished(header.game_id).await.expect("readable");
-    let Some(StoredGame::Hosted(stored, journal)) = stored else {
+    let Some(StoredGame::Hosted(stored, journal, _)) = stored else {
         panic!("not stored: {stored:?}");
     };
     assert_eq!(shown(&*stored), shown(&*header));
@@ -273,7 +273,7 @@ async fn a_game_is_created_with_its_first_entries() {
         }
         journal.append(&mut rest.to_vec()).await.expect("committed");
         journal
-            .finish(Some(summary(&header)))
+            .finish(Some(summary(&header)), None)
             .await
             .expect("committed");
         let journal = finished_journal(&store, header.game_id).await;
@@ -299,7 +299,7 @@ async fn an_ephemeral_game_is_stored_only_when_it_ends() {
             .is_empty()
     );
     journal
-        .finish(Some(summary(&header)))
+        .finish(Some(summary(&header)), None)
         .await
         .expect("committed");
     let journal = finished_journal(&store, header.game_id).await;
@@ -440,7 +440,7 @@ async fn a_missing_part_of_a_finished_game_is_detected() {
         }
         for (journal, header) in journals.iter_mut().zip(&headers) {
             journal
-                .finish(Some(summary(header)))
+                .finish(Some(summary(header)), None)
                 .await
                 .expect("committed");
         }

@@ -50,6 +50,7 @@ pub(super) enum WriteCommand {
         state: i32,
         last_row: Option<i64>,
         summary: Option<Box<v1::RecordSummary>>,
+        signature: Option<Vec<u8>>,
     },
     /// Stores a game that was only in memory until it ended.
     Whole {
@@ -59,6 +60,7 @@ pub(super) enum WriteCommand {
         row: i64,
         entries: Vec<u8>,
         summary: Box<v1::RecordSummary>,
+        signature: Option<Vec<u8>>,
     },
     /// Stores a game that was played elsewhere.
     Import {
@@ -219,14 +221,17 @@ async fn write(
                 state,
                 last_row,
                 summary,
+                signature,
             } => {
                 sqlx::query(
-                    "UPDATE games SET state = $2, ended_at_ms = $3, last_row = $4 WHERE number = $1",
+                    "UPDATE games SET state = $2, ended_at_ms = $3, last_row = $4, signature = $5
+                     WHERE number = $1",
                 )
                 .bind(*number)
                 .bind(*state)
                 .bind(i64::try_from(since_epoch_ms()).unwrap_or(i64::MAX))
                 .bind(*last_row)
+                .bind(signature.as_deref())
                 .execute(&mut *connection)
                 .await?;
                 if let Some(summary) = summary {
@@ -240,14 +245,16 @@ async fn write(
                 row,
                 entries,
                 summary,
+                signature,
             } => {
                 if !create(connection, *number, *game_id, header, *row).await? {
                     taken.insert(index, *game_id);
                     continue;
                 }
-                sqlx::query("UPDATE games SET last_row = $2 WHERE number = $1")
+                sqlx::query("UPDATE games SET last_row = $2, signature = $3 WHERE number = $1")
                     .bind(*number)
                     .bind(*row)
+                    .bind(signature.as_deref())
                     .execute(&mut *connection)
                     .await?;
                 sqlx::query(

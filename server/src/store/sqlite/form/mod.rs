@@ -5,6 +5,7 @@
 
 mod entry;
 mod header;
+mod signed;
 mod tournament;
 
 use chefshat_engine::ActionId;
@@ -13,6 +14,7 @@ use prost::Message as _;
 
 pub(super) use entry::{put_entry, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes};
+pub(super) use signed::{signed_from_bytes, signed_to_bytes};
 pub(super) use tournament::{
     tournament_entries_from_bytes, tournament_entries_to_bytes, tournament_from_bytes,
     tournament_to_bytes,

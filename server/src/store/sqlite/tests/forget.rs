@@ -33,7 +33,7 @@ async fn participants_who_sat_down_are_listed_whether_they_stayed_or_not() {
         .await
         .expect("committed");
     journal
-        .finish(Some(summary(&header)))
+        .finish(Some(summary(&header)), None)
         .await
         .expect("committed");
     drop(journal);

@@ -15,7 +15,7 @@ async fn lists_are_filtered_and_paged() {
             .await
             .expect("committed");
         journal
-            .finish(Some(summary(&header)))
+            .finish(Some(summary(&header)), None)
             .await
             .expect("committed");
     }
@@ -25,7 +25,7 @@ async fn lists_are_filtered_and_paged() {
             .await
             .expect("committed");
         // Nothing was dealt in it, so it has no record.
-        journal.finish(None).await
+        journal.finish(None, None).await
     };
     abandoned.expect("committed");
     let filter = v1::RecordFilter::default;

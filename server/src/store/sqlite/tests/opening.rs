@@ -98,7 +98,7 @@ async fn games_abandoned_before_the_deal_leave_nothing_behind() {
         let mut journal = store.create(header, Vec::new()).await.expect("committed");
         journal.append(&mut entries()).await.expect("committed");
         if game == 1 {
-            journal.finish(None).await.expect("committed");
+            journal.finish(None, None).await.expect("committed");
         }
     }
     store.close().await;

@@ -151,7 +151,9 @@ class Observation(_message.Message):
     pizza: _builtins.int
     """Number of the current pizza in its Shift, from 1; 0 before the Shift's first turn is open."""
     hand: _builtins.bytes
-    """The seat's own hand, F+1 counts."""
+    """The seat's own hand, F+1 counts. During the exchange without the cards given so far, and until
+    its end without those received: all gifts change hands at once.
+    """
     golden: _builtins.bool
     """Whether the seat's own hand has the Golden card."""
     board_face: _builtins.int
@@ -161,10 +163,14 @@ class Observation(_message.Message):
     board_jokers: _builtins.int
     """Number of jokers among the cards on the board, 0..=2."""
     cards_left: _builtins.bytes
-    """Number of cards in each hand, N bytes."""
+    """Number of cards in each hand, N bytes. During the exchange without the cards that Chef and
+    Sous-Chef have given so far; all other gifts are counted when it is complete.
+    """
     passed: _builtins.bytes
-    """1 for each seat that has passed and is out of the current pizza, else 0; N bytes. With
-    PASS_SCOPE_TURN: that has passed since the last play.
+    """1 for each seat that has passed in the current pizza and is out of it, else 0; N bytes. With
+    PASS_SCOPE_TURN: 1 for each seat that has passed since the last play, or since the pizza began
+    if nobody has played. Such a seat is not out: it may play at its next turn, and every play sets
+    all bytes to 0.
     """
     places: _builtins.bytes
     """Place of each seat that has finished this Shift, from 1, else 0; N bytes."""
@@ -173,9 +179,13 @@ class Observation(_message.Message):
     played: _builtins.bytes
     """Cards played by all seats so far in this Shift, F+1 counts."""
     gave: _builtins.bytes
-    """Cards that the seat gave in this Shift's exchange so far, F+1 counts; empty if none."""
+    """Cards that the seat gave in this Shift's exchange so far, F+1 counts; empty if none. Those of
+    Waiter and Dishwasher, who have no choice, are given when the exchange is complete.
+    """
     received: _builtins.bytes
-    """Cards that the seat received in this Shift's exchange, F+1 counts; empty if none."""
+    """Cards that the seat received in this Shift's exchange, F+1 counts; empty if none, and until the
+    exchange is complete.
+    """
     @_builtins.property
     def points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Points of each seat in the game so far, N numbers."""
@@ -237,7 +247,9 @@ class DecisionRequest(_message.Message):
     time_left_ms: _builtins.int
     """Milliseconds left for this decision before the time bank is used, when the request was written."""
     bank_left_ms: _builtins.int
-    """Milliseconds left in the seat's time bank, when the request was written."""
+    """Milliseconds left in the seat's time bank, when the request was written. 0 for a special action,
+    which does not use the bank.
+    """
     invalid_attempts_left: _builtins.int
     """Invalid attempts left before the server takes the default decision; unset if unlimited."""
     special_action: _rules_pb2.SpecialAction.ValueType

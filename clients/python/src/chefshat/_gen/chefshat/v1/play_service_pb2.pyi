@@ -124,8 +124,9 @@ class Attach(_message.Message):
     no_mask: _builtins.bool
     """Leave `action_mask` out of decision requests."""
     entropy: _builtins.bytes
-    """The seat's contribution to the game seed, 0..=32 bytes. Used if sent before the game starts,
-    except in games of a series.
+    """The seat's contribution to the game seed, 0..=32 bytes; best 32 random ones, of which it keeps a
+    copy. Used if sent before the game starts, except in games of a series. SeedReveal has the
+    formula, and what it proves.
     """
     def __init__(
         self,
@@ -148,7 +149,10 @@ Global___Attach: _TypeAlias = Attach  # noqa: Y015
 
 @_typing.final
 class ResumeSeat(_message.Message):
-    """Ends the substitution: the seat's own participant plays again."""
+    """Ends a substitution: the seat's own participant plays again, and every viewer receives Returned.
+    A seat learns from a Substituted event with its own number that a built-in agent plays for it; it
+    is sent at once. Attaching ends a substitution too.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 

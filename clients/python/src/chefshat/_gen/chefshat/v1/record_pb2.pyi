@@ -53,7 +53,7 @@ class RecordLine(_message.Message):
 
     @_builtins.property
     def footer(self) -> Global___RecordFooter:
-        """The last line."""
+        """The last line, with the signature of all lines."""
 
     def __init__(
         self,
@@ -351,23 +351,67 @@ class RecordFooter(_message.Message):
     STATE_FIELD_NUMBER: _builtins.int
     EVENTS_FIELD_NUMBER: _builtins.int
     DECISIONS_FIELD_NUMBER: _builtins.int
+    SIGNATURE_FIELD_NUMBER: _builtins.int
     state: _room_pb2.RoomState.ValueType
     """How the game ended: FINISHED or ABORTED."""
     events: _builtins.int
     """Number of events."""
     decisions: _builtins.int
     """Number of decisions."""
+    @_builtins.property
+    def signature(self) -> Global___RecordSignature:
+        """The signature of the server that hosted the game; unset if it has no key, or if the record was
+        changed later (a participant was deleted).
+        """
+
     def __init__(
         self,
         *,
         state: _room_pb2.RoomState.ValueType = ...,
         events: _builtins.int = ...,
         decisions: _builtins.int = ...,
+        signature: Global___RecordSignature | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["signature", b"signature"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "events", b"events", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "events", b"events", "signature", b"signature", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___RecordFooter: _TypeAlias = RecordFooter  # noqa: Y015
+
+@_typing.final
+class RecordSignature(_message.Message):
+    """A server's signature of a record (Ed25519, RFC 8032).
+
+    It signs the ASCII text "chefshat.v1 record" followed by the hash of the record, 32 bytes. The
+    hash starts as 32 zero bytes. For each line, the footer included, it becomes SHA-256(hash || line),
+    where `line` is the text of the line in UTF-8 as the server writes it to a file, without its line
+    feed, and the footer has no `signature`. That text is the canonical JSON of RecordLine without
+    spaces: fields in the order of their numbers, those with a default value absent, 64-bit numbers as
+    strings, floats in the shortest form that gives the same 32-bit value, bytes in base64 with padding.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    PUBLIC_KEY_FIELD_NUMBER: _builtins.int
+    SIGNATURE_FIELD_NUMBER: _builtins.int
+    public_key: _builtins.bytes
+    """The server's public key, 32 bytes. `chefshat key show` and GetServerInfo have it as text:
+    "ed25519:" and 64 hexadecimal digits.
+    """
+    signature: _builtins.bytes
+    """The signature, 64 bytes."""
+    def __init__(
+        self,
+        *,
+        public_key: _builtins.bytes = ...,
+        signature: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["public_key", b"public_key", "signature", b"signature"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RecordSignature: _TypeAlias = RecordSignature  # noqa: Y015

@@ -131,7 +131,9 @@ class _RewardSchemeEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_RewardSc
     REWARD_SCHEME_PAPER_INTENDED: _RewardScheme.ValueType  # 3
     """The same with the share of cards already played."""
     REWARD_SCHEME_WINNING: _RewardScheme.ValueType  # 4
-    """1 for finishing first, else -0.001."""
+    """1 for finishing first, else -0.001. A seat placed first in an adjudicated Shift, with cards
+    left, gets its 1 when the Shift ends, besides the -0.001 of its last turn.
+    """
     REWARD_SCHEME_POINTS: _RewardScheme.ValueType  # 5
     """The points of the Shift, when it ends."""
 
@@ -147,7 +149,9 @@ REWARD_SCHEME_PAPER: RewardScheme.ValueType  # 2
 REWARD_SCHEME_PAPER_INTENDED: RewardScheme.ValueType  # 3
 """The same with the share of cards already played."""
 REWARD_SCHEME_WINNING: RewardScheme.ValueType  # 4
-"""1 for finishing first, else -0.001."""
+"""1 for finishing first, else -0.001. A seat placed first in an adjudicated Shift, with cards
+left, gets its 1 when the Shift ends, besides the -0.001 of its last turn.
+"""
 REWARD_SCHEME_POINTS: RewardScheme.ValueType  # 5
 """The points of the Shift, when it ends."""
 Global___RewardScheme: _TypeAlias = RewardScheme  # noqa: Y015
@@ -385,7 +389,10 @@ class RoomPolicy(_message.Message):
     DURABILITY_FIELD_NUMBER: _builtins.int
     CLOCKS_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
-    """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000."""
+    """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. For a special
+    action, whoever holds the jokers: the longest time of any seat that participants can take, and
+    no bank.
+    """
     bank_ms: _builtins.int
     """The time bank: milliseconds that each seat may use beyond that in the game, 0..=86400000; by
     default 60000, for people 300000.
@@ -395,7 +402,12 @@ class RoomPolicy(_message.Message):
     by default 10. 0 is unlimited (in fact 10000, which bounds the record).
     """
     max_timeouts: _builtins.int
-    """Consecutive timeouts after which a seat is substituted, 1..=1000; by default 3."""
+    """Timeouts without a valid answer in time between them after which a seat is substituted,
+    1..=1000; by default 3. Invalid answers, attaching again and the return from a substitution
+    reset nothing: a seat that returned is substituted again at its next timeout unless it has
+    answered. A special action that is declined or runs out does not count, since others could
+    infer it.
+    """
     substitute: _builtins.str
     """Built-in agent that plays for a substituted seat; by default "random"."""
     abort: Global___AbortPolicy.ValueType
@@ -404,7 +416,8 @@ class RoomPolicy(_message.Message):
     """How turns are rewarded. Seats see their own rewards."""
     pace_ms: _builtins.int
     """Milliseconds that a built-in agent or substitute waits before it decides, so that people can
-    follow, 0..=60000; by default 1000 in a game with people, else 0.
+    follow, 0..=60000; by default 1000 in a game with people, else 0. It takes special actions at
+    once, so that the pace does not reveal one that is declined.
     """
     waiting_time_ms: _builtins.int
     """Milliseconds that the room waits for all seats to be attached, 1000..=86400000; by default

@@ -69,6 +69,7 @@ class GetServerInfoResponse(_message.Message):
     LIMITS_FIELD_NUMBER: _builtins.int
     OPEN_ROOMS_FIELD_NUMBER: _builtins.int
     SHUTTING_DOWN_FIELD_NUMBER: _builtins.int
+    SIGNING_KEY_FIELD_NUMBER: _builtins.int
     server_version: _builtins.str
     """Version of the server."""
     rules_version: _builtins.int
@@ -77,6 +78,10 @@ class GetServerInfoResponse(_message.Message):
     """Number of rooms that wait or play."""
     shutting_down: _builtins.bool
     """Whether the server is shutting down and refuses new rooms."""
+    signing_key: _builtins.str
+    """The public key that signs the server's records: "ed25519:" and 64 hexadecimal digits; empty if
+    it signs none, because it has no data folder. Ask it over a connection that you trust.
+    """
     @_builtins.property
     def presets(self) -> _containers.RepeatedCompositeFieldContainer[_rules_pb2.RuleSet]:
         """The presets, every field set."""
@@ -101,10 +106,11 @@ class GetServerInfoResponse(_message.Message):
         limits: _abc.Mapping[_builtins.str, _builtins.int] | None = ...,
         open_rooms: _builtins.int = ...,
         shutting_down: _builtins.bool = ...,
+        signing_key: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "limits", b"limits", "open_rooms", b"open_rooms", "presets", b"presets", "rules_version", b"rules_version", "server_version", b"server_version", "shutting_down", b"shutting_down"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "limits", b"limits", "open_rooms", b"open_rooms", "presets", b"presets", "rules_version", b"rules_version", "server_version", b"server_version", "shutting_down", b"shutting_down", "signing_key", b"signing_key"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -1,0 +1,346 @@
+//! Forgeries: what replaying a record shows to be wrong, what only its signature shows, and what
+//! neither can. `docs/records.md` has the same list; a test compares the two.
+
+use std::path::Path;
+
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::jsonl;
+use chefshat_record::pseudonym::Pseudonym;
+use chefshat_record::replay::replay;
+use chefshat_record::signature::{PublicKey, SigningKey, signer};
+
+use Outcome::{Believed, Replay, Signature};
+
+type Lines = Vec<v1::RecordLine>;
+
+/// How a forgery is caught.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// By replaying the record, signed or not.
+    Replay,
+    /// Only by the signature: an unsigned record that is forged so is accepted.
+    Signature,
+    /// Not at all.
+    Believed,
+}
+
+/// What is forged, as in the docs; how it is caught; and the change.
+type Forgery = (&'static str, Outcome, fn(&mut Lines));
+
+/// The forgeries. Numbers of lines are those of
+/// the fixture `committed.jsonl`, from 1.
+#[rustfmt::skip] // One row each.
+const FORGERIES: [Forgery; 42] = [
+    // The deal.
+    ("a card of a hand", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[1].cards[0] = 4 }),
+    ("the hands of two seats exchanged", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands.swap(0, 1) }),
+    ("the holder of the Golden card", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[2].golden = false }),
+    ("another server seed", Replay, |lines| reveal(lines).server_seed[0] ^= 1),
+    ("another nonce", Replay, |lines| reveal(lines).nonce[0] ^= 1),
+    ("the bytes of a seat", Replay, |lines| reveal(lines).seat_entropy[2][0] ^= 1),
+    ("another commitment", Replay, |lines| header(lines).seed_commitment[0] ^= 1),
+    ("the seed as fixed by the creator, without commitment", Signature, fixed_seed),
+    // Decisions.
+    ("another action", Replay, |lines| decision(lines, 8).action = 199),
+    ("another action with its event", Replay, |lines| { decision(lines, 8).action = 199; decision(lines, 8).text = "pass".into(); *kind(lines, 9) = Kind::Pass(v1::Pass { seat: 3, source: 1, decision_time_us: 1_277 }) }),
+    ("a decision left out", Replay, |lines| drop(lines.drain(7..9))),
+    ("a decision added", Replay, |lines| { let again = lines[7].clone(); lines.insert(8, again) }),
+    ("another seat as the one that decided", Replay, |lines| decision(lines, 8).seat = 0),
+    ("a legal action as illegal", Replay, |lines| decision(lines, 8).action_mask[24] = 0),
+    ("an illegal attempt added", Signature, |lines| { decision(lines, 8).invalid_attempts = vec![0]; decision(lines, 8).invalid_reward = Some(-1.0) }),
+    ("an attempt left out where the limit was reached", Replay, |lines| { decision(lines, 10).invalid_attempts.pop(); }),
+    ("other illegal attempts", Signature, |lines| decision(lines, 10).invalid_attempts[0] = 84),
+    // Sources and times.
+    ("a pass of the agent as a timeout before its time was up", Replay, |lines| source(lines, 16, v1::DecisionSource::Timeout)),
+    ("a timeout as the agent's own pass", Replay, |lines| source(lines, 21, v1::DecisionSource::Agent)),
+    ("a timeout as a lost connection", Replay, |lines| source(lines, 21, v1::DecisionSource::Disconnected)),
+    ("a decision of the agent as the substitute's", Replay, |lines| source(lines, 8, v1::DecisionSource::Substitute)),
+    ("a decision of the substitute as the agent's", Replay, |lines| source(lines, 69, v1::DecisionSource::Agent)),
+    ("a decision time longer than the time that passed", Replay, |lines| time(lines, 8, 9_000_000)),
+    ("a decision time longer than the seat had", Replay, |lines| { shift_clock(lines, 6, 1_000); time(lines, 6, 900_000) }),
+    ("a shorter decision time", Signature, |lines| time(lines, 8, 12)),
+    ("more in the time bank", Replay, |lines| decision(lines, 14).bank_left_ms = 30),
+    ("all later times moved", Signature, |lines| shift_clock(lines, 8, 5_000)),
+    ("a time before an earlier one", Replay, |lines| decision(lines, 14).elapsed_ms = 3),
+    // Seats and connections.
+    ("a dropped substitution", Replay, |lines| without_event(lines, 51)),
+    ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3 }))),
+    ("another name everywhere", Signature, rename),
+    ("another name at one place", Replay, |lines| header(lines).seats[3].name = "Rosa".into()),
+    ("another kind of participant everywhere", Signature, another_kind),
+    // What participants added.
+    ("annotations added", Signature, |lines| decision(lines, 8).annotations = Some(v1::Annotations { value_estimate: Some(0.5), ..v1::Annotations::default() })),
+    ("annotations above the limit", Replay, |lines| decision(lines, 8).annotations = Some(v1::Annotations { extra: [("note".to_owned(), "x".repeat(5_000))].into(), ..v1::Annotations::default() })),
+    ("an expression added", Signature, |lines| with_event(lines, 380, Kind::ExpressionShown(Box::new(v1::ExpressionShown { seat: 3, expression: Some(v1::Expression { label: "joy".into(), ..v1::Expression::default() }) })))),
+    // The room.
+    ("another date", Signature, |lines| header(lines).created_at_ms += 86_400_000),
+    ("another policy everywhere", Signature, another_policy),
+    ("another room, tournament or series", Signature, |lines| { header(lines).room_name = "final".into(); header(lines).tournament_id = "0".repeat(32) }),
+    // The result.
+    ("another winner", Replay, |lines| if let Kind::GameEnded(ended) = kind(lines, 492) { ended.standings[0].seat = 1 }),
+    ("a reward", Replay, |lines| if let Some(Line::Event(event)) = &mut lines[8].line { event.rewards[0].value = 1.0 }),
+    ("the record signed again with another key", Believed, |lines| { let signature = SigningKey::from_seed(&[9; 32]).sign(lines); footer(lines).signature = Some(signature) }),
+];
+
+fn header(lines: &mut Lines) -> &mut v1::RecordHeader {
+    chefshat_record::testing::header(lines)
+}
+
+fn footer(lines: &mut Lines) -> &mut v1::RecordFooter {
+    match &mut lines.last_mut().expect("a footer").line {
+        Some(Line::Footer(footer)) => footer,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn decision(lines: &mut Lines, line: usize) -> &mut v1::DecisionRecord {
+    match &mut lines[line - 1].line {
+        Some(Line::Decision(decision)) => decision,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn kind(lines: &mut Lines, line: usize) -> &mut Kind {
+    match &mut lines[line - 1].line {
+        Some(Line::Event(event)) => event.kind.as_mut().expect("an event"),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn reveal(lines: &mut Lines) -> &mut v1::SeedReveal {
+    match kind(lines, 492) {
+        Kind::GameEnded(ended) => ended.reveal.as_mut().expect("a reveal"),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Changes the source of a decision and of its event.
+fn source(lines: &mut Lines, line: usize, source: v1::DecisionSource) {
+    decision(lines, line).source = source.into();
+    match kind(lines, line + 1) {
+        Kind::Pass(pass) => pass.source = source.into(),
+        Kind::Play(play) => play.source = source.into(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Changes the time of a decision, in its event and in the bank too.
+fn time(lines: &mut Lines, line: usize, time_us: u64) {
+    let decision = decision(lines, line);
+    decision.decision_time_us = time_us;
+    let beyond_ms = u32::try_from(time_us / 1000)
+        .expect("small")
+        .saturating_sub(10);
+    decision.bank_left_ms = 60_u32.saturating_sub(beyond_ms);
+    match kind(lines, line + 1) {
+        Kind::Pass(pass) => pass.decision_time_us = time_us,
+        Kind::Play(play) => play.decision_time_us = time_us,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Moves the times from a line on.
+fn shift_clock(lines: &mut Lines, from: usize, ms: u64) {
+    for line in &mut lines[from - 1..] {
+        match &mut line.line {
+            Some(Line::Decision(decision)) => decision.elapsed_ms += ms,
+            Some(Line::Event(event)) => event.elapsed_ms += ms,
+            _ => {}
+        }
+    }
+}
+
+fn with_event(lines: &mut Lines, before: usize, kind: Kind) {
+    let elapsed_ms = match &lines[before - 1].line {
+        Some(Line::Event(event)) => event.elapsed_ms,
+        other => panic!("{other:?}"),
+    };
+    let event = v1::GameEvent {
+        elapsed_ms,
+        kind: Some(kind),
+        ..v1::GameEvent::default()
+    };
+    let line = Some(Line::Event(event));
+    lines.insert(before - 1, v1::RecordLine { line });
+    number_events(lines);
+}
+
+fn without_event(lines: &mut Lines, line: usize) {
+    lines.remove(line - 1);
+    number_events(lines);
+}
+
+/// Numbers the events again.
+fn number_events(lines: &mut Lines) {
+    let mut events = 0;
+    for line in lines.iter_mut() {
+        if let Some(Line::Event(event)) = &mut line.line {
+            events += 1;
+            event.sequence = events;
+        }
+    }
+    footer(lines).events = events;
+}
+
+/// Applies a change to the header and to the event that repeats it.
+fn everywhere(
+    lines: &mut Lines,
+    seats: impl Fn(&mut [v1::Participant]),
+    policy: impl Fn(&mut v1::RoomPolicy),
+) {
+    seats(&mut header(lines).seats);
+    policy(header(lines).policy.as_mut().expect("a policy"));
+    if let Kind::GameStarted(started) = kind(lines, 4) {
+        seats(&mut started.seats);
+        policy(started.policy.as_mut().expect("a policy"));
+    }
+}
+
+fn rename(lines: &mut Lines) {
+    everywhere(lines, |seats| seats[3].name = "Rosa".into(), |_| {});
+    if let Kind::Seated(seated) = kind(lines, 3) {
+        seated.name = "Rosa".into();
+    }
+}
+
+fn another_kind(lines: &mut Lines) {
+    let human = v1::ParticipantKind::Human.into();
+    everywhere(lines, |seats| seats[3].kind = human, |_| {});
+    if let Kind::Seated(seated) = kind(lines, 3) {
+        seated.kind = human;
+    }
+}
+
+fn another_policy(lines: &mut Lines) {
+    everywhere(lines, |_| {}, |policy| policy.spectators = Some(false));
+}
+
+fn fixed_seed(lines: &mut Lines) {
+    header(lines).origin = v1::GameOrigin::FixedSeed.into();
+    header(lines).seed_commitment.clear();
+    if let Kind::GameStarted(started) = kind(lines, 4) {
+        started.seed_commitment.clear();
+    }
+    let game_seed = reveal(lines).game_seed.clone();
+    *reveal(lines) = v1::SeedReveal {
+        game_seed,
+        ..v1::SeedReveal::default()
+    };
+}
+
+fn fixture() -> Lines {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records/committed.jsonl");
+    jsonl::read(&path).expect("a record")
+}
+
+fn key() -> SigningKey {
+    SigningKey::from_seed(&[7; 32])
+}
+
+fn signed() -> Lines {
+    let mut lines = fixture();
+    footer(&mut lines).signature = Some(key().sign(&lines));
+    lines
+}
+
+fn outcome(forge: fn(&mut Lines)) -> Outcome {
+    let (mut plain, mut with_signature) = (fixture(), signed());
+    forge(&mut plain);
+    forge(&mut with_signature);
+    let accepted = replay(&with_signature).is_ok();
+    match (replay(&plain).is_ok(), accepted) {
+        (false, false) => Replay,
+        (true, false) => Signature,
+        (_, true) => Believed,
+    }
+}
+
+#[test]
+fn each_forgery_is_caught_as_the_table_says() {
+    let wrong: Vec<String> = FORGERIES
+        .iter()
+        .map(|(name, expected, forge)| (name, *expected, outcome(*forge)))
+        .filter(|(_, expected, found)| expected != found)
+        .map(|(name, expected, found)| format!("{name}: {expected:?}, but it is {found:?}"))
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_pinned_key_catches_what_is_signed_again() {
+    let mut lines = signed();
+    assert_eq!(
+        replay(&lines).expect("it fits").signed_by,
+        Some(key().public())
+    );
+    let (.., forge) = FORGERIES[FORGERIES.len() - 1];
+    rename(&mut lines);
+    forge(&mut lines);
+    let signed_by = replay(&lines).expect("a valid signature").signed_by;
+    assert_ne!(signed_by, Some(key().public()));
+}
+
+#[test]
+fn a_record_without_a_participant_loses_its_signature() {
+    let mut lines = signed();
+    let delete = |name: &str| Pseudonym {
+        name: name.into(),
+        pseudonym: "deleted participant".into(),
+    };
+    delete("nobody").redact(&mut lines);
+    assert_eq!(signer(&lines), Ok(Some(key().public())));
+    delete("Greta").redact(&mut lines);
+    assert_eq!(replay(&lines).expect("it fits").signed_by, None);
+}
+
+#[test]
+fn the_docs_list_what_a_record_can_and_cannot_prove() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/records.md");
+    let docs = std::fs::read_to_string(path).expect("the docs");
+    let rows: Vec<&str> = docs
+        .lines()
+        .skip_while(|line| *line != "| forgery | caught by |")
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .collect();
+    let expected: Vec<String> = FORGERIES
+        .iter()
+        .map(|(name, outcome, _)| {
+            let caught = match outcome {
+                Replay => "replay",
+                Signature => "signature",
+                Believed => "a pinned key",
+            };
+            format!("| {name} | {caught} |")
+        })
+        .collect();
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn a_signature_survives_the_file_and_public_keys_their_text() {
+    let lines = signed();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("signed.jsonl");
+    jsonl::write(&path, &lines).expect("written");
+    let read = jsonl::read(&path).expect("read");
+    assert_eq!(signer(&read), Ok(Some(key().public())));
+    // The same signature, computed in Python.
+    let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/signed.jsonl");
+    assert_eq!(jsonl::read(&other).expect("read"), lines);
+    assert_eq!(signer(&fixture()), Ok(None));
+    let text = key().public().to_string();
+    assert_eq!(text.parse(), Ok(key().public()));
+    for wrong in ["", "ed25519:", "ed25519:00", &text[8..]] {
+        assert!(wrong.parse::<PublicKey>().is_err(), "{wrong:?}");
+    }
+    // RFC 8032, 7.1, test 1.
+    let seed = "9d61b19deffd5a60ba844af492ec2cc44449c5697b326919703bac031cae7f60";
+    let seed: [u8; 32] = hex::decode(seed)
+        .expect("hexadecimal")
+        .try_into()
+        .expect("32 bytes");
+    let public = "ed25519:d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a";
+    assert_eq!(SigningKey::from_seed(&seed).public().to_string(), public);
+}

@@ -1,0 +1,169 @@
+//! The key that signs the records of a server, in its data directory, and signing a game when it
+//! ends.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use chefshat_record::signature::{PublicKey, SigningKey};
+use tokio::sync::Semaphore;
+use tracing::error;
+
+use crate::config::MAX_CONCURRENT_RECORDS;
+use crate::convert;
+use crate::store::Signed;
+use chefshat_room::journal::{Entry, GameHeader};
+
+/// The file of the key in a data directory.
+const FILE: &str = "signing-key";
+/// Precedes the secret in the file, in hexadecimal digits.
+const PREFIX: &str = "ed25519-secret:";
+
+/// A key file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum KeyError {
+    /// The file system failed.
+    #[error("the key that signs records cannot be used: {0}: {1}")]
+    Io(PathBuf, io::Error),
+    /// The file has other contents.
+    #[error(
+        "{0} is not a key that signs records; restore it from a backup, or move it away: the server then creates another key"
+    )]
+    NotAKey(PathBuf),
+    /// Others can read the file.
+    #[error("{0} can be read by others, who could sign records with it; run chmod 600 on it")]
+    Exposed(PathBuf),
+}
+
+/// The key of a data directory; `None` if it has none.
+///
+/// # Errors
+/// The file cannot be used.
+pub fn key_of(data_dir: &Path) -> Result<Option<SigningKey>, KeyError> {
+    let path = data_dir.join(FILE);
+    let failed = |error| KeyError::Io(path.clone(), error);
+    let text = match fs::read_to_string(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if error.kind() == io::ErrorKind::InvalidData => {
+            return Err(KeyError::NotAKey(path));
+        }
+        text => text.map_err(failed)?,
+    };
+    let mode = fs::metadata(&path).map_err(failed)?.permissions().mode();
+    if mode & 0o077 != 0 {
+        return Err(KeyError::Exposed(path));
+    }
+    let mut seed = [0; 32];
+    let digits = text.trim_end().strip_prefix(PREFIX);
+    match digits.map(|digits| hex::decode_to_slice(digits, &mut seed)) {
+        Some(Ok(())) => Ok(Some(SigningKey::from_seed(&seed))),
+        _ => Err(KeyError::NotAKey(path)),
+    }
+}
+
+/// The key of a data directory. Creates it, readable only by its owner, if there is none.
+///
+/// # Errors
+/// The file cannot be used.
+pub fn key_or_new(data_dir: &Path) -> Result<SigningKey, KeyError> {
+    if let Some(key) = key_of(data_dir)? {
+        return Ok(key);
+    }
+    let seed: [u8; 32] = rand::random();
+    create(&data_dir.join(FILE), &seed)
+        .map_err(|error| KeyError::Io(data_dir.join(FILE), error))?;
+    Ok(SigningKey::from_seed(&seed))
+}
+
+/// Writes a new key file atomically.
+fn create(path: &Path, seed: &[u8; 32]) -> io::Result<()> {
+    let part = path.with_extension("part");
+    match fs::remove_file(&part) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    let mut options = File::options();
+    let mut file = options
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(&part)?;
+    writeln!(file, "{PREFIX}{}", hex::encode(seed))?;
+    file.sync_all()?;
+    fs::rename(&part, path)?;
+    match path.parent() {
+        Some(folder) => File::open(folder)?.sync_all(),
+        None => Ok(()),
+    }
+}
+
+/// Signs games that end, a few at a time.
+#[derive(Clone)]
+pub struct Signer {
+    key: Option<Arc<SigningKey>>,
+    permits: Arc<Semaphore>,
+}
+
+impl Signer {
+    /// Signs with this key; without one it signs nothing.
+    pub fn new(key: Option<Arc<SigningKey>>) -> Self {
+        Self {
+            key,
+            permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
+        }
+    }
+
+    /// Its public key, if it signs.
+    pub fn public(&self) -> Option<PublicKey> {
+        self.key.as_ref().map(|key| key.public())
+    }
+
+    /// Signs the record of a game that has ended.
+    pub async fn sign(&self, header: Arc<GameHeader>, journal: Vec<Entry>) -> Option<Signed> {
+        let key = Arc::clone(self.key.as_ref()?);
+        // The semaphore is never closed; if it were, the record would merely not wait.
+        let _permit = self.permits.acquire().await.ok();
+        let signing = tokio::task::spawn_blocking(move || {
+            let lines = convert::record_lines(&header, &journal);
+            Signed {
+                server_version: convert::SERVER_VERSION.to_owned(),
+                signature: key.sign(&lines),
+            }
+        });
+        match signing.await {
+            Ok(signed) => Some(signed),
+            Err(error) => {
+                error!(%error, "a record could not be signed; it stays unsigned");
+                None
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_created_once_and_only_its_owner_can_read_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(key_of(folder.path()).expect("no file").is_none());
+        let key = key_or_new(folder.path()).expect("a new key").public();
+        assert_eq!(key_or_new(folder.path()).expect("the key").public(), key);
+        let path = folder.path().join(FILE);
+        let mode = fs::metadata(&path).expect("the file").permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).expect("its owner");
+        assert!(matches!(key_of(folder.path()), Err(KeyError::Exposed(_))));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("its owner");
+        for wrong in ["", "ed25519-secret:00", "\u{1}"] {
+            fs::write(&path, wrong).expect("written");
+            assert!(matches!(
+                key_or_new(folder.path()),
+                Err(KeyError::NotAKey(_))
+            ));
+        }
+    }
+}
