@@ -84,6 +84,8 @@ enum FaultKind {
     Partition(usize),
     /// Nothing passes between a client and the server, and arrives later.
     Hold(usize),
+    /// Messages between a client and the server take this much longer.
+    Slow(usize, Duration),
 }
 
 /// The names of the clients' machines.
@@ -95,10 +97,11 @@ fn faults(chance: &mut ChaCha8Rng) -> Vec<Fault> {
         .map(|_| {
             let at = FAULTY.mul_f64(chance.random_range(0.0..1.0));
             let client = chance.random_range(0..CLIENTS.len());
-            let (kind, longest) = match chance.random_range(0..3) {
+            let (kind, longest) = match chance.random_range(0..4) {
                 0 => (FaultKind::Crash, 3.0),
                 1 => (FaultKind::Partition(client), 15.0),
-                _ => (FaultKind::Hold(client), 4.0),
+                2 => (FaultKind::Hold(client), 4.0),
+                _ => (FaultKind::Slow(client, latency(chance) * 10), 5.0),
             };
             let lasts = Duration::from_secs_f64(chance.random_range(0.05..longest));
             Fault {
@@ -112,20 +115,33 @@ fn faults(chance: &mut ChaCha8Rng) -> Vec<Fault> {
     faults
 }
 
+/// How long a message takes. Each connection has a latency of its own, which changes by faults
+/// alone: a latency drawn for each message would depend on the order in which a crash drops the
+/// tasks of the server, which the seed does not decide.
+fn latency(chance: &mut ChaCha8Rng) -> Duration {
+    Duration::from_millis(chance.random_range(1..60))
+}
+
 impl Fault {
-    fn begin(&self, sim: &mut Sim<'_>) {
+    fn begin(&self, sim: &mut Sim<'_>, latencies: &[Duration]) {
         match self.kind {
             FaultKind::Crash => sim.crash(SERVER),
             FaultKind::Partition(client) => sim.partition(SERVER, CLIENTS[client]),
             FaultKind::Hold(client) => sim.hold(SERVER, CLIENTS[client]),
+            FaultKind::Slow(client, more) => {
+                sim.set_link_latency(SERVER, CLIENTS[client], latencies[client] + more);
+            }
         }
     }
 
-    fn end(&self, sim: &mut Sim<'_>) {
+    fn end(&self, sim: &mut Sim<'_>, latencies: &[Duration]) {
         match self.kind {
             FaultKind::Crash => sim.bounce(SERVER),
             FaultKind::Partition(client) => sim.repair(SERVER, CLIENTS[client]),
             FaultKind::Hold(client) => sim.release(SERVER, CLIENTS[client]),
+            FaultKind::Slow(client, _) => {
+                sim.set_link_latency(SERVER, CLIENTS[client], latencies[client]);
+            }
         }
     }
 }
@@ -193,13 +209,10 @@ async fn watch(mut spectator: Spectator, trace: Trace) -> turmoil::Result {
 /// Simulates the run of a seed.
 pub(crate) fn simulate(seed: u64) -> Run {
     let mut chance = ChaCha8Rng::seed_from_u64(seed);
-    let slowest = Duration::from_millis(chance.random_range(2..80));
     let mut sim = Builder::new()
         .rng_seed(seed)
         .simulation_duration(LONGEST)
         .tick_duration(TICK)
-        .min_message_latency(Duration::from_millis(1))
-        .max_message_latency(slowest)
         .build();
     let disk = Disk::new(seed);
     let on_disk = Arc::clone(&disk);
@@ -249,6 +262,10 @@ pub(crate) fn simulate(seed: u64) -> Run {
         watch(spectator, watched).await
     });
 
+    let latencies = CLIENTS.map(|_| latency(&mut chance));
+    for (client, latency) in CLIENTS.iter().zip(latencies) {
+        sim.set_link_latency(SERVER, *client, latency);
+    }
     // The room is made on a good network.
     while room.borrow().is_none() {
         assert!(!sim.step().expect("the room is made"), "nobody plays");
@@ -276,11 +293,11 @@ pub(crate) fn simulate(seed: u64) -> Run {
                 true if is_crash && down > 1 => {}
                 false if is_crash && down > 0 => {}
                 true => {
-                    fault.begin(&mut sim);
+                    fault.begin(&mut sim, &latencies);
                     run.crashes += u32::from(is_crash);
                     run.partitions += u32::from(matches!(fault.kind, FaultKind::Partition(_)));
                 }
-                false => fault.end(&mut sim),
+                false => fault.end(&mut sim, &latencies),
             }
         }
         if sim.step().unwrap_or_else(|error| panic!("{error}")) {
