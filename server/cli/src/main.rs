@@ -19,6 +19,7 @@ mod import;
 mod key;
 mod kind;
 mod leaderboard;
+mod listen;
 mod narration;
 mod numbers;
 mod output;
@@ -39,6 +40,8 @@ mod table;
 mod threads;
 mod token;
 mod tournament;
+#[cfg(feature = "otlp")]
+mod traces;
 mod tui;
 mod verify;
 
@@ -47,7 +50,9 @@ use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{EnvFilter, Layer as _, fmt};
 
 use error::{CommandError, say};
 
@@ -130,7 +135,7 @@ enum Command {
 /// Runs the command.
 fn main() -> ExitCode {
     let result = config::Parsed::<Cli>::from_process().and_then(|parsed| {
-        start_logging(&parsed.cli)?;
+        let _tracing = start_logging(&parsed.cli)?;
         run(parsed)
     });
     match result {
@@ -193,7 +198,7 @@ fn in_runtime(
         .block_on(command)
 }
 
-fn start_logging(cli: &Cli) -> Result<(), CommandError> {
+fn start_logging(cli: &Cli) -> Result<Tracing, CommandError> {
     let filter = EnvFilter::try_new(&cli.log)
         .map_err(|error| format!("--log {:?}: {error}; use for example info", cli.log))?;
     let terminal = io::stderr().is_terminal();
@@ -205,14 +210,29 @@ fn start_logging(cli: &Cli) -> Result<(), CommandError> {
         filter
     };
     let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
-    let logs = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(colours)
-        .with_writer(io::stderr);
-    if cli.log_json {
-        logs.json().init();
-    } else {
-        logs.init();
+    let lines = fmt::layer().with_ansi(colours).with_writer(io::stderr);
+    let lines = match cli.log_json {
+        true => lines.json().boxed(),
+        false => lines.boxed(),
+    };
+    let logs = tracing_subscriber::registry().with(lines.with_filter(filter));
+    #[cfg(feature = "otlp")]
+    if let Command::Serve(command) = &cli.command
+        && let Some(endpoint) = &command.settings.otlp_endpoint
+    {
+        let traces = traces::Traces::to(endpoint)?;
+        logs.with(traces.layer()).init();
+        return Ok(Tracing {
+            _traces: Some(traces),
+        });
     }
-    Ok(())
+    logs.init();
+    Ok(Tracing::default())
+}
+
+/// What writes logs and spans until the end of the process.
+#[derive(Default)]
+struct Tracing {
+    #[cfg(feature = "otlp")]
+    _traces: Option<traces::Traces>,
 }

@@ -1,6 +1,5 @@
 //! `chefshat serve`: runs a server until it is stopped.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,10 +8,12 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::{FalseyValueParser, RangedU64ValueParser};
 use futures::future::OptionFuture;
+use sd_notify::NotifyState;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
+use super::listen::{self, Address};
 use super::{CommandError, data_dir, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::ServerConfig;
@@ -31,13 +32,14 @@ pub(super) struct Settings {
     /// Flags and environment variables override it.
     #[arg(long, env = "CHEFSHAT_CONFIG", value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
-    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 selects a
-    /// free port.
-    #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
+    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051, or a unix socket, such
+    /// as unix:/run/chefshat/chefshat.sock. Port 0 selects a free port. A socket from systemd is used
+    /// instead.
+    #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT|unix:PATH", default_value = "127.0.0.1:50051", value_parser = listen::address)]
     listen: String,
     /// Address and port that serve metrics for Prometheus at /metrics, such as 127.0.0.1:9464. They
     /// contain no names or cards, but anyone who reaches the port can read them. Default: none.
-    #[arg(long, env = "CHEFSHAT_METRICS_LISTEN", value_name = "HOST:PORT", value_parser = host_and_port)]
+    #[arg(long, env = "CHEFSHAT_METRICS_LISTEN", value_name = "HOST:PORT", value_parser = listen::host_and_port)]
     metrics_listen: Option<String>,
     /// Data directory: the database (games.sqlite3) and the records of finished games
     /// (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
@@ -77,6 +79,11 @@ pub(super) struct Settings {
         value_delimiter = ','
     )]
     allowed_hosts: Vec<String>,
+    /// Collector of OpenTelemetry that receives a span for each room and decision, over gRPC, such as
+    /// http://127.0.0.1:4317.
+    #[cfg(feature = "otlp")]
+    #[arg(long, env = "CHEFSHAT_OTLP_ENDPOINT", value_name = "URL")]
+    pub(super) otlp_endpoint: Option<String>,
     /// Whether calls need a token (see `chefshat token`): open or tokens. Default: tokens if the data
     /// directory has any. An open server is refused on addresses that others reach, unless this
     /// says open.
@@ -114,7 +121,7 @@ impl Settings {
     ///
     /// # Errors
     /// One is missing.
-    fn tls(&self, address: SocketAddr) -> Result<Option<TlsFiles>, CommandError> {
+    fn tls(&self, address: &Address) -> Result<Option<TlsFiles>, CommandError> {
         match (&self.tls_cert, &self.tls_key, &self.tls_client_ca) {
             (Some(certificate), Some(key), authority) => Ok(Some(TlsFiles {
                 certificate: certificate.clone(),
@@ -122,7 +129,7 @@ impl Settings {
                 client_authority: authority.clone(),
             })),
             (None, None, None) => {
-                if !address.ip().is_loopback() {
+                if !address.is_local() {
                     eprintln!(
                         "WARNING: connections to {address} are not encrypted: others can read tokens and tickets on the way; use \
                          --tls-cert and --tls-key, or a proxy with TLS"
@@ -142,7 +149,7 @@ impl Settings {
     fn access(
         &self,
         data_dir: Option<&PathBuf>,
-        address: SocketAddr,
+        address: &Address,
     ) -> Result<(AccessSettings, Mode), CommandError> {
         let settings = AccessSettings {
             mode: self.access,
@@ -153,7 +160,7 @@ impl Settings {
             return Err("--access tokens needs a data directory, which has the tokens; leave --no-records out".into());
         }
         let mode = Access::open(&settings, data_dir)?.mode();
-        if mode == Mode::Open && !address.ip().is_loopback() {
+        if mode == Mode::Open && !address.is_local() {
             if settings.mode.is_none() {
                 return Err(format!(
                     "refusing to listen on {address} without tokens: anyone who reaches it could create rooms; create a token with \
@@ -199,17 +206,16 @@ impl Serve {
             }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
-        let listener = listen(&settings.listen, "--listen").await?;
+        let (listener, address) = listen::listen(&settings.listen).await?;
         let metrics_listener = match &settings.metrics_listen {
-            Some(address) => Some(listen(address, "--metrics-listen").await?),
+            Some(address) => Some(listen::tcp(address, "--metrics-listen").await?),
             None => None,
         };
-        let address = listener.local_addr()?;
-        let tls = settings.tls(address)?;
+        let tls = settings.tls(&address)?;
         let scheme = if tls.is_some() { "https" } else { "http" };
-        let (access, mode) = settings.access(data_dir.as_ref(), address)?;
+        let (access, mode) = settings.access(data_dir.as_ref(), &address)?;
         // Pages of other names must not reach a server that trusts everybody on this machine.
-        let is_local = mode == Mode::Open && address.ip().is_loopback();
+        let is_local = mode == Mode::Open && address.is_loopback();
         let store: Arc<dyn Store> = match &data_dir {
             Some(folder) => Arc::new(SqliteStore::open(folder).await?),
             None => Arc::new(MemoryStore::default()),
@@ -259,7 +265,7 @@ impl Serve {
                 "games": server.games(),
             }))?;
         }
-        eprintln!("listening on {scheme}://{address}");
+        eprintln!("listening on {}", address.url(scheme));
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
             eprintln!("metrics at http://{address}/metrics");
             let metrics = Arc::clone(server.metrics());
@@ -272,6 +278,8 @@ impl Serve {
         if !web::is_built_in() {
             eprintln!("the web page is not built in; `cargo xtask web` builds it");
         }
+        // A failure only delays systemd, which says so itself.
+        let _ = sd_notify::notify(&[NotifyState::Ready]);
         let input_ends = self.until_stdin_closes.then(end_of_input);
         let stop = async move {
             tokio::select! {
@@ -279,6 +287,7 @@ impl Serve {
                 _ = interrupt.recv() => {}
                 Some(_) = OptionFuture::from(input_ends) => {}
             }
+            let _ = sd_notify::notify(&[NotifyState::Stopping]);
             eprintln!(
                 "stopping: no new rooms; running games may end within {grace} s, then durable ones are suspended and resume at the next \
                  start; stop again to end at once"
@@ -298,14 +307,6 @@ impl Serve {
         eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
-}
-
-/// Listens on the address of a setting.
-async fn listen(address: &str, flag: &str) -> Result<TcpListener, CommandError> {
-    let listener = TcpListener::bind(address).await.map_err(|error| {
-        format!("cannot listen on {address}: {error}; choose another address with {flag}")
-    })?;
-    Ok(listener)
 }
 
 /// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own
@@ -337,15 +338,6 @@ fn anonymous(text: &str) -> Result<Role, String> {
     }
 }
 
-/// Checks the form of an address; the host is resolved later.
-fn host_and_port(text: &str) -> Result<String, String> {
-    let is_complete = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
-    match text.rsplit_once(':').is_some_and(is_complete) {
-        true => Ok(text.to_owned()),
-        false => Err("use IP:PORT or HOST:PORT, for example 127.0.0.1:50051".to_owned()),
-    }
-}
-
 /// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means
 /// none.
 fn origin(text: &str) -> Result<String, String> {
@@ -366,24 +358,7 @@ fn origin(text: &str) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::serve::{host_and_port, origin};
-
-    #[test]
-    fn addresses_have_a_host_and_a_port() {
-        for good in ["127.0.0.1:0", "localhost:50051", "[::1]:50051"] {
-            assert_eq!(host_and_port(good).as_deref(), Ok(good));
-        }
-        for bad in [
-            "",
-            "50051",
-            ":50051",
-            "localhost",
-            "localhost:http",
-            "localhost:70000",
-        ] {
-            assert!(host_and_port(bad).is_err(), "{bad}");
-        }
-    }
+    use crate::serve::origin;
 
     #[test]
     fn origins_are_as_browsers_send_them() {

@@ -16,6 +16,7 @@ mod cli {
     mod experiment;
     mod export;
     mod import;
+    mod listen;
     mod participant;
     mod ratings;
     mod render;

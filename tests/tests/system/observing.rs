@@ -15,7 +15,7 @@ use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::store::SqliteStore;
 use chefshat_tests::{
-    StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
+    Launch, StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
 };
 use http_body_util::{BodyExt as _, Full};
 use hyper_util::client::legacy::Client as HttpClient;
@@ -184,6 +184,53 @@ async fn connected_seats_streams_and_late_decisions_are_counted() {
     })
     .await;
     assert_eq!(value(&server.text().await, connected), 0.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn each_decision_is_logged_in_the_spans_of_its_room_and_itself() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path())
+        .flags(&["--log-json"])
+        .with("--log", "chefshat_server=debug");
+    let server = launch.start().await.expect("the server starts");
+    let client = Client::connect(&launch.url()).await.expect("it listens");
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let playing = client.play_many(random_agents(tickets.clone()));
+    for outcome in patiently("the game", playing).await {
+        outcome.expect("it ends");
+    }
+    let room = created.room.expect("a room");
+    let record = client.record(&room.game_id).await.expect("it has ended");
+    let mut decided = Vec::new();
+    for line in &record {
+        if let Some(Line::Decision(decision)) = &line.line {
+            decided.push(u64::from(decision.seat));
+        }
+    }
+    let ended = server.stop().await;
+    assert!(ended.status.success(), "{ended:?}");
+
+    let lines = (ended.said.lines()).filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let logged: Vec<Value> = lines
+        .filter(|line| line["fields"]["message"] == "a decision was taken")
+        .collect();
+    let seats: Vec<u64> = (logged.iter())
+        .map(|line| line["spans"][1]["seat"].as_u64().expect("a seat"))
+        .collect();
+    assert_eq!(seats, decided);
+    for line in &logged {
+        assert_eq!(line["fields"]["outcome"], "answered");
+        let names = [&line["spans"][0]["name"], &line["spans"][1]["name"]];
+        assert_eq!(names, ["room", "decision"]);
+        assert_eq!(line["spans"][0]["room"], room.room_id.as_str());
+        assert_eq!(line["spans"][0]["game"], room.game_id.as_str());
+    }
+    for secret in tickets
+        .iter()
+        .chain([&created.owner_token, &created.join_code])
+    {
+        assert!(!ended.said.contains(secret), "a secret in the log");
+    }
 }
 
 /// A file of the source tree.

@@ -69,6 +69,16 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Res
         }
         let test = ["test", "--workspace", "--no-fail-fast"];
         steps.program("cargo test", cargo_command(places).args(test))?;
+        let traces = [
+            "test",
+            "--workspace",
+            "--features",
+            "chefshat/otlp",
+            "--bin",
+            "chefshat",
+            "traces::",
+        ];
+        steps.program("OpenTelemetry", cargo_command(places).args(traces))?;
     }
     if wants(Part::Python) {
         if has_python {
