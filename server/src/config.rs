@@ -7,6 +7,7 @@ use std::time::Duration;
 use chefshat_record::signature::SigningKey;
 
 use crate::access::AccessSettings;
+use crate::forwarded::TrustedProxies;
 use crate::tls::TlsFiles;
 
 /// Largest message a client may send, bytes.
@@ -123,6 +124,8 @@ pub struct ServerConfig {
     /// Names of hosts under which the server may be reached, besides those of this machine; `None`:
     /// any.
     pub allowed_hosts: Option<Vec<String>>,
+    /// Proxies that are trusted to name their clients in `x-forwarded-for`.
+    pub trusted_proxies: TrustedProxies,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
@@ -143,6 +146,7 @@ impl Default for ServerConfig {
             tls: None,
             max_connection_age: None,
             allowed_hosts: None,
+            trusted_proxies: TrustedProxies::default(),
             allowed_origins: Vec::new(),
         }
     }

@@ -84,9 +84,17 @@ pub struct Limits {
     pub first_byte_timeout: Duration,
 }
 
-/// The address of the peer that sent a request, from the request's extensions; `None` for
-/// connections without one, such as those of a unix socket.
+/// The client of a request, in the request's extensions if a trusted proxy named it (`forwarded`).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ForwardedClient(pub(crate) IpAddr);
+
+/// The address of the client that sent a request, from the request's extensions: the one that a
+/// trusted proxy names, else that of the peer. `None` for connections without one, such as those of
+/// a unix socket.
 pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
+    if let Some(ForwardedClient(address)) = extensions.get() {
+        return Some(*address);
+    }
     let info: &TcpConnectInfo = extensions.get()?;
     info.remote_addr()
         .map(|address| address.ip().to_canonical())

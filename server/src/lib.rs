@@ -8,6 +8,7 @@ pub mod config;
 pub mod connections;
 pub mod convert;
 pub mod file_watch;
+pub mod forwarded;
 pub mod grpc;
 pub mod host;
 pub mod metrics;

@@ -26,6 +26,7 @@ use crate::config::{
     ServerConfig,
 };
 use crate::connections::{self, Limits, Listener};
+use crate::forwarded::ForwardedLayer;
 use crate::grpc;
 use crate::metrics::Metrics;
 use crate::rooms::Rooms;
@@ -209,6 +210,7 @@ impl Server {
             .tcp_nodelay(true)
             .http2_max_header_list_size(MAX_HEADER_BYTES)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
+            .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins))
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer)

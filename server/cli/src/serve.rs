@@ -17,6 +17,7 @@ use super::listen::{self, Address};
 use super::{CommandError, data_dir, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::ServerConfig;
+use chefshat_server::forwarded::{IpNet, TrustedProxies, network};
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::signing::key_or_new;
@@ -84,6 +85,16 @@ pub(super) struct Settings {
     #[cfg(feature = "otlp")]
     #[arg(long, env = "CHEFSHAT_OTLP_ENDPOINT", value_name = "URL")]
     pub(super) otlp_endpoint: Option<String>,
+    /// Proxy in front of the server, an address or a network such as 10.0.0.0/8, that names its
+    /// clients in x-forwarded-for. Limits and logs then see the clients. Repeatable.
+    #[arg(
+        long = "trusted-proxy",
+        env = "CHEFSHAT_TRUSTED_PROXY",
+        value_name = "CIDR",
+        value_delimiter = ',',
+        value_parser = network
+    )]
+    trusted_proxies: Vec<IpNet>,
     /// Whether calls need a token (see `chefshat token`): open or tokens. Default: tokens if the data
     /// directory has any. An open server is refused on addresses that others reach, unless this
     /// says open.
@@ -236,6 +247,7 @@ impl Serve {
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,
             allowed_hosts: is_local.then_some(settings.allowed_hosts),
+            trusted_proxies: TrustedProxies::new(settings.trusted_proxies),
             access,
             max_connection_age: (tls.is_some() && settings.connection_age > 0)
                 .then(|| Duration::from_secs(settings.connection_age)),

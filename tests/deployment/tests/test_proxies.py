@@ -14,7 +14,7 @@ import chefshat
 import pytest
 from certificates import client_context
 from chefshat import Decision, RandomAgent, pb
-from chefshat.local_server import LocalServer, clean_environment
+from chefshat.local_server import LocalServer, clean_environment, find_binary
 from proxies import PATIENCE_S, Envoy, HAProxy, Nginx, Proxy
 
 # How long a stream stays idle in the slow test, seconds: more than six minutes.
@@ -135,6 +135,25 @@ def test_the_page_and_grpc_web_pass_over_http_1(proxy: Proxy, server: LocalServe
     assert answer.status == 200
     assert answer.getheader("content-type") == "application/grpc-web+proto"
     assert b"grpc-status:0" in body
+
+
+@pytest.mark.parametrize("kind", [Nginx, HAProxy, Envoy], ids=lambda kind: kind.program)
+def test_the_server_knows_the_addresses_of_clients(kind: type[Proxy], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    client, invented = "127.77.0.5", "192.0.2.1"
+    monkeypatch.setenv("CHEFSHAT_LOG", "info")
+    options = ["--data-dir", str(tmp_path / "data"), "--access", "tokens", "--trusted-proxy", "127.0.0.1"]
+    folder = tmp_path / "proxy"
+    folder.mkdir()
+    with LocalServer(find_binary(), options=options) as server, kind(server.address, folder) as proxy:
+        connection = http.client.HTTPSConnection(
+            proxy.address, context=client_context(), timeout=PATIENCE_S, source_address=(client, 0)
+        )
+        headers = {"content-type": "application/grpc-web+proto", "x-grpc-web": "1", "x-forwarded-for": invented}
+        # Refused without a token, which is logged.
+        connection.request("POST", "/chefshat.v1.RoomService/ListRooms", body=struct.pack(">BI", 0, 0), headers=headers)
+        assert connection.getresponse().status == 200
+        assert f"address={client}" in server.log
+        assert invented not in server.log
 
 
 @pytest.mark.slow

@@ -21,7 +21,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
-    schema(places, steps, "vendor.compose-spec", "docker/compose.yaml")?;
+    for file in ["docker/compose.yaml", "docker/compose.proxy.yaml"] {
+        schema(places, steps, "vendor.compose-spec", file)?;
+    }
     // Kinds of the Gateway API are not among the schemas.
     let manifests = [
         "--strict",

@@ -42,6 +42,9 @@ enum Task {
         /// Run only the tests of one part.
         #[arg(long, value_enum)]
         only: Option<Part>,
+        /// Also run the tests that take many minutes: the images built from source, idle streams.
+        #[arg(long)]
+        slow: bool,
     },
     /// Check format, lints, protocol, licences and images.
     Lint,
@@ -53,7 +56,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut steps = Steps::default();
     let outcome = Places::find().and_then(|places| match cli.task {
-        Task::Test { only } => test::run(&places, &mut steps, only),
+        Task::Test { only, slow } => test::run(&places, &mut steps, only, slow),
         Task::Lint => lint::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
     });

@@ -148,6 +148,19 @@ pub(crate) fn proxies() -> Result<(), Failure> {
     Ok(())
 }
 
+/// Builds images, and the systems they are based on.
+pub(crate) fn images() -> Result<(), Failure> {
+    for (program, name) in [
+        ("buildah", "buildah"),
+        ("/usr/sbin/debootstrap", "debootstrap"),
+    ] {
+        if !succeeds(program, &["--version"]) {
+            debian_package(name)?;
+        }
+    }
+    Ok(())
+}
+
 /// cargo-deny: from the path if it has the right version, else built here. Returns its command.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     let wanted = format!("cargo-deny {CARGO_DENY}");

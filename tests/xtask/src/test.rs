@@ -24,12 +24,18 @@ pub(crate) enum Part {
     Node,
     /// The page for people in clients/web, including browser tests.
     Web,
-    /// The proxies of docker/, with agents in all languages and a browser.
+    /// Backups, and the proxies and images of docker/, with agents in all languages and a browser.
     Deployment,
 }
 
-/// Sets up and runs the tests of one part, or of all.
-pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Result<(), Failure> {
+/// Sets up and runs the tests of one part, or of all; if `slow`, also those of docker/ that take
+/// long.
+pub(crate) fn run(
+    places: &Places,
+    steps: &mut Steps,
+    only: Option<Part>,
+    slow: bool,
+) -> Result<(), Failure> {
     let wants = |part| only.is_none_or(|only| only == part);
     let has_python = !places.python_packages().is_empty();
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
@@ -84,7 +90,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Res
         if has_python {
             for package in places.python_packages() {
                 if package != DEPLOYMENT {
-                    pytest(places, steps, package)?;
+                    pytest(places, steps, package, &[])?;
                 }
             }
             lint::python(places, steps)?;
@@ -112,16 +118,28 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, only: Option<Part>) -> Res
         steps.run("set up proxies and a browser", || {
             setup::proxies().and_then(|()| setup::chromium())
         })?;
-        pytest(places, steps, DEPLOYMENT)?;
+        if let Err(failure) = setup::images() {
+            steps.skip("images", &failure.to_string());
+        }
+        pytest(places, steps, DEPLOYMENT, &[])?;
+        if slow {
+            pytest(places, steps, DEPLOYMENT, &["-m", "slow"])?;
+        }
     }
     Ok(())
 }
 
-fn pytest(places: &Places, steps: &mut Steps, package: &str) -> Result<(), Failure> {
+fn pytest(
+    places: &Places,
+    steps: &mut Steps,
+    package: &str,
+    options: &[&str],
+) -> Result<(), Failure> {
     let cache = places.own.join("pytest").join(package);
     let cache = format!("cache_dir={}", cache.display());
     let mut pytest = python_command(places, package, "pytest");
-    steps.program(&format!("pytest, {package}"), pytest.args(["-o", &cache]))
+    let step = format!("pytest, {package} {}", options.join(" "));
+    steps.program(step.trim_end(), pytest.args(["-o", &cache]).args(options))
 }
 
 fn cargo_command(places: &Places) -> Command {

@@ -1,0 +1,193 @@
+//! The addresses of clients behind proxies. A layer in front of all others notes the client that a
+//! trusted proxy names in `x-forwarded-for`; [`peer_address`] then gives that client's address
+//! instead of the proxy's. What others write there counts for nothing.
+
+use std::net::IpAddr;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use http::{HeaderMap, Request};
+pub use ipnet::IpNet;
+use tower::{Layer, Service};
+
+use crate::connections::{ForwardedClient, peer_address};
+
+/// The header in which proxies list the addresses they forward for, the nearest last.
+const FORWARDED_FOR: &str = "x-forwarded-for";
+
+/// The networks of the proxies that are trusted to name their clients.
+#[derive(Debug, Clone, Default)]
+pub struct TrustedProxies(Arc<[IpNet]>);
+
+impl TrustedProxies {
+    /// Trusts the proxies in these networks.
+    pub fn new(networks: impl IntoIterator<Item = IpNet>) -> Self {
+        Self(networks.into_iter().collect())
+    }
+
+    /// Whether this is the address of a trusted proxy.
+    pub fn contains(&self, address: IpAddr) -> bool {
+        let address = address.to_canonical();
+        self.0.iter().any(|network| network.contains(&address))
+    }
+
+    /// The client for which trusted proxies forward: the last address that is not theirs. Stops at
+    /// what is no address: only what trusted proxies wrote counts.
+    fn client(&self, headers: &HeaderMap) -> Option<IpAddr> {
+        let lines = headers.get_all(FORWARDED_FOR).iter().rev();
+        let mut nearest = None;
+        for entry in lines.flat_map(|line| line.as_bytes().rsplit(|&byte| byte == b',')) {
+            let Some(address) = parse(entry) else {
+                return nearest;
+            };
+            nearest = Some(address);
+            if !self.contains(address) {
+                return nearest;
+            }
+        }
+        nearest
+    }
+}
+
+/// An address, with or without a port.
+fn parse(entry: &[u8]) -> Option<IpAddr> {
+    let text = str::from_utf8(entry).ok()?.trim();
+    let socket = || std::net::SocketAddr::from_str(text).map(|socket| socket.ip());
+    let address = IpAddr::from_str(text).or_else(|_| socket()).ok()?;
+    Some(address.to_canonical())
+}
+
+/// A network, such as 10.0.0.0/8, or a single address.
+///
+/// # Errors
+/// The text is neither.
+pub fn network(text: &str) -> Result<IpNet, String> {
+    let single = || IpAddr::from_str(text).map(IpNet::from);
+    text.parse()
+        .or_else(|_| single())
+        .map_err(|_| "use an address or a network, for example 127.0.0.1 or 10.0.0.0/8".to_owned())
+}
+
+/// Notes the clients of trusted proxies.
+#[derive(Debug, Clone)]
+pub struct ForwardedLayer {
+    trusted: TrustedProxies,
+}
+
+impl ForwardedLayer {
+    /// Believes these proxies.
+    pub fn new(trusted: TrustedProxies) -> Self {
+        Self { trusted }
+    }
+}
+
+impl<S> Layer<S> for ForwardedLayer {
+    type Service = WithClient<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithClient {
+            trusted: self.trusted.clone(),
+            services,
+        }
+    }
+}
+
+/// The services with the layer in front of them.
+#[derive(Debug, Clone)]
+pub struct WithClient<S> {
+    trusted: TrustedProxies,
+    services: S,
+}
+
+impl<S, B> Service<Request<B>> for WithClient<S>
+where
+    S: Service<Request<B>>,
+{
+    type Response = S::Response;
+    type Error = S::Error;
+    type Future = S::Future;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+        let by_proxy = peer_address(request.extensions())
+            .is_some_and(|address| self.trusted.contains(address));
+        if by_proxy && let Some(client) = self.trusted.client(request.headers()) {
+            request.extensions_mut().insert(ForwardedClient(client));
+        }
+        self.services.call(request)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+    use std::net::SocketAddr;
+
+    use futures::FutureExt as _;
+    use tonic::transport::server::TcpConnectInfo;
+    use tower::{ServiceBuilder, service_fn};
+
+    use super::*;
+
+    /// The address that the services see for a request of `peer` with these headers.
+    fn seen(peer: &str, headers: &[&str]) -> String {
+        let trusted = ["10.0.0.0/8", "192.0.2.7", "fd00::/8"].map(|text| network(text).unwrap());
+        let layer = ForwardedLayer::new(TrustedProxies::new(trusted));
+        let mut services = ServiceBuilder::new().layer(layer).service(service_fn(
+            |request: Request<()>| async move {
+                Ok::<_, Infallible>(peer_address(request.extensions()).unwrap())
+            },
+        ));
+        let mut request = Request::new(());
+        for line in headers {
+            let line = line.parse().unwrap();
+            request.headers_mut().append(FORWARDED_FOR, line);
+        }
+        request.extensions_mut().insert(TcpConnectInfo {
+            local_addr: None,
+            remote_addr: Some(SocketAddr::new(peer.parse().unwrap(), 1)),
+        });
+        let answer = services.call(request).now_or_never().expect("ready");
+        answer.expect("infallible").to_string()
+    }
+
+    #[test]
+    fn only_trusted_proxies_name_their_clients() {
+        for (peer, headers, client) in [
+            ("10.1.2.3", &["198.51.100.4"][..], "198.51.100.4"),
+            ("::ffff:10.1.2.3", &["198.51.100.4"], "198.51.100.4"),
+            ("192.0.2.7", &["198.51.100.4:5000"], "198.51.100.4"),
+            ("fd00::1", &["[2001:db8::1]:5000"], "2001:db8::1"),
+            // What the client wrote itself comes before what the proxy added.
+            ("10.1.2.3", &["1.1.1.1, 198.51.100.4"], "198.51.100.4"),
+            ("10.1.2.3", &["1.1.1.1", "198.51.100.4"], "198.51.100.4"),
+            (
+                "10.1.2.3",
+                &["1.1.1.1, 198.51.100.4, 10.9.9.9"],
+                "198.51.100.4",
+            ),
+            ("10.1.2.3", &["unknown, 10.9.9.9"], "10.9.9.9"),
+            ("10.1.2.3", &["1.1.1.1, nonsense"], "10.1.2.3"),
+            ("10.1.2.3", &[], "10.1.2.3"),
+            // A stranger.
+            ("198.51.100.9", &["10.0.0.1"], "198.51.100.9"),
+            ("192.0.2.8", &["1.1.1.1"], "192.0.2.8"),
+        ] {
+            assert_eq!(seen(peer, headers), client, "{peer} {headers:?}");
+        }
+    }
+
+    #[test]
+    fn networks_are_addresses_with_or_without_a_prefix() {
+        for good in ["127.0.0.1", "10.0.0.0/8", "::1", "fd00::/8"] {
+            assert!(network(good).is_ok(), "{good}");
+        }
+        for bad in ["", "localhost", "10.0.0.0/33", "10.0.0", "*"] {
+            assert!(network(bad).is_err(), "{bad}");
+        }
+    }
+}
