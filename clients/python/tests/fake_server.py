@@ -54,7 +54,7 @@ class FakeServer(
             # Answers any number of pings, as the real server does.
             ("grpc.http2.max_ping_strikes", 0),
         ]
-        interceptors = [self.guard] if token else []
+        interceptors: list[grpc.ServerInterceptor] = [self.guard] if token else []
         self._server = grpc.server(futures.ThreadPoolExecutor(max_workers=32), options=options, interceptors=interceptors)
         play_grpc.add_PlayServiceServicer_to_server(self, self._server)
         room_grpc.add_RoomServiceServicer_to_server(self, self._server)

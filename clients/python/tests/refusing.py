@@ -1,13 +1,14 @@
 """Refusals of fake services, with the error details of the protocol."""
 
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn, TypeAlias
 
 import grpc
 from google.protobuf import any_pb2
 from google.rpc import error_details_pb2, status_pb2
 
 Context = grpc.ServicerContext
+Handler: TypeAlias = "grpc.RpcMethodHandler[Any, Any]"
 
 
 def refuse(context: Context, code: grpc.StatusCode, reason: str, message: str, **metadata: str) -> NoReturn:
@@ -29,9 +30,9 @@ class Guard(grpc.ServerInterceptor):
 
     def intercept_service(
         self,
-        continuation: Callable[[grpc.HandlerCallDetails], grpc.RpcMethodHandler | None],
+        continuation: Callable[[grpc.HandlerCallDetails], Handler | None],
         details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler | None:
+    ) -> Handler | None:
         """Passes on a call with the token; otherwise says whether it is missing or unknown."""
         self.calls += 1
         given = dict(details.invocation_metadata).get("authorization")

@@ -9,7 +9,7 @@ import jax
 import numpy as np
 import pytest
 
-from chefshat import pb
+from chefshat import ServerAddress, pb
 from chefshat.experiments import learning, rules, stats, winning
 from chefshat.experiments.learning import Learned
 from chefshat.experiments.progress import Progress
@@ -52,7 +52,7 @@ def test_statistics_follow_from_places_and_counts() -> None:
 
 
 def test_the_tables_have_the_counts(tmp_path: Path) -> None:
-    config = Config("", (1, 2), True, tmp_path)
+    config = Config(ServerAddress(""), (1, 2), True, tmp_path)
     both = dict.fromkeys(rules.CONDITIONS, SOME)
     actions = {str(row[0]): row[2] for row in rules._actions(config, both).rows}
     assert actions["wrong actions of the learner, per Shift"] == stats.spread([10 / 3, 20])
@@ -81,22 +81,22 @@ def never(*_: object, **__: object) -> Learned:
 @pytest.mark.server
 def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quiet = Progress(show=False)
-    both = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
+    both = rules.networks(Config(ServerAddress(real_address), (1, 2), True, tmp_path), quiet)
     files = sorted(path.name for path in tmp_path.iterdir())
     assert files == ["rules-seed-1.safetensors", "rules-seed-2.safetensors"]
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
-        again = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
+        again = rules.networks(Config(ServerAddress(real_address), (1, 2), True, tmp_path), quiet)
     # A seed gives the same result alone and beside another.
     (tmp_path / "alone").mkdir()
-    alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
+    alone = rules.networks(Config(ServerAddress(real_address), (2,), True, tmp_path / "alone"), quiet)
     jax.tree.map(np.testing.assert_array_equal, both, again)
     jax.tree.map(lambda first, third: np.testing.assert_array_equal(first[1], third[0]), both, alone)
 
 
 @pytest.mark.server
 def test_networks_of_other_settings_are_learned_again(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick = Config(real_address, (1, 2), True, tmp_path)
+    quick = Config(ServerAddress(real_address), (1, 2), True, tmp_path)
     ruleset = pb.RuleSet(players=4, faces=11, jokers=2)
     made = rules.CONDITIONS[rules.FIRST].agent
     agents = deep_q.start(made, quick.seeds)
