@@ -1,5 +1,6 @@
 //! System tests over real sockets, from the view of participants, spectators and strangers.
 
+mod access;
 mod answers;
 mod attendant;
 mod beginnings;
@@ -8,6 +9,7 @@ mod connections;
 mod cup;
 mod database;
 mod doors;
+mod encrypted;
 mod examiner;
 mod faults;
 mod languages;

@@ -1,0 +1,417 @@
+//! Tokens, roles and scopes over real sockets. The role matrix is asked of a running server and
+//! must be the table in docs/access.md.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use chefshat_client::{Client, ConnectOptions, Error};
+use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
+use chefshat_room::ids::Id;
+use chefshat_server::access::{
+    AccessSettings, CALLS, Call, Mode, NewToken, Role, Scope, Scoped, TokenFile, TokenId,
+};
+use chefshat_server::store::MemoryStore;
+use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
+use http::{Request, StatusCode};
+use http_body_util::Full;
+use hyper_util::client::legacy::Client as HttpClient;
+use hyper_util::client::legacy::connect::HttpConnector;
+use hyper_util::rt::TokioExecutor;
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+/// A call without fields: the frame of an empty message.
+const EMPTY_CALL: &[u8] = &[0; 5];
+/// What starts the paths of this project's services.
+const PACKAGE: &str = "/chefshat.v1.";
+/// The line in docs/access.md before the table.
+const TABLE_FOLLOWS: &str =
+    "<!-- The table is compared with a running server by tests/tests/system/access.rs. -->\n";
+
+/// A server that requires tokens.
+struct Guarded {
+    server: TestServer,
+    tokens: TokenFile,
+}
+
+impl Guarded {
+    async fn start() -> Self {
+        let require = |config: &mut chefshat_server::config::ServerConfig| {
+            config.access = AccessSettings {
+                mode: Some(Mode::Tokens),
+                ..AccessSettings::default()
+            };
+        };
+        let server = TestServer::with(require, Arc::new(MemoryStore::default())).await;
+        let tokens = TokenFile::of(server.data_dir());
+        Self { server, tokens }
+    }
+
+    /// Creates a token.
+    fn token(
+        &self,
+        role: Role,
+        scope: Option<Scope>,
+        lifetime: Option<Duration>,
+    ) -> (TokenId, String) {
+        let created = self.tokens.create(NewToken {
+            role,
+            label: String::new(),
+            lifetime,
+            scope,
+        });
+        let created = created.expect("the data folder is writable");
+        (created.id, created.to_text())
+    }
+
+    /// Waits until the server knows a token.
+    async fn knows(&self, token: &str) {
+        let known = async {
+            while self
+                .refusal("/chefshat.v1.PlayService/Act", Some(token))
+                .await
+                == Some("TOKEN_UNKNOWN".to_owned())
+            {
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+        };
+        patiently("the server to read the token", known).await;
+    }
+
+    async fn client(&self, token: &str) -> Client {
+        let options = ConnectOptions {
+            token: Some(token.to_owned()),
+            ca: None,
+        };
+        let client = Client::connect_with(self.server.url(), &options).await;
+        client.expect("the server listens")
+    }
+
+    /// A token with its client.
+    async fn caller(&self, role: Role, scope: Option<Scope>) -> (TokenId, Client) {
+        let (id, token) = self.token(role, scope, None);
+        self.knows(&token).await;
+        (id, self.client(&token).await)
+    }
+
+    /// Why access refuses an empty call, if it does.
+    async fn refusal(&self, path: &str, token: Option<&str>) -> Option<String> {
+        let mut request = Request::post(format!("{}{path}", self.server.url()))
+            .header("content-type", "application/grpc")
+            .header("te", "trailers");
+        if let Some(token) = token {
+            request = request.header("authorization", format!("Bearer {token}"));
+        }
+        let body = Full::new(Bytes::from_static(EMPTY_CALL));
+        let request = request.body(body).expect("a request");
+        let answering = http_client().request(request);
+        let response = patiently("the headers of an answer", answering).await;
+        let response = response.expect("the server answers");
+        assert_eq!(response.status(), StatusCode::OK, "{path}");
+        // A refused call is answered with headers alone; others are not read further.
+        let status = Status::from_header_map(response.headers())?;
+        let reason = status.get_details_error_info()?.reason;
+        let ours = [
+            "TOKEN_MISSING",
+            "TOKEN_UNKNOWN",
+            "TOKEN_EXPIRED",
+            "ROLE_TOO_LOW",
+            "OUT_OF_SCOPE",
+        ];
+        ours.contains(&reason.as_str()).then_some(reason)
+    }
+}
+
+fn http_client() -> HttpClient<HttpConnector, Full<Bytes>> {
+    HttpClient::builder(TokioExecutor::new())
+        .http2_only(true)
+        .build_http()
+}
+
+fn reason_of(error: &Error) -> Option<&str> {
+    error.reason()
+}
+
+#[tokio::test]
+async fn every_call_has_the_role_that_the_documentation_says() {
+    let guarded = Guarded::start().await;
+    let elsewhere = Some(Scope::Room(Id::random()));
+    let minute = Some(Duration::from_secs(3_600));
+    let callers: Vec<(&str, Option<String>)> = vec![
+        ("no token", None),
+        (
+            "spectator",
+            Some(guarded.token(Role::Spectator, None, minute).1),
+        ),
+        ("player", Some(guarded.token(Role::Player, None, minute).1)),
+        ("host", Some(guarded.token(Role::Host, None, minute).1)),
+        ("admin", Some(guarded.token(Role::Admin, None, minute).1)),
+        (
+            "expired",
+            Some(guarded.token(Role::Admin, None, Some(Duration::ZERO)).1),
+        ),
+        (
+            "host, scoped",
+            Some(guarded.token(Role::Host, elsewhere, minute).1),
+        ),
+    ];
+    let newest = callers.last().and_then(|(_, token)| token.as_deref());
+    guarded.knows(newest.expect("a token")).await;
+
+    let mut calls: Vec<&Call> = CALLS
+        .iter()
+        .filter(|it| it.path.starts_with(PACKAGE))
+        .collect();
+    calls.sort_by_key(|call| call.path);
+    let mut table = String::from("\n| call |");
+    callers
+        .iter()
+        .for_each(|(name, _)| table += &format!(" {name} |"));
+    table += "\n|---|";
+    callers.iter().for_each(|_| table += "---|");
+    table += "\n";
+    for call in calls {
+        table += &format!("| `{}` |", call.path.trim_start_matches(PACKAGE));
+        for (name, token) in &callers {
+            let refusal = guarded.refusal(call.path, token.as_deref()).await;
+            let cell = match refusal {
+                Some(reason) => format!("`{reason}`"),
+                None if *name == "host, scoped" && call.scoped == Scoped::Compared => {
+                    "in its scope".to_owned()
+                }
+                None => "yes".to_owned(),
+            };
+            table += &format!(" {cell} |");
+        }
+        table += "\n";
+    }
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/access.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let (_, rest) = page
+        .split_once(TABLE_FOLLOWS)
+        .expect("the line before the table");
+    let documented = rest.split("\n\n").next().expect("the table");
+    assert_eq!(
+        documented.trim(),
+        table.trim(),
+        "docs/access.md should have:\n{table}"
+    );
+}
+
+#[tokio::test]
+async fn a_scoped_token_reaches_its_room_alone() {
+    let guarded = Guarded::start().await;
+    let (_, host) = guarded.caller(Role::Host, None).await;
+    let (mine, tickets) = room_of_four(&host, one_shift(), v1::RoomPolicy::default()).await;
+    let (other, other_tickets) = room_of_four(&host, one_shift(), v1::RoomPolicy::default()).await;
+    let room = mine.room.expect("a room");
+    let other_room = other.room.expect("a room");
+    let scope = Scope::Room(Id::parse(&room.room_id).expect("an id"));
+    let (_, scoped) = guarded.caller(Role::Host, Some(scope)).await;
+
+    let rooms = scoped
+        .list_rooms(v1::ListRoomsRequest::default())
+        .await
+        .expect("a list")
+        .rooms;
+    let ids: Vec<_> = rooms.iter().map(|it| &it.room_id).collect();
+    assert_eq!(ids, [&room.room_id]);
+    scoped.get_room(&room.room_id).await.expect("its room");
+    let refused = |error: Error| assert_eq!(reason_of(&error), Some("OUT_OF_SCOPE"), "{error}");
+    refused(
+        scoped
+            .get_room(&other_room.room_id)
+            .await
+            .expect_err("another room"),
+    );
+    refused(
+        scoped
+            .close_room(&other_room.room_id, &other.owner_token)
+            .await
+            .expect_err("another"),
+    );
+    refused(
+        scoped
+            .leave_room(&other_tickets[0])
+            .await
+            .expect_err("another room"),
+    );
+    let join = v1::JoinRoomRequest {
+        join_code: other.join_code.clone(),
+        name: "stranger".to_owned(),
+        ..v1::JoinRoomRequest::default()
+    };
+    refused(scoped.join(join).await.expect_err("another room"));
+    let watch = |room_id: &str| v1::SpectatorServiceWatchRequest {
+        room_id: room_id.to_owned(),
+        ..v1::SpectatorServiceWatchRequest::default()
+    };
+    let mut spectate = SpectatorServiceClient::new(scoped.channel());
+    let error = spectate
+        .watch(watch(&other_room.room_id))
+        .await
+        .expect_err("another room");
+    assert_eq!(error.code(), Code::PermissionDenied);
+    spectate
+        .watch(watch(&room.room_id))
+        .await
+        .expect("its room");
+
+    // Records of both games, seen by the scoped token and by a spectator.
+    for tickets in [tickets, other_tickets] {
+        let agents = chefshat_tests::random_agents(tickets);
+        for outcome in patiently("the game to end", host.play_many(agents)).await {
+            outcome.expect("the game ended");
+        }
+    }
+    let listed = scoped
+        .list_records(v1::ListRecordsRequest::default())
+        .await
+        .expect("a list");
+    let games: Vec<_> = listed.records.iter().map(|it| &it.game_id).collect();
+    assert_eq!(games, [&room.game_id]);
+    scoped.record(&room.game_id).await.expect("its record");
+    refused(
+        scoped
+            .record(&other_room.game_id)
+            .await
+            .expect_err("another record"),
+    );
+}
+
+#[tokio::test]
+async fn what_is_only_for_the_record_is_for_hosts() {
+    let guarded = Guarded::start().await;
+    let (_, host) = guarded.caller(Role::Host, None).await;
+    let (_, spectator) = guarded.caller(Role::Spectator, None).await;
+    let (created, tickets) = room_of_four(&host, one_shift(), v1::RoomPolicy::default()).await;
+    for (record_only, label) in [(true, "secret"), (false, "joy")] {
+        let expression = v1::Expression {
+            label: label.to_owned(),
+            media: "file.mp4".to_owned(),
+            record_only,
+            ..v1::Expression::default()
+        };
+        host.express(&tickets[0], expression)
+            .await
+            .expect("expressed");
+    }
+    let agents = chefshat_tests::random_agents(tickets);
+    for outcome in patiently("the game to end", host.play_many(agents)).await {
+        outcome.expect("the game ended");
+    }
+    let game = created.room.expect("a room").game_id;
+    let all = format!("{:?}", host.record(&game).await.expect("a record"));
+    let some = format!("{:?}", spectator.record(&game).await.expect("a record"));
+    for (word, for_spectators) in [("secret", false), ("file.mp4", false), ("joy", true)] {
+        assert!(all.contains(word), "{word}");
+        assert_eq!(some.contains(word), for_spectators, "{word}");
+    }
+}
+
+#[tokio::test]
+async fn a_stream_ends_with_its_token_and_no_other_does() {
+    let guarded = Guarded::start().await;
+    let (_, host) = guarded.caller(Role::Host, None).await;
+    let created = host
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("a room");
+    let room_id = created.room.expect("a room").room_id;
+    let (revoked, first) = guarded.caller(Role::Spectator, None).await;
+    let (_, second) = guarded.caller(Role::Spectator, None).await;
+    let mut streams = Vec::new();
+    for client in [&first, &second] {
+        let request = v1::SpectatorServiceWatchRequest {
+            room_id: room_id.clone(),
+            ..v1::SpectatorServiceWatchRequest::default()
+        };
+        let watching = SpectatorServiceClient::new(client.channel())
+            .watch(request)
+            .await;
+        let mut stream = watching.expect("a stream").into_inner();
+        stream.message().await.expect("no error").expect("the room");
+        streams.push(stream);
+    }
+    guarded
+        .tokens
+        .revoke(revoked)
+        .expect("written")
+        .expect("a token");
+    let ended = async {
+        loop {
+            match streams[0].message().await {
+                // A heartbeat.
+                Ok(Some(_)) => {}
+                ended => break ended,
+            }
+        }
+    };
+    let status = patiently("the stream to end", ended)
+        .await
+        .expect_err("revoked");
+    assert_eq!(status.code(), Code::Unauthenticated);
+    let info = status.get_details_error_info().expect("error info");
+    assert_eq!(info.reason, "TOKEN_UNKNOWN");
+    let error = first.get_room(&room_id).await.expect_err("revoked");
+    assert_eq!(reason_of(&error), Some("TOKEN_UNKNOWN"));
+
+    host.close_room(&room_id, &created.owner_token)
+        .await
+        .expect("its room");
+    let events = async {
+        loop {
+            let message = streams[1].message().await.expect("no error");
+            let message = message.expect("the end of the game comes first");
+            if !message.events.is_empty() {
+                break;
+            }
+        }
+    };
+    patiently("the other stream to continue", events).await;
+}
+
+#[tokio::test]
+async fn an_open_server_needs_no_token_and_lets_nobody_operate_it() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    play_out(&server, tickets).await;
+    let path = format!("{}/chefshat.v1.RoomService/NoSuchCall", server.url());
+    let body = Full::new(Bytes::from_static(EMPTY_CALL));
+    let request = Request::post(path)
+        .header("content-type", "application/grpc")
+        .body(body);
+    let answer = http_client()
+        .request(request.expect("a request"))
+        .await
+        .expect("an answer");
+    let status = Status::from_header_map(answer.headers()).expect("a status");
+    assert_eq!(status.code(), Code::Unimplemented);
+}
+
+#[tokio::test]
+async fn a_foreign_page_creates_no_room() {
+    let server = TestServer::start().await;
+    let create = |origin: &'static str| {
+        let path = format!("{}/chefshat.v1.RoomService/CreateRoom", server.url());
+        // What a page may send without being asked first.
+        let request = Request::post(path)
+            .header("content-type", "text/plain")
+            .header("origin", origin)
+            .body(Full::new(Bytes::from_static(EMPTY_CALL)));
+        http_client().request(request.expect("a request"))
+    };
+    let refused = create("https://evil.net").await.expect("an answer");
+    assert_eq!(refused.status(), StatusCode::FORBIDDEN);
+    let status = Status::from_header_map(refused.headers()).expect("a status");
+    assert_eq!(status.code(), Code::PermissionDenied);
+    let client = server.client().await;
+    let rooms = client
+        .list_rooms(v1::ListRoomsRequest::default())
+        .await
+        .expect("a list");
+    assert_eq!(rooms.rooms, []);
+}
