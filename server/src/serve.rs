@@ -304,7 +304,7 @@ fn routes(
         RecordServiceServer::new(grpc::Records::new(
             recorded,
             Arc::clone(tournaments),
-            config.allow_import,
+            config,
         ))
         .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )

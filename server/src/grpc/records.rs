@@ -10,6 +10,7 @@ use chefshat_proto::v1::{
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::jsonl::excess;
 use chefshat_record::replay;
+use chefshat_record::signature::SigningKey;
 use chefshat_record::summary::summary;
 use futures::Stream;
 use prost::Message as _;
@@ -25,7 +26,7 @@ use super::status::{disk_nearly_full, field, has_reason, status};
 use crate::access::{Caller, Role};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
-    RECORD_SEND_TIMEOUT,
+    RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use crate::store::Part;
 use crate::tournaments::Tournaments;
@@ -47,17 +48,20 @@ pub struct Records {
     sending: Arc<Semaphore>,
     receiving: Arc<Semaphore>,
     allow_import: bool,
+    /// Signs records of which parts are left out.
+    key: Option<Arc<SigningKey>>,
 }
 
 impl Records {
     /// Creates the service for these games.
-    pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, allow_import: bool) -> Self {
+    pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, config: &ServerConfig) -> Self {
         Self {
             recorded,
             tournaments,
             sending: Arc::new(Semaphore::new(MAX_RECORDS_SENT)),
             receiving: Arc::new(Semaphore::new(MAX_IMPORTS)),
-            allow_import,
+            allow_import: config.allow_import,
+            key: config.signing_key.clone(),
         }
     }
 
@@ -92,7 +96,8 @@ impl Records {
                 }
                 let _permit = permit(&self.sending).await;
                 let role = caller.role;
-                let shown = move |lines| seen_by(role, lines);
+                let key = self.key.clone();
+                let shown = move |lines| seen_by(role, key.as_deref(), lines);
                 let lines = self.recorded.of_game(&summary.game_id, shown).await;
                 let lines = match lines {
                     // Withheld while games with the same deals are being played.
@@ -149,6 +154,7 @@ impl RecordService for Records {
         let caller = Caller::of(request.extensions());
         let permit = permit(&self.sending).await;
         let game_id = request.into_inner().game_id;
+        let key = self.key.clone();
         let shown = move |lines: Vec<v1::RecordLine>| {
             let header = lines.first().and_then(|line| match &line.line {
                 Some(Line::Header(header)) => Some(header),
@@ -157,7 +163,7 @@ impl RecordService for Records {
             check(&caller, |caller| {
                 header.is_some_and(|it| reaches(caller, &it.room_id, &it.tournament_id))
             })?;
-            Ok::<_, Status>(seen_by(caller.role, lines))
+            Ok::<_, Status>(seen_by(caller.role, key.as_deref(), lines))
         };
         let lines = self.recorded.of_game(&game_id, shown).await??;
         let (sender, responses) = channel();
@@ -242,23 +248,40 @@ fn reaches(caller: &Caller, room: &str, tournament: &str) -> bool {
 }
 
 /// A record as a role may see it: what was only for the record, and references to media, are for
-/// hosts.
-fn seen_by(role: Role, mut lines: Vec<v1::RecordLine>) -> Vec<v1::RecordLine> {
+/// hosts. If anything is left out of a record that this server signed, it signs what remains.
+fn seen_by(
+    role: Role,
+    key: Option<&SigningKey>,
+    mut lines: Vec<v1::RecordLine>,
+) -> Vec<v1::RecordLine> {
     if role >= Role::Host {
         return lines;
     }
+    let count = lines.len();
     lines.retain(|line| !matches!(line.line, Some(Line::PrivateExpression(_))));
+    let mut changed = lines.len() < count;
+    let mut signature = None;
     for line in &mut lines {
         match &mut line.line {
-            Some(Line::Decision(decision)) => decision.annotations = None,
+            Some(Line::Decision(decision)) => changed |= decision.annotations.take().is_some(),
             Some(Line::Event(event)) => {
                 if let Some(Kind::ExpressionShown(shown)) = &mut event.kind
                     && let Some(expression) = &mut shown.expression
                 {
-                    expression.media.clear();
+                    changed |= !std::mem::take(&mut expression.media).is_empty();
                 }
             }
+            Some(Line::Footer(footer)) if changed => signature = footer.signature.take(),
             _ => {}
+        }
+    }
+    let ours = |signed: &v1::RecordSignature| {
+        key.filter(|key| key.public().0.as_slice() == signed.public_key)
+    };
+    if let Some(key) = signature.as_ref().and_then(ours) {
+        let signed = key.sign(&lines);
+        if let Some(Line::Footer(footer)) = lines.last_mut().and_then(|line| line.line.as_mut()) {
+            footer.signature = Some(signed);
         }
     }
     lines

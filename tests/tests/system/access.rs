@@ -8,6 +8,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use chefshat_client::{Client, ConnectOptions, Error};
 use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
+use chefshat_record::replay::replay;
+use chefshat_record::signature::{self, SigningKey};
 use chefshat_room::ids::Id;
 use chefshat_server::access::{
     AccessSettings, CALLS, Call, Mode, NewToken, Role, Scope, Scoped, TokenFile, TokenId,
@@ -39,6 +41,7 @@ struct Guarded {
 impl Guarded {
     async fn start() -> Self {
         let require = |config: &mut chefshat_server::config::ServerConfig| {
+            config.signing_key = Some(Arc::new(SigningKey::from_seed(&[7; 32])));
             config.access = AccessSettings {
                 mode: Some(Mode::Tokens),
                 ..AccessSettings::default()
@@ -303,8 +306,15 @@ async fn what_is_only_for_the_record_is_for_hosts() {
         outcome.expect("the game ended");
     }
     let game = created.room.expect("a room").game_id;
-    let all = format!("{:?}", host.record(&game).await.expect("a record"));
-    let some = format!("{:?}", spectator.record(&game).await.expect("a record"));
+    let all = host.record(&game).await.expect("a record");
+    let some = spectator.record(&game).await.expect("a record");
+    // Both are signed, and both are records.
+    for lines in [&all, &some] {
+        let signer = signature::signer(lines).expect("a valid signature");
+        assert_eq!(signer, Some(SigningKey::from_seed(&[7; 32]).public()));
+        replay(lines).expect("a valid record");
+    }
+    let (all, some) = (format!("{all:?}"), format!("{some:?}"));
     for (word, for_spectators) in [("secret", false), ("file.mp4", false), ("joy", true)] {
         assert!(all.contains(word), "{word}");
         assert_eq!(some.contains(word), for_spectators, "{word}");

@@ -48,7 +48,7 @@ export function ThisMachine() {
     <div class={css.here}>
       <Notice kind="hint">
         <span>
-          {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"}</code>
+          {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"} --access open</code>
           {words.thenOpen}
         </span>
       </Notice>
