@@ -5,6 +5,7 @@ import { spawn } from "node:child_process";
 import { once } from "node:events";
 import { mkdirSync, readFileSync } from "node:fs";
 import { mkdir, mkdtemp, readFile, readdir, rm, stat, writeFile } from "node:fs/promises";
+import { connect, createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -187,6 +188,39 @@ test("TLS with an authority of its own, and a token with every call", async () =
   await assert.rejects(play({ ...way, ticket: "a ticket" }), /a token is needed/);
   assert.equal(server.calls, 4, "refused once each");
   await assert.rejects(play({ ...way, ca: undefined }), /self-signed certificate/);
+});
+
+test("a connection that goes silent is replaced", async () => {
+  const ends = async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  };
+  const sockets = [];
+  const falls = async (stream, read) => {
+    await read();
+    // Both directions stay open, but nothing more arrives.
+    for (const socket of sockets) socket.pause();
+    stream.write({ updates: [attached] });
+  };
+  const server = await serve(falls, ends);
+  const [host, port] = server.address.split(":");
+  const relay = createServer((near) => {
+    const far = connect({ host, port });
+    if (server.remaining.length === 2) sockets.push(near, far);
+    for (const [from, to] of [[near, far], [far, near]]) {
+      from.on("data", (bytes) => { if (!from.isPaused()) to.write(bytes); });
+      from.on("close", () => to.destroy()).on("error", () => to.destroy());
+    }
+  });
+  await once(relay.listen(0, "127.0.0.1"), "listening");
+  try {
+    const address = `127.0.0.1:${relay.address().port}`;
+    assert.deepEqual(await play({ address, ticket: "a ticket" }), { seat: 2, standings: STANDINGS });
+    assert.equal(server.remaining.length, 0);
+  } finally {
+    for (const socket of sockets) socket.destroy();
+    relay.close();
+  }
 });
 
 /** An update of a seat that the server attached: `number` counts these seats from 0. */
