@@ -1,6 +1,6 @@
 // The setup of a browser test: a server with the built page, and a browser for several people.
 
-import { type ChildProcess, spawn } from "node:child_process";
+import { type ChildProcess, execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -30,9 +30,24 @@ export class Server {
     const running = process.env.CHEFSHAT_URL && new URL(process.env.CHEFSHAT_URL);
     const { CHEFSHAT_DATA_DIR: runningData = "" } = process.env;
     if (running) return new Server(undefined, runningData, running.host, running.protocol.replace(":", ""));
-    const dataDir = mkdtempSync(join(tmpdir(), "chefshat-web-"));
+    return Server.startIn(dataFolder());
+  }
+
+  /** Starts the server CHEFSHAT_BIN so that every call requires a token (`tokenFor`). */
+  static async startWithTokens(): Promise<Server> {
+    const dataDir = dataFolder();
+    createToken(dataDir, "admin");
+    return Server.startIn(dataDir);
+  }
+
+  private static async startIn(dataDir: string): Promise<Server> {
     const { child, address } = await serve(dataDir, "127.0.0.1:0");
     return new Server(child, dataDir, address);
+  }
+
+  /** A new token with a role. The server reads it soon after. */
+  tokenFor(role: string): string {
+    return createToken(this.dataDir, role);
   }
 
   /** Address of the page. */
@@ -105,12 +120,27 @@ export async function until(holds: () => boolean | Promise<boolean>): Promise<vo
   await vi.waitUntil(holds, { timeout: PATIENCE_MS });
 }
 
-async function serve(dataDir: string, listen: string): Promise<{ child: ChildProcess; address: string }> {
-  const program = process.env.CHEFSHAT_BIN;
-  if (!program)
+function dataFolder(): string {
+  return mkdtempSync(join(tmpdir(), "chefshat-web-"));
+}
+
+function program(): string {
+  const named = process.env.CHEFSHAT_BIN;
+  if (!named)
     throw new Error("CHEFSHAT_BIN must name the server: cargo build, then CHEFSHAT_BIN=…/target/debug/chefshat");
+  return named;
+}
+
+function createToken(dataDir: string, role: string): string {
+  return execFileSync(program(), ["token", "create", "--role", role, "--data-dir", dataDir], {
+    encoding: "utf8",
+    stdio: ["ignore", "pipe", "ignore"],
+  }).trim();
+}
+
+async function serve(dataDir: string, listen: string): Promise<{ child: ChildProcess; address: string }> {
   const args = ["serve", "--listen", listen, "--data-dir", dataDir, "--json", "--until-stdin-closes"];
-  const child = spawn(program, args, { stdio: ["pipe", "pipe", "ignore"] });
+  const child = spawn(program(), args, { stdio: ["pipe", "pipe", "ignore"] });
   for await (const line of createInterface({ input: child.stdout })) {
     const said: unknown = JSON.parse(line);
     if (typeof said === "object" && said !== null && "address" in said) return { child, address: String(said.address) };
