@@ -46,12 +46,18 @@ def toy() -> Iterator[FakeVector]:
 
 
 @pytest.fixture(scope="session")
-def real_address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of the real server, one for the complete run. Fails if CHEFSHAT_BIN names a binary that does not serve."""
+def real_binary() -> Path:
+    """The program of the real server. Skips the test if there is none."""
     binary = os.environ.get(BINARY)
     if not binary:
         pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
-    with RealServer(Path(binary), tmp_path_factory.mktemp("data")) as server:
+    return Path(binary)
+
+
+@pytest.fixture(scope="session")
+def real_address(real_binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of the real server, one for the complete run. Fails if CHEFSHAT_BIN names a binary that does not serve."""
+    with RealServer(real_binary, tmp_path_factory.mktemp("data")) as server:
         yield server.address
 
 

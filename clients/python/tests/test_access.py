@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from fake_server import TLS, FakeServer
 from proxy import Proxy
 
 import chefshat
-from chefshat import Backoff, ChefsHatError, Decision, SeatResult, ServerAddress, aio, pb
+from chefshat import Backoff, ChefsHatError, Decision, LocalServer, SeatResult, ServerAddress, aio, pb
 from chefshat import agent as command
 from chefshat.channels import CA, TOKEN, channel
 
@@ -57,6 +58,18 @@ def play(request: pytest.FixtureRequest) -> Player:
 
 def test_a_game_is_played_with_tls_and_a_token(guarded: FakeServer, play: Player) -> None:
     assert play(ServerAddress(guarded.address, SECRET, AUTHORITY), chefshat.RandomAgent(1)).finished
+
+
+@pytest.mark.server
+def test_the_real_server_with_tls_and_tokens(real_binary: Path, tmp_path: Path, play: Player) -> None:
+    create = [str(real_binary), "token", "create", "--role", "host", "--data-dir", str(tmp_path)]
+    token = subprocess.run(create, capture_output=True, text=True, check=True).stdout.strip()
+    tls = ["--tls-cert", str(AUTHORITY), "--tls-key", str(TLS / "localhost.key")]
+    with LocalServer(real_binary, options=["--data-dir", str(tmp_path), *tls]) as server:
+        address = f"https://{server.address}"
+        with pytest.raises(ChefsHatError, match="TOKEN_MISSING"):
+            play(ServerAddress(address, token="", ca=AUTHORITY), chefshat.RandomAgent(1))
+        assert play(ServerAddress(address, token, AUTHORITY), chefshat.RandomAgent(1)).finished
 
 
 def test_token_and_authorities_come_from_the_environment(

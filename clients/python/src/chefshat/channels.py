@@ -80,9 +80,9 @@ def target(address: str) -> Target:
 
 
 def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
-    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`."""
+    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`, or replace them."""
     where = target(server.address)
-    together = [*CHANNEL_OPTIONS, *options]
+    together = list({**dict(CHANNEL_OPTIONS), **dict(options)}.items())
     if where.tls:
         opened = grpc.secure_channel(where.authority, _credentials(server.ca), together)
     else:

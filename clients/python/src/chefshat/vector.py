@@ -45,6 +45,13 @@ __all__ = [
 
 # Maximum bytes of a message: the largest batch has a quarter of them (`max_vector_batch_bytes`), a part of a record far fewer.
 MAX_BATCH_BYTES = 64 * 1024 * 1024
+# An environment cannot reconnect and has no clock, so it is patient with a busy server. Times in milliseconds.
+PATIENT_CHANNEL = [
+    ("grpc.max_receive_message_length", MAX_BATCH_BYTES),
+    ("grpc.keepalive_time_ms", 30_000),
+    ("grpc.keepalive_timeout_ms", 60_000),
+    ("grpc.http2.ping_timeout_ms", 60_000),
+]
 
 # The name exists only in the type stubs of grpc.
 RunCall: TypeAlias = "grpc._CallIterator[pb.RunResponse]"
@@ -99,7 +106,7 @@ class VectorEnv:
         # A server of this process knows no tokens.
         own = ServerAddress(local_server.shared_address(), token="") if address is None else address
         self.server = server_address(own, token, ca)
-        channel = channels.channel(self.server, [("grpc.max_receive_message_length", MAX_BATCH_BYTES)])
+        channel = channels.channel(self.server, PATIENT_CHANNEL)
         # gRPC takes requests from the queue in a thread of its own.
         outbox: Requests = queue.SimpleQueue()
         self._outbox = outbox
