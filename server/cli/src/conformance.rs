@@ -1,4 +1,4 @@
-//! `chefshat conformance FILE`: checks the engine against test vectors. `chefshat-simulation`
+//! `chefshat conformance FILE…`: checks the engine against test vectors. `chefshat-simulation`
 //! replays them.
 
 use std::fs::File;
@@ -17,31 +17,51 @@ const HELP: &str = "\
 A vector file has one JSON object per line, either a deal (rules, seed, shift, hands, leader) or a complete game (rules, seed, steps, \
 shifts, scores, winner).
 
-Exit code 0: all vectors agree. 1: a vector does not agree (the first is reported), or the file is not a vector file.
+Every file is checked. Exit code 0: all vectors agree. 1: a vector does not agree (the first of each file is reported), or a file is not \
+a vector file.
 
 Example:
-  chefshat conformance tests/fixtures/vectors/games.jsonl";
+  chefshat conformance tests/fixtures/vectors/*.jsonl";
 
 /// Check the rule engine against deals and games of another engine.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Conformance {
-    /// File of test vectors.
-    file: PathBuf,
-    /// Print one JSON object.
+    /// Files of test vectors.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Print one line of JSON for each file.
     #[arg(long)]
     json: bool,
 }
 
 impl Conformance {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let name = self.file.display();
-        let file = File::open(&self.file).map_err(|error| format!("{name}: {error}"))?;
+        let mut code = ExitCode::SUCCESS;
+        for file in &self.files {
+            let checked = self.check_file(file).unwrap_or_else(|error| {
+                anstream::eprintln!("chefshat: {error}");
+                false
+            });
+            if !checked {
+                code = ExitCode::FAILURE;
+            }
+        }
+        Ok(code)
+    }
+
+    /// Whether all vectors of a file agree.
+    ///
+    /// # Errors
+    /// It is not a file of vectors.
+    fn check_file(&self, path: &Path) -> Result<bool, CommandError> {
+        let name = path.display();
+        let file = File::open(path).map_err(|error| format!("{name}: {error}"))?;
         let bytes = file
             .metadata()
             .map_err(|error| format!("{name}: {error}"))?;
         if bytes.is_dir() {
-            return Err(format!("{name} is a folder: name a file of vectors in it").into());
+            return Err(format!("{name} is a folder: name the files of vectors in it").into());
         }
         let bar = progress::styled(
             ProgressBar::new(bytes.len()),
@@ -51,13 +71,13 @@ impl Conformance {
         bar.finish_and_clear();
         let mut out = anstream::stdout().lock();
         if self.json {
-            writeln!(out, "{}", json_report(&self.file, &report))?;
+            writeln!(out, "{}", json_report(path, &report))?;
         } else {
-            write_report(&mut out, &self.file, &report)?;
+            write_report(&mut out, path, &report)?;
         }
         match report.failure {
-            None => Ok(ExitCode::SUCCESS),
-            Some(Failure::Disagrees { .. }) => Ok(ExitCode::FAILURE),
+            None => Ok(true),
+            Some(Failure::Disagrees { .. }) => Ok(false),
             Some(problem) => Err(format!("{name}: {problem}").into()),
         }
     }

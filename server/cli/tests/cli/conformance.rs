@@ -71,6 +71,30 @@ fn the_vectors_agree() {
 }
 
 #[test]
+fn several_files_are_checked_even_if_one_is_wrong() {
+    let folder = TempDir::new().unwrap();
+    let wrong = damaged(&folder, "deals.jsonl", 4, |deal| deal["leader"] = json!(9));
+    let missing = folder.path().join("missing.jsonl");
+    let (deals, games) = (vectors("deals.jsonl"), vectors("games.jsonl"));
+    let check = |files: &[&Path], flags: &[&str]| {
+        let files = files.iter().map(|file| file.to_str().unwrap());
+        let all: Vec<&str> = (["conformance"].into_iter().chain(files))
+            .chain(flags.iter().copied())
+            .collect();
+        chefshat(&all)
+    };
+    let all = check(&[&deals, &games], &[]).clean();
+    all.assert_says(&["all agree: 87 deals", "all agree: 57 games"]);
+    let some = check(&[&wrong, &missing, &deals], &["--json"]);
+    assert_eq!(some.code, Some(1));
+    let agree: Vec<Value> = (some.stdout.lines())
+        .map(|line| serde_json::from_str::<Value>(line).unwrap()["agree"].clone())
+        .collect();
+    assert_eq!(agree, [json!(false), json!(true)]);
+    assert!(some.stderr.contains("missing.jsonl"), "{}", some.stderr);
+}
+
+#[test]
 fn the_first_wrong_vector_is_reported() {
     let folder = TempDir::new().unwrap();
     let path = damaged(&folder, "games.jsonl", 3, |game| {
