@@ -12,6 +12,7 @@ mod cli {
     mod compare;
     mod config;
     mod conformance;
+    mod connect;
     mod demo;
     mod experiment;
     mod export;
