@@ -41,6 +41,9 @@ pub enum Interference {
     HoldAnswer,
     /// Answers are dropped until a substitute plays for the seat.
     DropAnswers,
+    /// When an answer arrives, the port is closed with all connections, and the server restarted;
+    /// it never receives the answer.
+    Restart,
 }
 
 /// One case.
@@ -73,7 +76,7 @@ pub enum Place {
 use v1::DecisionKind::{Exchange, SpecialAction, Turn};
 
 /// All cases, in order.
-pub static CASES: [Case; 11] = [
+pub static CASES: [Case; 12] = [
     Case {
         name: "game",
         about: "a complete game to 15 points: legal answers of all kinds, clean exit",
@@ -139,16 +142,24 @@ pub static CASES: [Case; 11] = [
         place: Place::Room(unhurried),
     },
     Case {
+        name: "restart",
+        about: "the server restarts, its port is closed meanwhile: the agent attaches again",
+        interferences: &[Interference::Restart],
+        kinds: &[Turn],
+        hurried: false,
+        place: Place::Room(durable),
+    },
+    Case {
         name: "stale",
-        about: "an answer arrives too late: the agent plays on",
+        about: "an answer is held back until its time is over: the agent plays on",
         interferences: &[Interference::HoldAnswer],
         kinds: &[Turn],
         hurried: true,
-        place: Place::Room(late),
+        place: Place::Room(held_back),
     },
     Case {
         name: "substitution",
-        about: "a substitute plays for the agent: the agent takes over again",
+        about: "answers are lost and a substitute plays: the agent takes over again",
         interferences: &[Interference::DropAnswers],
         kinds: &[Turn],
         hurried: true,
@@ -178,14 +189,19 @@ impl Case {
         CASES.iter().find(|case| case.name == name)
     }
 
+    /// Whether its server is restarted.
+    pub fn restarts(&self) -> bool {
+        self.interferences.contains(&Interference::Restart)
+    }
+
     /// Whether it is played in a tournament.
     pub fn is_tournament(&self) -> bool {
         matches!(self.place, Place::Tournament(_))
     }
 }
 
-/// Time for a decision in cases that lose some to the clock.
-const LATE_MS: u32 = 1_000;
+/// Time for a decision in cases where the examiner lets the time of some run out.
+const RUN_OUT_MS: u32 = 1_000;
 /// Time for a decision in the case of short deadlines.
 const SHORT_MS: u32 = 400;
 /// Pace of built-in agents in a tournament, so that its games are played at the same time.
@@ -276,12 +292,18 @@ fn unhurried(patience: &Patience) -> v1::CreateRoomRequest {
     room(4, 1, Stop::TargetShifts(3), milliseconds(patience.each))
 }
 
-fn late(_: &Patience) -> v1::CreateRoomRequest {
-    room(4, 3, Stop::TargetShifts(2), LATE_MS)
+fn durable(patience: &Patience) -> v1::CreateRoomRequest {
+    let mut room = unhurried(patience);
+    room.policy.get_or_insert_default().durability = v1::Durability::Durable.into();
+    room
+}
+
+fn held_back(_: &Patience) -> v1::CreateRoomRequest {
+    room(4, 3, Stop::TargetShifts(2), RUN_OUT_MS)
 }
 
 fn substitution(_: &Patience) -> v1::CreateRoomRequest {
-    let mut room = room(2, 0, Stop::TargetShifts(2), LATE_MS);
+    let mut room = room(2, 0, Stop::TargetShifts(2), RUN_OUT_MS);
     if let Some(policy) = &mut room.policy {
         policy.max_timeouts = Some(2);
         policy.pace_ms = Some(PACE_MS);

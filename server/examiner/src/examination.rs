@@ -8,20 +8,24 @@ use std::time::Duration;
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
-use tokio::net::TcpListener;
-use tokio::time::sleep_until;
+use tempfile::TempDir;
+use tokio::time::{sleep, sleep_until};
 
 use super::case::{Case, Patience, Place};
 use super::exam::{Exam, Venue};
 use super::fault::{Fault, Finding};
 use super::process::{AgentCommand, AgentProcess, Places};
-use super::relay::{self, Desk};
+use super::relay::{Desk, Port};
+use chefshat_server::config::ServerConfig;
 use chefshat_server::host::{Host, HostError};
+use chefshat_server::store::{OpenError, SqliteStore};
 
 /// Name of the agent in the room.
 const NAME: &str = "examined";
 /// Last lines of the agent's output that are shown with a fault.
 const LAST_LINES: usize = 8;
+/// How long the port stays closed when the server is restarted.
+const CLOSED: Duration = Duration::from_secs(2);
 
 /// Why an examination failed for reasons other than the agent.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +39,9 @@ pub enum ExaminationError {
     /// The server did not stop cleanly.
     #[error(transparent)]
     Stopped(#[from] HostError),
+    /// The database of a case could not be opened.
+    #[error("the examiner's own server: {0}")]
+    Store(#[from] OpenError),
     /// A response was incomplete.
     #[error("the examiner's own server did not return the room it created")]
     NoRoom,
@@ -77,11 +84,51 @@ impl Outcome {
     }
 }
 
+/// The server behind the examiner.
+#[derive(Debug)]
+struct Server {
+    host: Host,
+    client: Client,
+    /// Where its games survive a restart; `None`: they do not.
+    data: Option<TempDir>,
+}
+
+impl Server {
+    async fn in_memory() -> Result<Self, ExaminationError> {
+        let host = Host::in_memory(None).await?;
+        let client = Client::connect(host.url()).await?;
+        let data = None;
+        Ok(Self { host, client, data })
+    }
+
+    async fn with_database(data: TempDir) -> Result<Self, ExaminationError> {
+        let config = ServerConfig {
+            grace: Duration::ZERO,
+            ..ServerConfig::default()
+        };
+        let store = SqliteStore::open(data.path()).await?;
+        let host = Host::start(config, Arc::new(store)).await?;
+        let client = Client::connect(host.url()).await?;
+        let data = Some(data);
+        Ok(Self { host, client, data })
+    }
+
+    /// Stops the server; starts another with its games, if they were stored.
+    async fn restarted(self) -> Result<Self, ExaminationError> {
+        let data = self.data;
+        drop(self.client);
+        self.host.stop().await?;
+        match data {
+            Some(data) => Self::with_database(data).await,
+            None => Self::in_memory().await,
+        }
+    }
+}
+
 /// An examiner with its server.
 #[derive(Debug)]
 pub struct Examination {
-    host: Host,
-    client: Client,
+    server: Server,
     listen: SocketAddr,
     patience: Patience,
     logs: Option<PathBuf>,
@@ -98,10 +145,8 @@ impl Examination {
         patience: Patience,
         logs: Option<PathBuf>,
     ) -> Result<Self, ExaminationError> {
-        let host = Host::in_memory(None).await?;
         Ok(Self {
-            client: Client::connect(host.url()).await?,
-            host,
+            server: Server::in_memory().await?,
             listen: listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
             patience,
             logs,
@@ -119,23 +164,23 @@ impl Examination {
         command: Option<&AgentCommand>,
         waiting: impl FnOnce(&Waiting),
     ) -> Result<Outcome, ExaminationError> {
-        let channel = self.client.channel();
+        let mut own = match case.restarts() {
+            true => Some(Server::with_database(TempDir::new()?).await?),
+            false => None,
+        };
+        let client = own.as_ref().map_or(&self.server.client, |own| &own.client);
         let Opened {
             venue,
             code,
             owner_token,
-        } = self.open(case).await?;
-        let listener = TcpListener::bind(self.listen).await?;
-        let address = listener.local_addr()?;
+        } = self.open(client, case).await?;
         let exam = Exam::new(case, self.patience, venue.clone(), command.is_some());
         let desk = Desk::new(exam, self.patience.each);
-        let relay = tokio::spawn(relay::serve(listener, channel, Arc::clone(&desk)));
-        let mut last_lines = match command {
-            None => {
-                waiting(&Waiting { address, code });
-                watch(&desk, None).await?;
-                Vec::new()
-            }
+        let mut port = Port::open(self.listen, client.channel(), Arc::clone(&desk)).await?;
+        let address = port.address;
+        let mut process = None;
+        match command {
+            None => waiting(&Waiting { address, code }),
             Some(command) => {
                 let places = Places {
                     address: address.to_string(),
@@ -144,20 +189,33 @@ impl Examination {
                 };
                 let log = (self.logs.as_ref()).map(|logs| logs.join(format!("{}.log", case.name)));
                 match AgentProcess::start(command, &places, log).await {
-                    Ok(mut process) => {
-                        watch(&desk, Some(&mut process)).await?;
-                        process.finish(LAST_LINES).await
-                    }
+                    Ok(started) => process = Some(started),
                     Err(error) => {
                         let program = command.words().first().cloned().unwrap_or_default();
                         desk.show(|exam, _| exam.not_started(&format!("{program}: {error}")));
-                        Vec::new()
                     }
                 }
             }
+        }
+        while !watch(&desk, process.as_mut()).await? {
+            drop(port);
+            let server = own
+                .take()
+                .expect("only a case with its own server restarts it");
+            let server = own.insert(server.restarted().await?);
+            sleep(CLOSED).await;
+            port = Port::open(address, server.client.channel(), Arc::clone(&desk)).await?;
+            desk.show(Exam::restarted);
+        }
+        let mut last_lines = match process {
+            Some(process) => process.finish(LAST_LINES).await,
+            None => Vec::new(),
         };
-        relay.abort();
-        self.close(venue, owner_token).await;
+        drop(port);
+        match own {
+            Some(own) => own.host.stop().await?,
+            None => close(&self.server.client, venue, owner_token).await,
+        }
         let findings = desk.lock().findings().to_vec();
         if findings.is_empty() {
             last_lines.clear();
@@ -170,8 +228,7 @@ impl Examination {
     }
 
     /// Creates the room or tournament of a case.
-    async fn open(&self, case: &Case) -> Result<Opened, ExaminationError> {
-        let client = &self.client;
+    async fn open(&self, client: &Client, case: &Case) -> Result<Opened, ExaminationError> {
         match case.place {
             Place::Room(room) => {
                 let mut request = room(&self.patience);
@@ -207,31 +264,13 @@ impl Examination {
         }
     }
 
-    /// Closes it. It may have ended already.
-    async fn close(&self, venue: Venue, owner_token: String) {
-        let client = &self.client;
-        match venue {
-            Venue::Room { room_id, .. } => {
-                let _closed = client.close_room(room_id, owner_token).await;
-            }
-            Venue::Tournament { tournament_id } => {
-                let request = v1::CloseTournamentRequest {
-                    tournament_id,
-                    owner_token,
-                };
-                let mut service = TournamentServiceClient::new(client.channel());
-                let _closed = service.close_tournament(request).await;
-            }
-        }
-    }
-
     /// Stops the examiner's server.
     ///
     /// # Errors
     /// It did not stop cleanly.
     pub async fn stop(self) -> Result<(), ExaminationError> {
-        drop(self.client);
-        Ok(self.host.stop().await?)
+        drop(self.server.client);
+        Ok(self.server.host.stop().await?)
     }
 }
 
@@ -242,10 +281,30 @@ struct Opened {
     owner_token: String,
 }
 
-/// Waits until the case is over.
-async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Result<()> {
+/// Closes the room or tournament of a case. It may have ended already.
+async fn close(client: &Client, venue: Venue, owner_token: String) {
+    match venue {
+        Venue::Room { room_id, .. } => {
+            let _closed = client.close_room(room_id, owner_token).await;
+        }
+        Venue::Tournament { tournament_id } => {
+            let request = v1::CloseTournamentRequest {
+                tournament_id,
+                owner_token,
+            };
+            let mut service = TournamentServiceClient::new(client.channel());
+            let _closed = service.close_tournament(request).await;
+        }
+    }
+}
+
+/// Waits until the case is over, or the server must be restarted; returns whether it is over.
+async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Result<bool> {
     let mut running = process.is_some();
     while !desk.lock().is_done() {
+        if desk.lock().takes_restart() {
+            return Ok(false);
+        }
         let exited = async {
             match &mut process {
                 Some(process) if running => process.ended().await,
@@ -262,5 +321,5 @@ async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Resul
             }
         }
     }
-    Ok(())
+    Ok(true)
 }

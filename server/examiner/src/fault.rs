@@ -215,7 +215,7 @@ impl Fault {
                 "After a result INVALID answer the same decision_id again with a legal action; the decision is not requested again."
             }
             Self::DidNotReconnect => {
-                "When the stream ends with UNAVAILABLE, wait a moment, open a new stream and attach with the same ticket."
+                "When the stream ends with UNAVAILABLE, or no connection is possible, wait a moment, open a new stream and attach with the same ticket; try for minutes."
             }
             Self::EventsSkipped => {
                 "Attach with from_sequence = the number of the last event received plus one; 0 requests all events again."

@@ -2,6 +2,8 @@
 //! Calls that join rooms and play games are examined; all others are forwarded unchanged.
 
 use std::convert::Infallible;
+use std::io;
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -14,8 +16,9 @@ use chefshat_proto::v1::{
     room_service_server::{RoomService, RoomServiceServer},
 };
 use tokio::net::TcpListener;
+use tokio::runtime::{self, Runtime};
 use tokio::sync::{Notify, mpsc};
-use tokio::time::{Instant, timeout};
+use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
 use tonic::service::Routes;
 use tonic::transport::Server;
@@ -57,7 +60,7 @@ impl Desk {
         result
     }
 
-    /// Locks the case for reading.
+    /// Locks the case without waking its waiters.
     pub(super) fn lock(&self) -> MutexGuard<'_, Exam> {
         self.exam.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -78,12 +81,63 @@ impl Desk {
     }
 }
 
-/// Serves the examiner on a socket, in front of a server, until the future is dropped.
-pub(super) async fn serve(
-    listener: TcpListener,
-    server: Connection,
-    desk: Arc<Desk>,
-) -> Result<(), tonic::transport::Error> {
+/// How long a port may take to become free.
+const BIND_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time between two attempts to bind it.
+const BIND_PAUSE: Duration = Duration::from_millis(20);
+
+/// A port of the examiner, in front of a server. It has a runtime of its own, so that dropping it
+/// closes the port together with all connections.
+#[derive(Debug)]
+pub(super) struct Port {
+    pub(super) address: SocketAddr,
+    runtime: Option<Runtime>,
+}
+
+impl Port {
+    /// Serves on this address; waits until it is free.
+    ///
+    /// # Errors
+    /// The address cannot be used.
+    pub(super) async fn open(
+        address: SocketAddr,
+        server: Connection,
+        desk: Arc<Desk>,
+    ) -> io::Result<Self> {
+        let give_up_at = Instant::now() + BIND_TIMEOUT;
+        let listener = loop {
+            match std::net::TcpListener::bind(address) {
+                Err(error)
+                    if error.kind() == io::ErrorKind::AddrInUse && Instant::now() < give_up_at =>
+                {
+                    sleep(BIND_PAUSE).await;
+                }
+                bound => break bound?,
+            }
+        };
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        let runtime = runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()?;
+        runtime.spawn(async move { serve(TcpListener::from_std(listener)?, server, desk).await });
+        Ok(Self {
+            address,
+            runtime: Some(runtime),
+        })
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
+}
+
+async fn serve(listener: TcpListener, server: Connection, desk: Arc<Desk>) -> io::Result<()> {
     let play = PlayServiceServer::new(Play {
         server: server.clone(),
         desk: Arc::clone(&desk),
@@ -102,6 +156,7 @@ pub(super) async fn serve(
         .add_routes(Routes::from(router))
         .serve_with_incoming(TcpListenerStream::new(listener))
         .await
+        .map_err(io::Error::other)
 }
 
 /// Forwards a call unchanged.

@@ -66,7 +66,7 @@ async fn passes(agent: &[&str], many: &str, folder: Option<&Path>) {
     let options = ["--patience", PATIENCE, "--start", PATIENCE, "--many", many];
     let examined = examine(&options, agent, folder).await;
     assert!(examined.passed, "{}", examined.said);
-    assert_eq!(examined.cases.len(), 11, "{}", examined.said);
+    assert_eq!(examined.cases.len(), 12, "{}", examined.said);
     for case in &examined.cases {
         assert_eq!(case["passed"], true, "{}", examined.said);
     }
@@ -163,6 +163,7 @@ const FAULTY: [(&str, &str, &str); 32] = [
     ("exits-when-refused", "refusal", "GAVE_UP_WHEN_REFUSED"),
     ("ignores-refusal", "refusal", "GAVE_UP_WHEN_REFUSED"),
     ("no-reconnect", "disconnect", "DID_NOT_RECONNECT"),
+    ("no-reconnect", "restart", "DID_NOT_RECONNECT"),
     ("joins-again", "disconnect", "JOINED_AGAIN"),
     ("skips-events", "disconnect", "EVENTS_SKIPPED"),
     ("stale-forever", "stale", "REPEATED_AFTER_CLOSED"),

@@ -78,14 +78,18 @@ impl Exam {
         let Some(seen) = self.seats.get(key) else {
             return;
         };
-        let (lost, taken) = (seen.lost, seen.taken);
+        let (lost, taken, late) = (seen.lost, seen.taken, seen.late);
         let enough = lost >= HURRIED_LOSSES || seen.over;
         if self.case.hurried && enough && lost > taken {
             let all = lost + taken;
+            let (fault, why) = match late {
+                0 => (Fault::NotAnswered, "none of these was answered"),
+                _ => (Fault::TooSlow, "answers to them came too late"),
+            };
             self.failed(
-                Fault::TooSlow,
+                fault,
                 "most answers within the time for a decision",
-                format!("{lost} of {all} decisions were lost to the clock"),
+                format!("the time of {lost} of {all} decisions ran out, and {why}"),
             );
         }
     }
@@ -143,7 +147,10 @@ impl Exam {
                     false
                 }
                 // It was on its way when the time ran out.
-                DecisionState::Closed => false,
+                DecisionState::Closed => {
+                    seen.late += 1;
+                    false
+                }
                 DecisionState::Open | DecisionState::Refused => {
                     decision.state = DecisionState::Answered;
                     decision.tampered |= dropping;
@@ -230,6 +237,11 @@ impl Exam {
                 decision.tampered = true;
                 self.interfered();
                 self.cut(stream, now);
+            }
+            Some(Interference::Restart) if quiet => {
+                decision.tampered = true;
+                self.interfered();
+                self.restart();
             }
             Some(Interference::HoldAnswer) if quiet => {
                 decision.tampered = true;
@@ -338,6 +350,7 @@ impl Exam {
                     );
                 } else if !std::mem::replace(&mut decision.lost_noted, true) {
                     seen.lost += 1;
+                    seen.late += 1;
                     if self.case.hurried {
                         return self.check_losses(key);
                     }

@@ -12,6 +12,9 @@ use super::seats::{DecisionState, RequestedAttach, SeatKey, StreamSeen};
 use super::{Exam, Phase, StreamId, Venue};
 use crate::fault::Fault;
 
+const AFTER_RESTART: &str =
+    "a new stream, and an attachment with the same ticket, after the server was restarted";
+
 impl Exam {
     /// The agent requested a seat with this join code, with this result.
     pub fn joined(
@@ -261,6 +264,26 @@ impl Exam {
             "a new stream, and an attachment with the same ticket, after the connection was lost",
             Some(now + self.patience.each),
         );
+    }
+
+    /// The examiner closes the port, with all streams, and restarts the server.
+    pub(super) fn restart(&mut self) {
+        self.streams.iter_mut().for_each(|stream| stream.cut = true);
+        self.restart_due = true;
+        self.demand(Fault::DidNotReconnect, AFTER_RESTART, None);
+    }
+
+    /// Whether the server must be restarted now; says so once.
+    pub fn takes_restart(&mut self) -> bool {
+        std::mem::take(&mut self.restart_due)
+    }
+
+    /// The server was restarted, and its port is open.
+    pub fn restarted(&mut self, now: Duration) {
+        let by = now + self.patience.each;
+        if let Some(demand) = &mut self.demand {
+            demand.by.get_or_insert(by);
+        }
     }
 
     /// The agent half-closed or ended a stream, the latter possibly with an error in `status`.

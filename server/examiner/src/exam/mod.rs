@@ -96,6 +96,8 @@ pub struct Exam {
     quiet: u32,
     /// Answers of the agent are dropped.
     dropping: bool,
+    /// The server must be restarted.
+    restart_due: bool,
     streams: Vec<StreamSeen>,
     seats: BTreeMap<SeatKey, SeatSeen>,
     tickets: BTreeMap<String, SeatKey>,
@@ -128,6 +130,7 @@ impl Exam {
             plan: case.interferences.iter().copied().collect(),
             quiet: 0,
             dropping: false,
+            restart_due: false,
             streams: Vec::new(),
             seats: BTreeMap::new(),
             tickets: BTreeMap::new(),

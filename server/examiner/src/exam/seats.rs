@@ -118,6 +118,8 @@ pub(super) struct SeatSeen {
     pub(super) taken: u32,
     /// Decisions that it lost to the clock.
     pub(super) lost: u32,
+    /// Answers that came after the time of their decision.
+    pub(super) late: u32,
     /// It has received the end of the game.
     pub(super) over: bool,
 }

@@ -128,3 +128,29 @@ fn answers_are_dropped_until_a_substitute_plays() {
     let again = and_good_end([with(&[Leave, Attach(3)]), played(4, 6)].concat());
     check("attaching again", "substitution", again, &[]);
 }
+
+#[test]
+fn an_agent_waits_for_a_server_that_restarts() {
+    let mut course = Course::of("restart", started());
+    course.step(request(2));
+    assert!(!course.exam.takes_restart());
+    course.step(answer(2, 1));
+    assert_eq!(course.answers(), [(1, 1)], "the answer is lost");
+    assert!(course.exam.takes_restart() && !course.exam.takes_restart());
+    // However long the restart takes.
+    course.step(Wait(60));
+    assert!(!course.exam.is_done());
+    course.exam.restarted(course.now);
+    for step in [Attach(2), request(2), answer(2, 1), accepted(2)] {
+        course.step(step);
+    }
+    good_end().into_iter().for_each(|step| course.step(step));
+    assert!(course.codes().is_empty() && course.exam.is_done());
+
+    let mut gone = Course::of("restart", started());
+    gone.step(request(2));
+    gone.step(answer(2, 1));
+    gone.exam.restarted(gone.now);
+    gone.step(Wait(5));
+    assert_eq!(gone.codes(), ["DID_NOT_RECONNECT"]);
+}

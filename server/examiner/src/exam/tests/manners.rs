@@ -167,10 +167,13 @@ fn the_end() {
 fn short_deadlines_need_most_answers_in_time() {
     let lost = |ids: std::ops::RangeInclusive<u64>| ids.map(request).collect::<Vec<_>>();
     let some = and_good_end([lost(2..=9), played(10, 20)].concat());
-    check("some lost", "deadlines", some, &["TOO_SLOW"]);
+    check("some lost", "deadlines", some, &["NOT_ANSWERED"]);
     let few = and_good_end([lost(2..=5), played(6, 20)].concat());
     check("few lost", "deadlines", few, &[]);
-    check("all lost", "deadlines", lost(2..=20), &["TOO_SLOW"]);
+    check("all lost", "deadlines", lost(2..=20), &["NOT_ANSWERED"]);
+    let late = (3..=20).flat_map(|id| [request(id), answer(id - 1, 1)]);
+    let late: Vec<Step> = [request(2)].into_iter().chain(late).collect();
+    check("all late", "deadlines", late, &["TOO_SLOW"]);
 }
 
 #[test]
