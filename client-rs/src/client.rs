@@ -137,8 +137,8 @@ impl Client {
     /// is repeated and takes no second seat.
     ///
     /// # Errors
-    /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`, `GAME_STARTED`,
-    /// `ROOM_UNKNOWN`.
+    /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`,
+    /// `CLIENT_HAS_SEAT`, `GAME_STARTED`, `ROOM_UNKNOWN`.
     pub async fn join(
         &self,
         mut request: v1::JoinRoomRequest,

@@ -38,6 +38,9 @@ pub enum JoinError {
     /// The free seats are reserved for other kinds.
     #[error("the free seats of this room are reserved for participants of another kind")]
     KindNotAdmitted,
+    /// The client has a seat, and the room's policy gives each client one.
+    #[error("this client has a seat of this room, whose policy gives each client one")]
+    ClientHasSeat,
     /// The request id was used for another participant.
     #[error("this request id was used with another name, kind or seat; draw a new one")]
     RequestIdUsed,

@@ -80,6 +80,8 @@ pub struct Policy {
     pub durability: Durability,
     /// Times for kinds of participants, each kind at most once.
     pub clocks: Vec<KindClock>,
+    /// Whether a client may take only one seat.
+    pub one_seat_per_client: bool,
 }
 
 impl Policy {
@@ -125,6 +127,7 @@ impl Default for Policy {
             spectators_see_hands: false,
             durability: Durability::Durable,
             clocks: vec![KindClock::PEOPLE],
+            one_seat_per_client: false,
         }
     }
 }

@@ -11,7 +11,7 @@ mod file;
 mod guard;
 mod token;
 
-pub use caller::{Caller, Role, Scope};
+pub use caller::{Caller, Client, Role, Scope};
 pub use calls::{CALLS, Call, Scoped};
 pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};

@@ -67,6 +67,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Err(_) => return Err(unknown("durability", message.durability)),
         },
         clocks: clocks(message)?,
+        one_seat_per_client: message.one_seat_per_client,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -120,6 +121,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
                 bank_ms: clock.bank.map(millis),
             })
             .collect(),
+        one_seat_per_client: policy.one_seat_per_client,
     }
 }
 

@@ -111,6 +111,9 @@ impl PlayService for Play {
             for attach in seats {
                 reader.attach(attach).await;
             }
+            if !reader.has_attached() {
+                return outbox.end(StreamEnd::Complete);
+            }
             // The seats stay attached until the client goes or the server closes. A call that has
             // been received is executed completely: cancelled half-way, the seat would be attached
             // to no stream.

@@ -183,6 +183,7 @@ impl RoomService for RoomCalls {
                 kind,
                 seat: request.seat,
                 request_id,
+                client: caller.client(),
             })
             .await
             .map_err(Refusal::from)?

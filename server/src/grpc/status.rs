@@ -222,6 +222,7 @@ impl From<JoinError> for Refusal {
             JoinError::TooManySeatings => (Code::ResourceExhausted, "TOO_MANY_SEATINGS"),
             JoinError::SeatTaken => (Code::FailedPrecondition, "SEAT_TAKEN"),
             JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
+            JoinError::ClientHasSeat => (Code::FailedPrecondition, "CLIENT_HAS_SEAT"),
             JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),
             JoinError::RequestIdUsed => (Code::AlreadyExists, "REQUEST_ID_USED"),
             JoinError::GameStarted => (Code::FailedPrecondition, "GAME_STARTED"),

@@ -10,6 +10,7 @@ use tokio::time::Instant;
 
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
+use crate::access::Client;
 use crate::outbox::{OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
@@ -27,6 +28,8 @@ pub struct JoinRequest {
     pub seat: Option<u32>,
     /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
+    /// Who asks, where the server can tell clients apart.
+    pub client: Option<Client>,
 }
 
 /// A seat that was taken.

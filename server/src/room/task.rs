@@ -30,6 +30,7 @@ use super::subscriber::{
     MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
 };
 use super::table_view::TableView;
+use crate::access::Client;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
@@ -99,6 +100,7 @@ pub(super) fn spawn(
         public: PublicEvents::default(),
         delivered: 0,
         always_visit: vec![false; seats],
+        clients: Vec::new(),
         backlog_due_at: 0,
         over_since,
         suspended: false,
@@ -163,6 +165,8 @@ pub(super) struct Room {
     delivered: usize,
     /// By seat, whether every delivery must visit its connection.
     always_visit: Vec<bool>,
+    /// The clients that took seats, with the secrets of their tickets.
+    clients: Vec<(Client, [u8; 32])>,
     /// Length of the log at which the backlog of a connection may first be due.
     backlog_due_at: usize,
     over_since: Option<Duration>,
@@ -417,6 +421,7 @@ impl Room {
         if let Some(seat) = self.core.seat_of_ticket(&ticket.secret) {
             return self.join_again(seat, ticket, &request);
         }
+        self.check_client(request.client)?;
         let seat = self.core.join(
             self.now,
             request.seat,
@@ -426,11 +431,24 @@ impl Room {
                 ticket: ticket.hash(),
             },
         )?;
+        (self.clients).extend(request.client.map(|client| (client, ticket.secret)));
         Ok(Joined {
             seat,
             ticket,
             room: Box::new(convert::describe(&self.core)),
         })
+    }
+
+    /// Checks that a client may take a seat, by those it took and did not leave.
+    fn check_client(&mut self, client: Option<Client>) -> Result<(), JoinError> {
+        if !self.core.header().policy.one_seat_per_client {
+            return Ok(());
+        }
+        (self.clients).retain(|(_, secret)| self.core.seat_of_ticket(secret).is_some());
+        match (self.clients.iter()).any(|(seated, _)| Some(*seated) == client) {
+            true => Err(JoinError::ClientHasSeat),
+            false => Ok(()),
+        }
     }
 
     /// Answers a repeated request for a seat.

@@ -20,6 +20,7 @@ use super::{
     AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, SpectateRequest, TaskContext,
     spawn_room,
 };
+use crate::access::Client;
 use crate::clock::RoomClock;
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
@@ -29,7 +30,7 @@ use crate::store::{Journal, MemoryStore, Signed, Store as _, StoreError};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_room::{Answer, ConnectionId, Core};
+use chefshat_room::{Answer, ConnectionId, Core, JoinError};
 
 struct NullWatcher;
 
@@ -108,6 +109,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
             name: "somebody".into(),
             kind: ParticipantKind::Agent,
             seat: None,
+            client: None,
         })
         .await
         .expect("the room exists")
@@ -464,4 +466,37 @@ async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_em
     );
     let record = room.describe().await.expect("the room is shown");
     assert_eq!(record.state(), v1::RoomState::Finished);
+}
+
+#[tokio::test]
+async fn a_client_takes_one_seat_if_the_policy_says_so() {
+    let request = |client: u8| JoinRequest {
+        request_id: None,
+        name: "somebody".into(),
+        kind: ParticipantKind::Agent,
+        seat: None,
+        client: Some(Client::Address([10, 0, 0, client].into())),
+    };
+    let join = async |room: &Handle, client: u8| {
+        let joined = room.join(request(client)).await.expect("the room exists");
+        joined.map(|joined| joined.ticket)
+    };
+    let open = room(Policy::default(), 1).await;
+    for _ in 0..2 {
+        join(&open, 1)
+            .await
+            .expect("by default as many as it wants");
+    }
+    let policy = Policy {
+        one_seat_per_client: true,
+        ..Policy::default()
+    };
+    let strict = room(policy, 1).await;
+    let first = join(&strict, 1).await.expect("its seat");
+    let again = join(&strict, 1).await.map(|_| ());
+    assert_eq!(again, Err(JoinError::ClientHasSeat));
+    join(&strict, 2).await.expect("another client");
+    let left = strict.leave(first.secret).await.expect("the room exists");
+    left.expect("its ticket").expect("the game has not started");
+    join(&strict, 1).await.expect("its seat is free again");
 }

@@ -1,8 +1,12 @@
 //! Connections that are lost, re-established or duplicated.
 
-use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
+use chefshat_proto::v1::{
+    self, game_event::Kind, play_service_client::PlayServiceClient, seat_command::Command,
+    seat_update::Update,
+};
 use chefshat_tests::{
-    StreamSeat, TestServer, attach_all, first_legal, first_update, one_shift, play_on, room_of_four,
+    StreamSeat, TestServer, attach_all, first_legal, first_update, one_shift, patiently, play_on,
+    room_of_four,
 };
 
 /// Plays until `seat` has a decision open, which it leaves unanswered.
@@ -156,4 +160,29 @@ async fn a_snapshot_replaces_the_past_events() {
 
 fn room_id(created: &v1::CreateRoomResponse) -> String {
     created.room.as_ref().expect("a new room").room_id.clone()
+}
+
+#[tokio::test]
+async fn watching_with_an_unknown_ticket_ends() {
+    let server = TestServer::start().await;
+    let mut service = PlayServiceClient::new(server.channel().await);
+    let attach = v1::Attach {
+        ticket: "unknown".into(),
+        ..v1::Attach::default()
+    };
+    let request = v1::PlayServiceWatchRequest {
+        seats: vec![attach],
+    };
+    let mut responses = service.watch(request).await.expect("a stream").into_inner();
+    let mut updates = Vec::new();
+    while let Some(response) = patiently("the end", responses.message())
+        .await
+        .expect("no error")
+    {
+        updates.extend(response.updates);
+    }
+    let [update] = updates.as_slice() else {
+        panic!("not one update: {updates:?}");
+    };
+    assert!(matches!(update.update, Some(Update::Refused(_))));
 }

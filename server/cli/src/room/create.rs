@@ -62,6 +62,10 @@ pub(super) struct Create {
     /// Milliseconds to wait for all seats to be taken. Default: 3600000.
     #[arg(long, value_name = "MS", help_heading = "Times and limits")]
     waiting_time_ms: Option<u32>,
+    /// Let each client take only one seat. Clients are told apart by their tokens, or else by their
+    /// addresses. By default one client may take several seats with the join code.
+    #[arg(long, help_heading = "Times and limits")]
+    one_seat_per_client: bool,
 }
 
 impl Create {
@@ -167,6 +171,7 @@ impl Create {
             seats: all.take(players).collect(),
             policy: Some(v1::RoomPolicy {
                 waiting_time_ms: self.waiting_time_ms,
+                one_seat_per_client: self.one_seat_per_client,
                 ..self.policy.message()
             }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),

@@ -467,5 +467,6 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         spectators_see_hands: Some(false),
         durability: v1::Durability::Durable.into(),
         clocks: Vec::new(),
+        one_seat_per_client: false,
     }
 }

@@ -262,6 +262,11 @@ impl Reader {
         }
     }
 
+    /// Whether a seat or participant is attached to the stream.
+    pub(super) fn has_attached(&self) -> bool {
+        !(self.seats.is_empty() && self.participants.is_empty())
+    }
+
     /// Whether the stream can take one more seat.
     pub(super) fn has_space(&mut self) -> bool {
         let full =

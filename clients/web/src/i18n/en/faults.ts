@@ -20,6 +20,7 @@ export const faults = {
     SEAT_TAKEN: "Someone else has just taken this seat.",
     NO_SUCH_SEAT: "This room has no such seat.",
     KIND_NOT_ADMITTED: "The free seats are reserved for other kinds of participants.",
+    CLIENT_HAS_SEAT: "You have a seat in this room already, and everyone may take only one.",
     GAME_STARTED: "The game has already started. You can watch it.",
     GAME_OVER: "The game is over.",
     GAME_NOT_STARTED: "The game has not started yet.",

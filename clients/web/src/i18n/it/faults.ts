@@ -20,6 +20,7 @@ export const faults: Texts["faults"] = {
     SEAT_TAKEN: "Qualcun altro ha appena preso questo posto.",
     NO_SUCH_SEAT: "Questa stanza non ha quel posto.",
     KIND_NOT_ADMITTED: "I posti liberi sono riservati ad altri tipi di partecipanti.",
+    CLIENT_HAS_SEAT: "Hai già un posto in questa stanza, e ognuno può prenderne solo uno.",
     GAME_STARTED: "La partita è già iniziata. Puoi guardarla.",
     GAME_OVER: "La partita è finita.",
     GAME_NOT_STARTED: "La partita non è ancora iniziata.",

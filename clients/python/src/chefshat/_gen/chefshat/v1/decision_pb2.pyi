@@ -384,7 +384,10 @@ Global___GiftRequirement: _TypeAlias = GiftRequirement  # noqa: Y015
 
 @_typing.final
 class Answer(_message.Message):
-    """A seat's answer to a decision."""
+    """A seat's answer to a decision. Answer once: again only after INVALID, which leaves the decision
+    open, or when the decision is requested again after attaching again. An answer that was accepted
+    is final; the same answer again is acknowledged again.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 

@@ -69,8 +69,9 @@ class PlayServiceServicer:
 
     def Watch(self, request, context):
         """For clients without bidirectional streams (browsers): all updates of the given seats, until the
-        client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
-        (SEATS_REFUSED); UNAVAILABLE as for Play.
+        client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
+        known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
+        as for Play.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

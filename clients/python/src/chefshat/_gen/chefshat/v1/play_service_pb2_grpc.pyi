@@ -42,8 +42,9 @@ class PlayServiceStub:
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
-    client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
-    (SEATS_REFUSED); UNAVAILABLE as for Play.
+    client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
+    known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
+    as for Play.
     """
     Act: _grpc.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
@@ -65,8 +66,9 @@ class PlayServiceAsyncStub(PlayServiceStub):
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
-    client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
-    (SEATS_REFUSED); UNAVAILABLE as for Play.
+    client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
+    known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
+    as for Play.
     """
     Act: _aio.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]  # type: ignore[assignment]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
@@ -97,8 +99,9 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayServiceWatchResponse], _abc.AsyncIterator[_play_service_pb2.PlayServiceWatchResponse]]:
         """For clients without bidirectional streams (browsers): all updates of the given seats, until the
-        client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
-        (SEATS_REFUSED); UNAVAILABLE as for Play.
+        client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
+        known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
+        as for Play.
         """
 
     @_abc_1.abstractmethod

@@ -388,6 +388,7 @@ class RoomPolicy(_message.Message):
     SPECTATORS_SEE_HANDS_FIELD_NUMBER: _builtins.int
     DURABILITY_FIELD_NUMBER: _builtins.int
     CLOCKS_FIELD_NUMBER: _builtins.int
+    ONE_SEAT_PER_CLIENT_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. For a special
     action, whoever holds the jokers: the longest time of any seat that participants can take, and
@@ -437,6 +438,12 @@ class RoomPolicy(_message.Message):
     """What the game survives; by default DURABLE, or EPHEMERAL on a server that has no store and
     refuses DURABLE.
     """
+    one_seat_per_client: _builtins.bool
+    """Whether a client may take only one seat (CLIENT_HAS_SEAT). By default one client may take
+    several seats with one join code. The server tells clients apart by their tokens, or else by
+    their addresses, and remembers them until it is restarted. Participants of tournaments are not
+    limited by it.
+    """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
         """Other times for some kinds of participants, each kind at most once. People have the default
@@ -460,10 +467,11 @@ class RoomPolicy(_message.Message):
         spectators_see_hands: _builtins.bool | None = ...,
         durability: Global___Durability.ValueType = ...,
         clocks: _abc.Iterable[Global___KindClock] | None = ...,
+        one_seat_per_client: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015

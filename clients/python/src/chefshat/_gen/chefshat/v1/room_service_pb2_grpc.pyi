@@ -50,10 +50,11 @@ class RoomServiceStub:
     requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
-    """Takes a seat and returns its ticket. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED,
-    GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
-    NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Takes a seat and returns its ticket. One client may take several seats with one join code,
+    unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
+    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
+    KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
+    NAME_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     LeaveRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
@@ -87,10 +88,11 @@ class RoomServiceAsyncStub(RoomServiceStub):
     requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
-    """Takes a seat and returns its ticket. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED,
-    GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
-    NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Takes a seat and returns its ticket. One client may take several seats with one join code,
+    unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
+    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
+    KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
+    NAME_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     LeaveRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]  # type: ignore[assignment]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
@@ -145,10 +147,11 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.JoinRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.JoinRoomResponse, _abc.Awaitable[_room_service_pb2.JoinRoomResponse]]:
-        """Takes a seat and returns its ticket. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED,
-        GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
-        NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """Takes a seat and returns its ticket. One client may take several seats with one join code,
+        unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
+        RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
+        KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
+        NAME_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
