@@ -5,7 +5,7 @@ import { create } from "@bufbuild/protobuf";
 import { durationFromMs } from "@bufbuild/protobuf/wkt";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { beforeAll, expect, test } from "vitest";
-import { faultOf, inWords, isPassing } from "../src/api/faults";
+import { faultOf, inWords, isPassing, needsToken } from "../src/api/faults";
 import { ErrorInfoSchema, RetryInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { startLanguage } from "../src/i18n";
 import { en } from "../src/i18n/en";
@@ -65,6 +65,7 @@ test("refused tokens are explained and not retried", () => {
   for (const reason of ["TOKEN_MISSING", "TOKEN_UNKNOWN", "TOKEN_EXPIRED", "ROLE_TOO_LOW", "OUT_OF_SCOPE"]) {
     const error = refusal(reason, "the server's words");
     expect(inWords(error)).not.toContain("the server's words");
+    expect(needsToken(faultOf(error))).toBe(true);
     expect(isPassing(faultOf(error))).toBe(false);
   }
 });

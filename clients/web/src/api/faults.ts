@@ -43,6 +43,14 @@ export function isPassing(fault: Fault): boolean {
   );
 }
 
+/** Reasons of calls that need a token, or another one. */
+const TOKEN_REASONS = ["TOKEN_MISSING", "TOKEN_UNKNOWN", "TOKEN_EXPIRED", "ROLE_TOO_LOW", "OUT_OF_SCOPE"];
+
+/** Whether the call needs a token, or another one. */
+export function needsToken(fault: Fault): boolean {
+  return TOKEN_REASONS.includes(fault.reason);
+}
+
 /** A fault in words: the translated sentence for its reason if there is one, else the server's. */
 export function wordsOf(fault: Fault): string {
   const known: Record<string, string> = t().faults.byReason;

@@ -2,7 +2,7 @@
 // goes straight to it.
 
 import { useEffect, useState } from "preact/hooks";
-import { faultOf } from "../api/faults";
+import { faultOf, wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import type { PageProps } from "../app";
 import { AfterStudy } from "../experiment/AfterStudy";
@@ -76,6 +76,7 @@ function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) 
   const [, setAsked] = useState(0);
   if (found === null) return <p class="soft">{t().common.loading}</p>;
   if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
+  if (found.kind === "refused") return <StudyNotice kind="fault">{wordsOf(found.fault)}</StudyNotice>;
   const room = found.kind === "room" ? found.room : undefined;
   const seats = room?.seats ?? [];
   // Read on each render: another tab of this device may have taken a seat meanwhile.
@@ -171,6 +172,7 @@ function WayIn({ code }: { code: string }) {
     );
   }
   if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
+  if (found.kind === "refused") return <Notice kind="fault">{wordsOf(found.fault)}</Notice>;
   const room = found.kind === "room" ? found.room : undefined;
   return (
     <>
