@@ -143,7 +143,7 @@ pub static CASES: [Case; 12] = [
     },
     Case {
         name: "restart",
-        about: "the server restarts, its port is closed meanwhile: the agent attaches again",
+        about: "the server restarts with its port closed: the agent attaches again",
         interferences: &[Interference::Restart],
         kinds: &[Turn],
         hurried: false,
@@ -151,7 +151,7 @@ pub static CASES: [Case; 12] = [
     },
     Case {
         name: "stale",
-        about: "an answer is held back until its time is over: the agent plays on",
+        about: "an answer is held back until its time is up: the agent plays on",
         interferences: &[Interference::HoldAnswer],
         kinds: &[Turn],
         hurried: true,
@@ -159,7 +159,7 @@ pub static CASES: [Case; 12] = [
     },
     Case {
         name: "substitution",
-        about: "answers are lost and a substitute plays: the agent takes over again",
+        about: "answers are lost, a substitute plays: the agent takes over again",
         interferences: &[Interference::DropAnswers],
         kinds: &[Turn],
         hurried: true,
