@@ -135,7 +135,7 @@ async fn good_agents_of_all_languages_pass() {
 }
 
 /// Agents with a fault, the case in which it shows, and the code that must be reported first.
-const FAULTY: [(&str, &str, &str); 32] = [
+const FAULTY: [(&str, &str, &str); 33] = [
     ("never-joins", "game", "NEVER_JOINED"),
     ("wrong-code", "game", "JOIN_REFUSED"),
     ("never-attaches", "game", "NEVER_ATTACHED"),
