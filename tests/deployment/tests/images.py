@@ -138,6 +138,13 @@ def stop(process: subprocess.Popen[str], number: int = signal.SIGTERM) -> tuple[
     return process.returncode, output
 
 
+def end(process: subprocess.Popen[str]) -> None:
+    """Kills the program in a container, if it is still running, and waits for its end."""
+    if process.poll() is None:
+        os.kill(innermost(process.pid), signal.SIGKILL)
+        process.communicate(timeout=PATIENCE_S)
+
+
 def innermost(process: int) -> int:
     """The last of a chain of processes that each wait for one child."""
     while True:

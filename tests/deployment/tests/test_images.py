@@ -9,7 +9,7 @@ from pathlib import Path
 import chefshat
 import pytest
 from chefshat import RandomAgent, pb
-from images import Container, Images, run, stop, until
+from images import Container, Images, end, run, stop, until
 
 # The user of the images, who is nobody on this machine.
 USER = 65532
@@ -75,7 +75,7 @@ def check(images: Images, server_image: str, agent_image: str) -> None:
         game = play(address, token, images.container(agent_image))
         code, output = stop(server)
     finally:
-        server.kill()
+        end(server)
     assert code == 0, output
     assert container.run("health", environment=environment)[0] == 1
 
