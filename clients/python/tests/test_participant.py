@@ -121,6 +121,14 @@ def test_a_seat_attached_twice_is_one_seat() -> None:
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
 
 
+def test_a_participant_enters_again_after_the_server_has_stopped() -> None:
+    cup = Cup()
+    cup.receive(detached("SERVER_STOPPING"))
+    assert not cup.session.done
+    cup.session.lost()
+    assert cup.connect() == [("cup", 0)]
+
+
 def test_the_end_of_the_tournament_waits_for_open_games() -> None:
     cup = Cup()
     cup.receive(seated(FIRST_HANDLE, "a"), detached("TOURNAMENT_OVER"))

@@ -20,6 +20,14 @@ def test_reconnecting_resumes_after_the_last_event(stage: Stage) -> None:
     assert stage.session.results()["t"].reconnects == 1
 
 
+def test_a_seat_resumes_after_the_server_has_stopped(stage: Stage) -> None:
+    stage.receive(events(1), detached("SERVER_STOPPING"))
+    assert not stage.session.done
+    stage.session.lost()
+    stage.connect()
+    assert stage.sent[0].attach.from_sequence == 2
+
+
 def test_an_unacknowledged_answer_is_repeated_once_and_not_recomputed(stage: Stage) -> None:
     (ask,) = stage.receive(decision(1))
     stage.answer(ask, 2)
