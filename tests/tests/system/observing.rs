@@ -83,6 +83,13 @@ async fn get(url: &str) -> String {
     String::from_utf8(body.expect("complete").to_bytes().to_vec()).expect("text")
 }
 
+/// Whether a page is there.
+async fn is_ok(url: &str) -> bool {
+    let http = HttpClient::builder(TokioExecutor::new()).build_http::<Full<bytes::Bytes>>();
+    let answer = http.get(url.parse().expect("a URL")).await;
+    answer.is_ok_and(|answer| answer.status().is_success())
+}
+
 /// The value of a sample.
 fn value(text: &str, sample: &str) -> f64 {
     let line = text.lines().find_map(|line| line.strip_prefix(sample));
@@ -215,12 +222,12 @@ async fn each_decision_is_logged_in_the_spans_of_its_room_and_itself() {
         .filter(|line| line["fields"]["message"] == "a decision was taken")
         .collect();
     let seats: Vec<u64> = (logged.iter())
-        .map(|line| line["spans"][1]["seat"].as_u64().expect("a seat"))
+        .map(|line| line["span"]["seat"].as_u64().expect("a seat"))
         .collect();
     assert_eq!(seats, decided);
     for line in &logged {
         assert_eq!(line["fields"]["outcome"], "answered");
-        let names = [&line["spans"][0]["name"], &line["spans"][1]["name"]];
+        let names = [&line["spans"][0]["name"], &line["span"]["name"]];
         assert_eq!(names, ["room", "decision"]);
         assert_eq!(line["spans"][0]["room"], room.room_id.as_str());
         assert_eq!(line["spans"][0]["game"], room.game_id.as_str());
@@ -345,8 +352,9 @@ impl Prometheus {
             .kill_on_drop(true)
             .spawn()
             .expect("promtool and prometheus are one package");
-        patiently("Prometheus to listen", async {
-            while tokio::net::TcpStream::connect(&address).await.is_err() {
+        let ready = format!("http://{address}/-/ready");
+        patiently("Prometheus to be ready", async {
+            while !is_ok(&ready).await {
                 tokio::time::sleep(Duration::from_millis(50)).await;
             }
         })
