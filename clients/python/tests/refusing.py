@@ -8,7 +8,7 @@ from google.protobuf import any_pb2
 from google.rpc import error_details_pb2, status_pb2
 
 Context = grpc.ServicerContext
-Handler: TypeAlias = "grpc.RpcMethodHandler[Any, Any]"
+Handler: TypeAlias = "grpc.RpcMethodHandler[Any, Any] | None"
 
 
 def refuse(context: Context, code: grpc.StatusCode, reason: str, message: str, **metadata: str) -> NoReturn:
@@ -30,9 +30,9 @@ class Guard(grpc.ServerInterceptor):
 
     def intercept_service(
         self,
-        continuation: Callable[[grpc.HandlerCallDetails], Handler | None],
+        continuation: Callable[[grpc.HandlerCallDetails], Handler],
         details: grpc.HandlerCallDetails,
-    ) -> Handler | None:
+    ) -> Handler:
         """Passes on a call with the token; otherwise says whether it is missing or unknown."""
         self.calls += 1
         given = dict(details.invocation_metadata).get("authorization")
