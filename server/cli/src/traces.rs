@@ -101,7 +101,7 @@ mod tests {
             for span in scopes.flat_map(|scope| scope.spans) {
                 self.0.send(span).expect("the test waits");
             }
-            Ok(Response::default())
+            Ok(Response::new(ExportTraceServiceResponse::default()))
         }
     }
 
