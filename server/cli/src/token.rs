@@ -13,7 +13,7 @@ use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
 use super::numbers::counted;
-use super::output::{heading, table};
+use super::output::table;
 use super::{CommandError, data_dir, say};
 
 /// Longest label, characters.
@@ -158,7 +158,6 @@ impl List {
             return say("there are no tokens");
         }
         let mut text = String::new();
-        heading(&mut text, &counted(tokens.len() as u64, "token"));
         let rows = tokens.iter().map(|token| {
             vec![
                 token.id.to_string(),
