@@ -8,6 +8,7 @@ use chefshat_record::signature::SigningKey;
 
 use crate::access::AccessSettings;
 use crate::forwarded::TrustedProxies;
+use crate::limits::Shares;
 use crate::tls::TlsFiles;
 
 /// Largest message a client may send, bytes.
@@ -20,6 +21,8 @@ pub const MAX_SEATS_PER_STREAM: usize = 4_096;
 pub const MAX_SEATS_PER_WATCH: usize = 64;
 /// Most commands in one message.
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
+/// How long a Play stream may stay silent before its first message.
+pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
 /// Largest message of a vector stream, bytes: large enough for a list of seeds.
@@ -28,7 +31,7 @@ pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
 /// Shifts ended at once.
 pub const MAX_VECTOR_BATCH_BYTES: usize = 16 * 1024 * 1024;
 /// Most vector streams at a time.
-pub const MAX_VECTOR_STREAMS: usize = 64;
+pub const MAX_VECTOR_STREAMS: usize = 128;
 /// Most seats played on all vector streams together, games times seats: about 5 KB each.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 131_072;
 /// Most game seeds in one message.
@@ -36,7 +39,7 @@ pub const MAX_VECTOR_SEEDS: usize = 16_384;
 /// Most games of a vector stream with records.
 pub const MAX_VECTOR_RECORDED_GAMES: u32 = 256;
 /// How long a client may take to send the setup of a vector stream.
-pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(30);
+pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long a client may think about a batch.
 pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
 /// How long a client may take to receive one message.
@@ -47,6 +50,8 @@ pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 pub const MAX_IMPORT_LINES: usize = 1_500_000;
 /// How long the upload of a record may take.
 pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
+/// How long a client may take to send the next part of a record.
+pub const IMPORT_IDLE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most uploads of records at a time.
 pub const MAX_IMPORTS: usize = 2;
 /// Most records that are assembled or replayed at a time, for each purpose.
@@ -66,7 +71,7 @@ pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// Pause before rooms for games of a tournament are tried again after a failure.
 pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
 /// Most streams that follow tournaments.
-pub const MAX_FOLLOWERS: usize = 256;
+pub const MAX_FOLLOWERS: usize = 1_024;
 /// Shortest time between two updates of a followed tournament.
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
 /// Most updates for followers, and most results, that are computed at a time.
@@ -93,6 +98,15 @@ pub const MAX_HOSTED_SHIFTS: u32 = 1_000;
 /// Interval of heartbeats on an idle Watch stream.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 
+/// How many games a server keeps by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeepGames {
+    /// The newest ones.
+    Newest(u64),
+    /// Those that ended within this time.
+    For(Duration),
+}
+
 /// The settings of a server.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
@@ -110,8 +124,14 @@ pub struct ServerConfig {
     pub retention: Duration,
     /// How long running games may continue after a shutdown is requested.
     pub grace: Duration,
-    /// How long a new connection may stay silent before it is dropped.
-    pub first_byte_timeout: Duration,
+    /// How many finished games are kept; `None`: all.
+    pub keep_games: Option<KeepGames>,
+    /// How much of each limit one caller may use.
+    pub shares: Shares,
+    /// Decisions of games that only built-in agents play, in a second; faster for a minute.
+    pub built_in_decisions_per_second: u64,
+    /// How long a new connection may take until its protocol is known.
+    pub first_bytes_timeout: Duration,
     /// Whether clients may import records of games played elsewhere.
     pub allow_import: bool,
     /// Who may call.
@@ -140,7 +160,10 @@ impl Default for ServerConfig {
             vector_threads: 0,
             retention: Duration::from_secs(600),
             grace: Duration::from_secs(30),
-            first_byte_timeout: Duration::from_secs(10),
+            keep_games: None,
+            shares: Shares::default(),
+            built_in_decisions_per_second: 10_000,
+            first_bytes_timeout: Duration::from_secs(10),
             allow_import: false,
             access: AccessSettings::default(),
             tls: None,

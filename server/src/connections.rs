@@ -1,28 +1,45 @@
-//! Accepts connections: disables Nagle's delay, limits their number, and drops those that send
-//! nothing at the start or whose peer has vanished.
+//! Accepts connections: disables Nagle's delay, limits their number, of each caller and in all, and
+//! drops those whose protocol stays unknown or whose peer has vanished. Knows which clients are
+//! connected, and closes their connections.
 
+use std::collections::BTreeMap;
+use std::fs::File;
 use std::io;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
-use std::sync::Arc;
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::task::{Context, Poll};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
-use futures::{Stream, stream};
-use prometheus_client::metrics::gauge::Gauge;
+use futures::task::AtomicWaker;
+use futures::{FutureExt as _, Stream, stream};
 use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::Sleep;
+use tokio::time::{Instant, Sleep};
 use tokio_util::either::Either;
 use tonic::transport::server::{Connected, TcpConnectInfo};
-use tracing::debug;
+use tracing::{debug, warn};
 
-use crate::metrics::Counted;
+use crate::access::TokenId;
+use crate::limits::{Held, Key, Places, Shares};
+use crate::metrics::{Counted, Metrics};
 
 /// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+/// File descriptors that connections leave for databases, records and everything else.
+const RESERVED_DESCRIPTORS: usize = 128;
+/// Shortest time between two lines in the log about refused connections.
+const LOG_INTERVAL: Duration = Duration::from_secs(60);
+/// Bytes after which the protocol of a connection is known: the preface of HTTP/2 and the header of
+/// its first frame. No request of HTTP/1.1 is shorter, and its headers have a time limit, too.
+const FIRST_BYTES: usize = 33;
+/// How long a client may take to read an answer.
+const STALLED_LIMIT: Duration = Duration::from_secs(30);
+/// Time between two checks of that.
+const STALLED_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Idle time before the kernel probes the peer. Unlike HTTP/2 pings, probes cost nothing per
 /// message, and they work for HTTP/1.1 as well.
@@ -59,16 +76,16 @@ impl From<UnixListener> for Listener {
 }
 
 impl Listener {
-    async fn accept(&self) -> io::Result<Socket> {
+    async fn accept(&self) -> io::Result<(Socket, Option<SocketAddr>)> {
         match self {
             Self::Tcp(listener) => {
-                let (stream, _) = listener.accept().await?;
+                let (stream, address) = listener.accept().await?;
                 if let Err(error) = set_options(&stream) {
                     debug!(%error, "could not set the options of a connection");
                 }
-                Ok(Either::Left(stream))
+                Ok((Either::Left(stream), Some(address)))
             }
-            Self::Unix(listener) => Ok(Either::Right(listener.accept().await?.0)),
+            Self::Unix(listener) => Ok((Either::Right(listener.accept().await?.0), None)),
         }
     }
 }
@@ -78,10 +95,212 @@ type Socket = Either<TcpStream, UnixStream>;
 /// Limits of connections.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Most connections at a time; further ones wait to be accepted.
+    /// Most connections at a time. Each caller has its share of them.
     pub max_connections: usize,
-    /// How long a new connection may stay silent.
-    pub first_byte_timeout: Duration,
+    /// How much of them one caller may have.
+    pub shares: Shares,
+    /// How long a new connection may take until its protocol is known.
+    pub first_bytes_timeout: Duration,
+}
+
+/// The connections of a server.
+#[derive(Debug)]
+pub struct Connections {
+    places: Arc<Places>,
+    clients: Mutex<BTreeMap<u64, Weak<Client>>>,
+    next: AtomicU64,
+    metrics: Arc<Metrics>,
+    refused_at: Mutex<Option<Instant>>,
+}
+
+impl Connections {
+    /// No connections yet. Lets this process open as many files as the system allows, and leaves
+    /// some for everything else.
+    pub fn new(limits: Limits, metrics: Arc<Metrics>) -> Arc<Self> {
+        let descriptors = raise_descriptor_limit();
+        let most = descriptors.saturating_sub(RESERVED_DESCRIPTORS).max(1);
+        let max_connections = limits.max_connections.min(most);
+        if max_connections < limits.max_connections {
+            warn!(
+                max_connections,
+                descriptors,
+                "the system allows fewer open files than connections; raise its limit (ulimit -n)"
+            );
+        }
+        Arc::new(Self {
+            places: Places::new(max_connections, limits.shares),
+            clients: Mutex::default(),
+            next: AtomicU64::new(1),
+            metrics,
+            refused_at: Mutex::default(),
+        })
+    }
+
+    /// The clients that are connected, oldest first.
+    pub fn clients(&self) -> Vec<Arc<Client>> {
+        self.lock().values().filter_map(Weak::upgrade).collect()
+    }
+
+    /// The client with this number.
+    pub fn client(&self, id: u64) -> Option<Arc<Client>> {
+        self.lock().get(&id)?.upgrade()
+    }
+
+    /// Number of places for connections.
+    pub fn max_connections(&self) -> usize {
+        self.places.total()
+    }
+
+    /// Closes connections whose clients do not read answers, until the future is dropped. What
+    /// waits for them takes memory.
+    pub async fn close_stalled(self: Arc<Self>) {
+        let mut interval = tokio::time::interval(STALLED_INTERVAL);
+        loop {
+            interval.tick().await;
+            for client in self.clients() {
+                let stalled = client.oldest_answer();
+                if stalled.is_some_and(|since| since.elapsed() > STALLED_LIMIT) {
+                    self.metrics.refused("ANSWERS_NOT_READ");
+                    client.close();
+                }
+            }
+        }
+    }
+
+    /// Admits a new connection, unless there are too many.
+    fn admit(self: &Arc<Self>, address: Option<SocketAddr>) -> Option<Arc<Client>> {
+        let key = Key::of_address(address.map(|address| address.ip()));
+        let Some(place) = self.places.try_take(key) else {
+            self.refuse("TOO_MANY_CONNECTIONS", &format_args!("{address:?}"));
+            return None;
+        };
+        let id = self.next.fetch_add(1, Relaxed);
+        let client = Arc::new(Client {
+            id,
+            address,
+            since: SystemTime::now(),
+            calls: AtomicU64::new(0),
+            streams: AtomicUsize::new(0),
+            token: Mutex::default(),
+            answers: Mutex::default(),
+            closing: AtomicBool::new(false),
+            waker: AtomicWaker::new(),
+            connections: Arc::downgrade(self),
+            _counted: Counted::new(self.metrics.connections()),
+            _place: place,
+        });
+        self.lock().insert(id, Arc::downgrade(&client));
+        Some(client)
+    }
+
+    /// Counts a refused connection, and logs it unless another was logged just before.
+    fn refuse(&self, reason: &'static str, cause: &dyn std::fmt::Display) {
+        self.metrics.refused(reason);
+        let now = Instant::now();
+        let mut refused_at = (self.refused_at.lock()).expect("nothing panics under this lock");
+        if refused_at.is_none_or(|before| now > before + LOG_INTERVAL) {
+            *refused_at = Some(now);
+            let open = self.places.taken();
+            warn!(reason, %cause, open, "connections are refused");
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Weak<Client>>> {
+        (self.clients.lock()).expect("nothing panics under this lock")
+    }
+}
+
+/// The client at the other end of a connection.
+#[derive(Debug)]
+pub struct Client {
+    /// Its number, unique in the life of the server.
+    pub id: u64,
+    /// Its address; `None` if it has none, as on a unix socket.
+    pub address: Option<SocketAddr>,
+    /// When it connected.
+    pub since: SystemTime,
+    calls: AtomicU64,
+    streams: AtomicUsize,
+    /// The token that it used last.
+    token: Mutex<Option<TokenId>>,
+    /// Answers that it has not read completely, by the number of the call, with the time at which
+    /// they were ready.
+    answers: Mutex<BTreeMap<u64, Instant>>,
+    closing: AtomicBool,
+    waker: AtomicWaker,
+    connections: Weak<Connections>,
+    _counted: Counted,
+    _place: Held,
+}
+
+impl Client {
+    /// The client that sent a request; `None` for connections without an address.
+    pub fn of(extensions: &http::Extensions) -> Option<&Arc<Self>> {
+        extensions.get()
+    }
+
+    /// Number of its calls so far, including streams.
+    pub fn calls(&self) -> u64 {
+        self.calls.load(Relaxed)
+    }
+
+    /// Number of its open streams.
+    pub fn streams(&self) -> usize {
+        self.streams.load(Relaxed)
+    }
+
+    /// The token that it used last.
+    pub fn token(&self) -> Option<TokenId> {
+        *(self.token.lock()).expect("nothing panics under this lock")
+    }
+
+    /// Counts a call with this token, if any, and returns its number.
+    pub fn called(&self, token: Option<TokenId>) -> u64 {
+        if token.is_some() {
+            *(self.token.lock()).expect("nothing panics under this lock") = token;
+        }
+        self.calls.fetch_add(1, Relaxed)
+    }
+
+    /// Counts streams that begin or end.
+    pub fn count_stream(&self, begins: bool) {
+        match begins {
+            true => self.streams.fetch_add(1, Relaxed),
+            false => self.streams.fetch_sub(1, Relaxed),
+        };
+    }
+
+    /// An answer is ready, and waits until the client reads it.
+    pub fn answer_ready(&self, call: u64) {
+        self.answers().insert(call, Instant::now());
+    }
+
+    /// An answer has been read, or will never be.
+    pub fn answer_gone(&self, call: u64) {
+        self.answers().remove(&call);
+    }
+
+    /// Closes the connection.
+    pub fn close(&self) {
+        self.closing.store(true, Release);
+        self.waker.wake();
+    }
+
+    fn oldest_answer(&self) -> Option<Instant> {
+        self.answers().values().min().copied()
+    }
+
+    fn answers(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
+        (self.answers.lock()).expect("nothing panics under this lock")
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        if let Some(connections) = self.connections.upgrade() {
+            connections.lock().remove(&self.id);
+        }
+    }
 }
 
 /// The client of a request, in the request's extensions if a trusted proxy named it (`forwarded`).
@@ -95,28 +314,35 @@ pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
     if let Some(ForwardedClient(address)) = extensions.get() {
         return Some(*address);
     }
-    let info: &TcpConnectInfo = extensions.get()?;
-    info.remote_addr()
-        .map(|address| address.ip().to_canonical())
+    let address = match Client::of(extensions) {
+        Some(client) => client.address,
+        None => extensions.get::<TcpConnectInfo>()?.remote_addr(),
+    };
+    address.map(|address| address.ip().to_canonical())
 }
 
-/// The connections of a listening socket. `open`: gauge of open connections.
+/// The connections of a listening socket.
 pub fn accept(
     listener: Listener,
-    limits: Limits,
-    open: Gauge,
+    connections: Arc<Connections>,
+    first_bytes_timeout: Duration,
 ) -> impl Stream<Item = io::Result<Connection>> {
-    let permits = Arc::new(Semaphore::new(limits.max_connections));
+    let reserve = Reserve::new();
+    let start = (listener, connections, reserve);
     stream::unfold(
-        (listener, permits, open),
-        move |(listener, permits, open)| async move {
-            let permit = Arc::clone(&permits)
-                .acquire_owned()
-                .await
-                .expect("the semaphore is never closed");
-            let stream = loop {
+        start,
+        move |(listener, connections, mut reserve)| async move {
+            let (stream, client) = loop {
                 match listener.accept().await {
-                    Ok(stream) => break stream,
+                    Ok((stream, address)) => match connections.admit(address) {
+                        Some(client) => break (stream, client),
+                        None => drop(stream),
+                    },
+                    Err(error) if is_out_of_descriptors(&error) => {
+                        connections.refuse("OUT_OF_DESCRIPTORS", &error);
+                        reserve.refuse_one(&listener);
+                        tokio::time::sleep(ACCEPT_PAUSE).await;
+                    }
                     Err(error) => {
                         debug!(%error, "accepting a connection failed");
                         tokio::time::sleep(ACCEPT_PAUSE).await;
@@ -125,13 +351,57 @@ pub fn accept(
             };
             let connection = Connection {
                 stream,
-                silence: Some(Box::pin(tokio::time::sleep(limits.first_byte_timeout))),
-                _permit: permit,
-                _counted: Counted::new(&open),
+                client,
+                unknown: Some(Unknown {
+                    bytes: 0,
+                    until: Box::pin(tokio::time::sleep(first_bytes_timeout)),
+                }),
             };
-            Some((Ok(connection), (listener, permits, open)))
+            Some((Ok(connection), (listener, connections, reserve)))
         },
     )
+}
+
+/// A file descriptor that is given up to refuse a connection when there is no other. Otherwise
+/// those that wait would hang.
+struct Reserve(Option<File>);
+
+impl Reserve {
+    fn new() -> Self {
+        Self(File::open("/dev/null").ok())
+    }
+
+    fn refuse_one(&mut self, listener: &Listener) {
+        self.0 = None;
+        drop(listener.accept().now_or_never());
+        *self = Self::new();
+    }
+}
+
+fn is_out_of_descriptors(error: &io::Error) -> bool {
+    use rustix::io::Errno;
+    let code = error.raw_os_error();
+    [Errno::MFILE, Errno::NFILE]
+        .iter()
+        .any(|errno| code == Some(errno.raw_os_error()))
+}
+
+/// Raises the limit of open files to what the system allows and returns it.
+fn raise_descriptor_limit() -> usize {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit {
+        current: limit.maximum,
+        maximum: limit.maximum,
+    };
+    let current = match setrlimit(Resource::Nofile, raised) {
+        Ok(()) => limit.maximum,
+        Err(_) => limit.current,
+    };
+    // No limit at all is none that matters.
+    current
+        .and_then(|limit| usize::try_from(limit).ok())
+        .unwrap_or(usize::MAX)
 }
 
 fn set_options(stream: &TcpStream) -> io::Result<()> {
@@ -147,27 +417,26 @@ fn set_options(stream: &TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// A connection that is dropped unless it sends its first bytes in time.
+/// A connection that is dropped unless its protocol is known in time.
 #[derive(Debug)]
 pub struct Connection {
     stream: Socket,
-    /// Fires unless something has been read.
-    silence: Option<Pin<Box<Sleep>>>,
-    _permit: OwnedSemaphorePermit,
-    _counted: Counted,
+    client: Arc<Client>,
+    unknown: Option<Unknown>,
+}
+
+/// The state of a connection whose protocol is not yet known.
+#[derive(Debug)]
+struct Unknown {
+    bytes: usize,
+    until: Pin<Box<Sleep>>,
 }
 
 impl Connected for Connection {
-    type ConnectInfo = TcpConnectInfo;
+    type ConnectInfo = Arc<Client>;
 
     fn connect_info(&self) -> Self::ConnectInfo {
-        match &self.stream {
-            Either::Left(stream) => stream.connect_info(),
-            Either::Right(_) => TcpConnectInfo {
-                local_addr: None,
-                remote_addr: None,
-            },
-        }
+        Arc::clone(&self.client)
     }
 }
 
@@ -177,13 +446,21 @@ impl AsyncRead for Connection {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
         let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        if read.is_ready() {
-            self.silence = None;
-        } else if let Some(silence) = &mut self.silence
-            && silence.as_mut().poll(context).is_ready()
-        {
-            return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+        if let Some(unknown) = &mut self.unknown {
+            unknown.bytes += buffer.filled().len() - before;
+            if unknown.bytes >= FIRST_BYTES {
+                self.unknown = None;
+            } else if unknown.until.as_mut().poll(context).is_ready() {
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
+        if read.is_pending() {
+            self.client.waker.register(context.waker());
+            if self.client.closing.load(Acquire) {
+                return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
+            }
         }
         read
     }
@@ -222,21 +499,42 @@ impl AsyncWrite for Connection {
 #[cfg(test)]
 mod tests {
     use futures::StreamExt as _;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 
     use super::*;
+
+    fn limits(max_connections: usize, first_bytes_timeout: Duration) -> Limits {
+        Limits {
+            max_connections,
+            shares: Shares::default(),
+            first_bytes_timeout,
+        }
+    }
+
+    async fn listening(
+        limits: Limits,
+    ) -> (
+        SocketAddr,
+        Arc<Connections>,
+        Pin<Box<impl Stream<Item = io::Result<Connection>>>>,
+    ) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let connections = Connections::new(limits, Arc::default());
+        let accepted = accept(
+            listener.into(),
+            Arc::clone(&connections),
+            limits.first_bytes_timeout,
+        );
+        (address, connections, Box::pin(accepted))
+    }
 
     #[cfg(unix)]
     #[tokio::test]
     async fn an_accepted_connection_is_probed_by_the_kernel() {
-        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
-        let address = listener.local_addr().expect("bound");
-        let limits = Limits {
-            max_connections: 1,
-            first_byte_timeout: Duration::from_secs(60),
-        };
-        let mut connections = std::pin::pin!(accept(listener.into(), limits, Gauge::default()));
+        let (address, _, mut accepted) = listening(limits(1, Duration::from_secs(60))).await;
         let _client = TcpStream::connect(address).await.expect("it listens");
-        let connection = connections.next().await.expect("endless").expect("one");
+        let connection = accepted.next().await.expect("endless").expect("one");
         let Either::Left(stream) = &connection.stream else {
             panic!("not a TCP connection");
         };
@@ -247,5 +545,49 @@ mod tests {
             KEEPALIVE_IDLE
         );
         assert!(socket.tcp_nodelay().expect("an option"));
+    }
+
+    #[tokio::test]
+    async fn one_caller_cannot_take_all_connections() {
+        // Half of them are the share of a caller on this machine.
+        let (address, connections, mut accepted) =
+            listening(limits(4, Duration::from_secs(60))).await;
+        let mut clients = Vec::new();
+        for _ in 0..4 {
+            clients.push(TcpStream::connect(address).await.expect("it listens"));
+        }
+        let first = accepted.next().await.expect("endless").expect("one");
+        let _second = accepted.next().await.expect("endless").expect("one");
+        let mut byte = [0];
+        tokio::select! {
+            _ = accepted.next() => panic!("the others are closed"),
+            read = clients[3].read(&mut byte) => assert!(!matches!(read, Ok(1..))),
+        }
+        assert_eq!(connections.clients().len(), 2);
+        drop(first);
+        let _fifth = TcpStream::connect(address).await.expect("it listens");
+        assert!(accepted.next().await.is_some());
+        assert_eq!(connections.clients().len(), 1);
+    }
+
+    #[tokio::test]
+    async fn a_connection_of_one_byte_and_a_closed_one_end() {
+        let (address, connections, mut accepted) =
+            listening(limits(4, Duration::from_millis(10))).await;
+        let mut client = TcpStream::connect(address).await.expect("it listens");
+        client.write_all(b"P").await.expect("a byte");
+        let mut connection = accepted.next().await.expect("endless").expect("one");
+        let mut buffer = Vec::new();
+        let read = connection.read_to_end(&mut buffer).await;
+        let error = read.expect_err("the protocol stays unknown");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+
+        let mut client = TcpStream::connect(address).await.expect("it listens");
+        client.write_all(&[b'P'; FIRST_BYTES]).await.expect("bytes");
+        let mut connection = accepted.next().await.expect("endless").expect("one");
+        let reading = tokio::spawn(async move { connection.read_to_end(&mut buffer).await });
+        connections.clients().last().expect("connected").close();
+        let error = reading.await.expect("no panic").expect_err("it is closed");
+        assert_eq!(error.kind(), io::ErrorKind::ConnectionAborted);
     }
 }

@@ -25,10 +25,12 @@ use crate::config::{
     DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
     ServerConfig,
 };
-use crate::connections::{self, Limits, Listener};
+use crate::connections::{self, Connections, Limits, Listener};
 use crate::forwarded::ForwardedLayer;
 use crate::grpc;
+use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
+use crate::retention::Retention;
 use crate::rooms::Rooms;
 use crate::scrape;
 use crate::store::{Store, StoreError};
@@ -89,6 +91,8 @@ pub struct Server {
     tournaments: Arc<Tournaments>,
     access: Arc<Access>,
     tls: Option<Arc<Tls>>,
+    calls: Arc<CallLimits>,
+    connections: Arc<Connections>,
     tracker: TaskTracker,
     games: usize,
 }
@@ -102,12 +106,19 @@ impl Server {
         let access = Access::open(&config.access, config.data_dir.as_ref())?;
         let tls = config.tls.clone().map(Tls::open).transpose()?;
         let tracker = TaskTracker::new();
-        let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
+        let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone())?;
         let games = rooms.restore().await?;
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
         tournaments.restore().await?;
         scrape::add_state(&rooms, &tournaments);
+        let limits = Limits {
+            max_connections: config.max_connections,
+            shares: config.shares,
+            first_bytes_timeout: config.first_bytes_timeout,
+        };
         Ok(Self {
+            calls: Arc::new(CallLimits::new(config.shares)),
+            connections: Connections::new(limits, Arc::clone(rooms.metrics())),
             config,
             store,
             rooms,
@@ -143,15 +154,9 @@ impl Server {
         listener: impl Into<Listener>,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
-        let limits = Limits {
-            max_connections: self.config.max_connections,
-            first_byte_timeout: self.config.first_byte_timeout,
-        };
-        let incoming = connections::accept(
-            listener.into(),
-            limits,
-            self.metrics().connections().clone(),
-        );
+        let connections = Arc::clone(&self.connections);
+        let timeout = self.config.first_bytes_timeout;
+        let incoming = connections::accept(listener.into(), connections, timeout);
         let incoming = match self.tls.clone() {
             None => incoming.map_ok(Secured::Plain).left_stream(),
             Some(tls) => tls.secure(incoming).right_stream(),
@@ -179,14 +184,38 @@ impl Server {
             tournaments,
             access,
             tls,
+            calls,
+            connections,
             tracker,
             ..
         } = self;
         let closing = CancellationToken::new();
+        tracker.spawn(
+            closing
+                .clone()
+                .run_until_cancelled_owned(Arc::clone(&connections).close_stalled()),
+        );
+        if let Some(keep) = config.keep_games {
+            let retention = Retention::new(Arc::clone(&rooms), Arc::clone(&tournaments));
+            tracker.spawn(
+                closing
+                    .clone()
+                    .run_until_cancelled_owned(retention.follow(keep)),
+            );
+        }
+        // Above any encryption, because it reads frames.
+        let incoming = incoming.map_ok(Metered::new);
         let (health, health_service) = tonic_health::server::health_reporter();
-        let routes = routes(&rooms, &tournaments, &config, &closing)?
-            .add_service(health_service)
-            .add_service(reflection());
+        let routes = routes(
+            &rooms,
+            &tournaments,
+            &calls,
+            &connections,
+            &config,
+            &closing,
+        )?
+        .add_service(health_service)
+        .add_service(reflection());
         health
             .set_service_status("", tonic_health::ServingStatus::Serving)
             .await;
@@ -217,6 +246,7 @@ impl Server {
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(grpc::AccessLayer::new(Arc::clone(&access)))
+            .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
 
@@ -259,11 +289,14 @@ impl Server {
 fn routes(
     rooms: &Arc<Rooms>,
     tournaments: &Arc<Tournaments>,
+    calls: &Arc<CallLimits>,
+    connections: &Arc<Connections>,
     config: &ServerConfig,
     closing: &CancellationToken,
 ) -> Result<Routes, ServeError> {
     use crate::wire::service::play_service_server::PlayServiceServer;
     use crate::wire::service::spectator_service_server::SpectatorServiceServer;
+    use v1::admin_service_server::AdminServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
@@ -271,6 +304,13 @@ fn routes(
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let recorded = grpc::Recorded::new(Arc::clone(rooms));
+    let retention = Retention::new(Arc::clone(rooms), Arc::clone(tournaments));
+    let admin = grpc::AdminCalls::new(
+        Arc::clone(rooms),
+        Arc::clone(tournaments),
+        Arc::clone(connections),
+        retention,
+    );
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let routes = Routes::new(
         PlayServiceServer::new(grpc::Play::new(
@@ -284,13 +324,18 @@ fn routes(
         TournamentServiceServer::new(grpc::TournamentCalls::new(
             Arc::clone(tournaments),
             recorded.clone(),
+            Arc::clone(calls),
             closing.clone(),
         ))
         .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        RoomServiceServer::new(grpc::RoomCalls::new(Arc::clone(rooms), recorded.clone()))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        RoomServiceServer::new(grpc::RoomCalls::new(
+            Arc::clone(rooms),
+            recorded.clone(),
+            Arc::clone(calls),
+        ))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
         SpectatorServiceServer::new(grpc::Spectate::new(Arc::clone(rooms), closing.clone()))
@@ -311,8 +356,9 @@ fn routes(
     .add_service(
         VectorServiceServer::new(vectors).max_decoding_message_size(MAX_VECTOR_MESSAGE_BYTES),
     )
+    .add_service(AdminServiceServer::new(admin).max_decoding_message_size(MAX_MESSAGE_BYTES))
     .add_service(
-        ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), config))
+        ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), calls, config))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     );
     Ok(routes)

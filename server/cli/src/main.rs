@@ -1,5 +1,6 @@
 //! The command line of `chefshat`: its arguments and one module per command.
 
+mod admin;
 mod agent;
 mod backup;
 mod board;
@@ -116,6 +117,8 @@ enum Command {
     Import(import::Import),
     /// Show the key that signs a server's records.
     Key(key::KeyCommand),
+    /// Operate a running server: clients, rooms and tournaments of others, storage.
+    Admin(admin::AdminCommand),
     /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
     /// Create, list and revoke the tokens of a server.
@@ -173,6 +176,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Key(command) => command.run(),
+        Command::Admin(command) => in_runtime(command.run()),
         Command::Participant(command) => in_runtime(command.run()),
         Command::Token(command) => command.run(),
         Command::Backup(command) => in_runtime(command.run()),

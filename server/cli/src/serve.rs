@@ -16,8 +16,9 @@ use tokio::sync::oneshot;
 use super::listen::{self, Address};
 use super::{CommandError, data_dir, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
-use chefshat_server::config::ServerConfig;
+use chefshat_server::config::{KeepGames, ServerConfig};
 use chefshat_server::forwarded::{IpNet, TrustedProxies, network};
+use chefshat_server::limits::Shares;
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::signing::key_or_new;
@@ -55,6 +56,19 @@ pub(super) struct Settings {
     /// Maximum number of open rooms.
     #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
+    /// Delete older finished games with their records: keep this many (1000), or those of a time (90d).
+    #[arg(long, env = "CHEFSHAT_KEEP_GAMES", value_name = "GAMES|TIME", value_parser = keep_games)]
+    keep_games: Option<KeepGames>,
+    /// Share of each limit that one client elsewhere may use, percent: of connections, streams, rooms,
+    /// tournaments and more. Clients on this machine may use half.
+    #[arg(long, env = "CHEFSHAT_CALLER_SHARE", default_value_t = 10, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(1..=100))]
+    caller_share: u8,
+    /// Maximum number of connections.
+    #[arg(long, env = "CHEFSHAT_MAX_CONNECTIONS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    max_connections: usize,
+    /// Decisions per second, over more than a minute, of games that only built-in agents play.
+    #[arg(long, env = "CHEFSHAT_BUILT_IN_RATE", default_value_t = 10_000, value_name = "DECISIONS", value_parser = clap::value_parser!(u64).range(1..))]
+    built_in_rate: u64,
     /// Threads for the games of learning agents; 0 means one per core. Rooms have separate threads.
     #[arg(long, env = "CHEFSHAT_VECTOR_THREADS", default_value_t = 0, value_parser = RangedU64ValueParser::<usize>::new().range(..=256))]
     vector_threads: usize,
@@ -244,6 +258,13 @@ impl Serve {
             data_dir,
             signing_key: signing_key.map(Arc::new),
             max_rooms: settings.max_rooms,
+            max_connections: settings.max_connections,
+            keep_games: settings.keep_games,
+            shares: Shares {
+                remote: settings.caller_share,
+                ..Shares::default()
+            },
+            built_in_decisions_per_second: settings.built_in_rate,
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,
             allowed_hosts: is_local.then_some(settings.allowed_hosts),
@@ -347,6 +368,17 @@ fn anonymous(text: &str) -> Result<Role, String> {
         "spectator" => Ok(Role::Spectator),
         "player" => Ok(Role::Player),
         _ => Err("use none, spectator or player".to_owned()),
+    }
+}
+
+/// A number of games, or a time such as 90d.
+fn keep_games(text: &str) -> Result<KeepGames, String> {
+    match text.parse() {
+        Ok(0) => Err("keep at least one game".to_owned()),
+        Ok(count) => Ok(KeepGames::Newest(count)),
+        Err(_) => super::records::prune::age(text)
+            .map(KeepGames::For)
+            .map_err(|_| "use a number of games, or a time such as 90d, 12h or 30m".to_owned()),
     }
 }
 

@@ -86,9 +86,14 @@ pub enum LineProblem {
     NotARecord(String),
 }
 
+/// The folder of the records in a data directory.
+pub fn folder_of(data_dir: &Path) -> PathBuf {
+    data_dir.join("records")
+}
+
 /// The path of a game's record in a data directory: `records/GAME-ID.jsonl`.
 pub fn path_of(data_dir: &Path, game_id: &str) -> PathBuf {
-    data_dir.join("records").join(format!("{game_id}.jsonl"))
+    folder_of(data_dir).join(format!("{game_id}.jsonl"))
 }
 
 /// Removes what killed writers left in the `records` folder of a data directory: files that end in
@@ -97,7 +102,7 @@ pub fn path_of(data_dir: &Path, game_id: &str) -> PathBuf {
 /// # Errors
 /// The first error of the file system. A folder that does not exist is none.
 pub fn remove_unfinished(data_dir: &Path) -> io::Result<()> {
-    let entries = match std::fs::read_dir(data_dir.join("records")) {
+    let entries = match std::fs::read_dir(folder_of(data_dir)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         entries => entries?,
     };
@@ -118,7 +123,32 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
     }
-    let mut file = AtomicFile::create(path)?;
+    write_to(AtomicFile::create(path)?, path, lines)
+}
+
+/// Writes a record into a data directory. Only its owner may look into the folder of the records,
+/// as into the database: they have expressions that were not public.
+///
+/// # Errors
+/// The first error of the file system; the record is then unchanged.
+pub fn write_private(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
+    if let Some(folder) = path.parent() {
+        let made = std::fs::create_dir_all(folder);
+        #[cfg(unix)]
+        let made = made.and_then(|()| {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::set_permissions(folder, PermissionsExt::from_mode(0o700))
+        });
+        made.map_err(|source| io_error(path, source))?;
+    }
+    write_to(AtomicFile::create_private(path)?, path, lines)
+}
+
+fn write_to(
+    mut file: AtomicFile,
+    path: &Path,
+    lines: &[RecordLine],
+) -> Result<(), RecordFileError> {
     for line in lines {
         serde_json::to_writer(&mut file, line).map_err(|error| io_error(path, error.into()))?;
         file.write_all(b"\n")?;

@@ -60,6 +60,19 @@ impl Core {
             && !self.all_seats().any(|seat| self.is_automatic(seat))
     }
 
+    /// Whether nobody plays the game now: built-in agents and substitutes have all seats, or its
+    /// decisions are taken over from a record.
+    pub fn is_unattended(&self) -> bool {
+        self.state == State::Playing
+            && (self.next_taken_over().is_some()
+                || self.all_seats().all(|seat| self.is_automatic(seat)))
+    }
+
+    /// Whether built-in agents have all seats from the start, so that no participant ever joins.
+    pub fn is_built_in_only(&self) -> bool {
+        self.seats.iter().all(|seat| seat.fill.is_built_in())
+    }
+
     /// Does what is due at `now`. `handed`: when the transport received the request for the open
     /// decision.
     pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {

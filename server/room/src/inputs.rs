@@ -343,10 +343,9 @@ impl Core {
         }
     }
 
-    /// Starts the game of a room without open seats.
+    /// Starts the game of a room without open seats; [`Core::tick`] then plays it.
     pub fn begin_if_all_built_in(&mut self, now: Duration) {
         self.start_if_complete(now);
-        self.advance(now);
     }
 
     fn is_free(&self, seat: Seat) -> bool {

@@ -263,6 +263,13 @@ impl Core {
         &self.log
     }
 
+    /// Drops events before a position that nobody will read: the room has no participants.
+    pub fn drop_log_before(&mut self, position: usize) {
+        if self.is_built_in_only() {
+            self.log.drop_before(position);
+        }
+    }
+
     /// The game, once it has started.
     pub fn game(&self) -> Option<&Game> {
         self.game.as_ref().map(RoomGame::game)

@@ -1,6 +1,7 @@
 //! The log of a room: every public event, in order. The number of an event is its position plus
 //! one. `convert::event` in the server redacts events for a viewer.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use chefshat_engine::{Cards, Event, Seat, Viewer};
@@ -120,11 +121,14 @@ impl RoomEvent {
 /// Events in one chunk of a log.
 const CHUNK: usize = 64;
 
-/// The events of a room, in chunks of a fixed size, so that a growing log is never copied.
+/// The events of a room, in chunks of a fixed size, so that a growing log is never copied. The
+/// oldest may be dropped.
 #[derive(Debug, Default)]
 pub struct Log {
     /// All full but the last.
-    chunks: Vec<Vec<LogEntry>>,
+    chunks: VecDeque<Vec<LogEntry>>,
+    /// Number of events in chunks that were dropped.
+    dropped: usize,
     length: usize,
 }
 
@@ -132,9 +136,9 @@ impl Log {
     /// Appends an event.
     pub(super) fn push(&mut self, at: Duration, event: RoomEvent) {
         if self.length.is_multiple_of(CHUNK) {
-            self.chunks.push(Vec::with_capacity(CHUNK));
+            self.chunks.push_back(Vec::with_capacity(CHUNK));
         }
-        let last = self.chunks.last_mut().expect("one has space");
+        let last = self.chunks.back_mut().expect("one has space");
         last.push(LogEntry {
             at_ms: u32::try_from(at.as_millis()).unwrap_or(u32::MAX),
             event,
@@ -167,15 +171,32 @@ impl Log {
         self.length == 0
     }
 
-    /// The event at a position, from 0.
+    /// Position of the first event that has not been dropped.
+    pub fn first(&self) -> usize {
+        self.dropped
+    }
+
+    /// Drops events before a position, except for those that share a chunk with later ones.
+    pub(super) fn drop_before(&mut self, position: usize) {
+        while self.dropped + CHUNK <= position.min(self.length) && self.chunks.len() > 1 {
+            self.chunks.pop_front();
+            self.dropped += CHUNK;
+        }
+    }
+
+    /// The event at a position, from 0, unless it has been dropped.
     pub fn get(&self, position: usize) -> Option<&LogEntry> {
+        let position = position.checked_sub(self.dropped)?;
         self.chunks.get(position / CHUNK)?.get(position % CHUNK)
     }
 
-    /// The events from a position on.
+    /// The events from a position on, or from the first one that has not been dropped.
     pub fn since(&self, position: usize) -> impl Iterator<Item = &LogEntry> + Clone {
-        let chunks = self.chunks.get(position / CHUNK..).unwrap_or_default();
-        chunks.iter().flatten().skip(position % CHUNK)
+        let position = position.saturating_sub(self.dropped);
+        let chunks = self
+            .chunks
+            .range((position / CHUNK).min(self.chunks.len())..);
+        chunks.flatten().skip(position % CHUNK)
     }
 }
 
@@ -186,6 +207,25 @@ mod tests {
     #[test]
     fn an_entry_fits_one_cache_line() {
         assert!(size_of::<LogEntry>() <= 64, "{}", size_of::<LogEntry>());
+    }
+
+    #[test]
+    fn dropped_events_leave_the_others_where_they_are() {
+        let mut log = Log::default();
+        for number in 0..3 * CHUNK {
+            let at = Duration::from_millis(u64::try_from(number).expect("small"));
+            log.push(at, RoomEvent::GameStarted);
+        }
+        log.drop_before(CHUNK - 1);
+        assert_eq!(log.first(), 0, "a chunk is dropped as a whole");
+        log.drop_before(10 * CHUNK);
+        assert_eq!(log.first(), 2 * CHUNK, "the last chunk stays");
+        assert_eq!(log.len(), 3 * CHUNK);
+        assert!(log.get(2 * CHUNK - 1).is_none());
+        for from in [0, 2 * CHUNK, 2 * CHUNK + 7] {
+            let times = log.since(from).map(|entry| entry.at_ms as usize);
+            assert!(times.eq(from.max(2 * CHUNK)..3 * CHUNK), "{from}");
+        }
     }
 
     #[test]

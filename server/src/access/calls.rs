@@ -1,7 +1,7 @@
 //! The minimal role of every call, in one table. A test compares it with the services that the
 //! server has, so no call is forgotten; a call that is not listed is not served.
 
-use super::caller::Role::{self, Anyone, Host, Player, Spectator};
+use super::caller::Role::{self, Admin, Anyone, Host, Player, Spectator};
 use Scoped::{Compared, Refused, Unlimited};
 
 /// What a token that is limited to one room or tournament may do with a call.
@@ -132,6 +132,12 @@ pub const CALLS: &[Call] = &[
     records("/chefshat.v1.RecordService/StreamRecords"),
     call("/chefshat.v1.RecordService/ImportRecord", Host, Refused),
     call("/chefshat.v1.VectorService/Run", Player, Refused),
+    call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
+    call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
+    call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused),
+    call("/chefshat.v1.AdminService/CloseTournament", Admin, Refused),
+    call("/chefshat.v1.AdminService/GetStorage", Admin, Refused),
+    call("/chefshat.v1.AdminService/PruneRecords", Admin, Refused),
     call(
         "/chefshat.v1.ServerService/GetServerInfo",
         Anyone,

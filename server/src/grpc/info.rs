@@ -19,6 +19,7 @@ use crate::config::{
     ServerConfig,
 };
 use crate::convert;
+use crate::limits::CallLimits;
 use crate::room::MAX_SPECTATORS;
 use crate::rooms::Rooms;
 
@@ -34,7 +35,7 @@ pub struct Info {
 
 impl Info {
     /// Creates the service for these rooms.
-    pub fn new(rooms: Arc<Rooms>, config: &ServerConfig) -> Self {
+    pub fn new(rooms: Arc<Rooms>, calls: &CallLimits, config: &ServerConfig) -> Self {
         let limits = [
             ("max_rooms", config.max_rooms),
             ("max_connections", config.max_connections),
@@ -66,7 +67,17 @@ impl Info {
             ),
         ]
         .into_iter()
-        .map(|(name, limit)| (name.to_owned(), u64::try_from(limit).unwrap_or(u64::MAX)))
+        .map(|(name, limit)| (name, u64::try_from(limit).unwrap_or(u64::MAX)))
+        .chain(calls.named())
+        .chain([
+            (
+                "built_in_decisions_per_second",
+                config.built_in_decisions_per_second,
+            ),
+            ("local_share_percent", config.shares.local.into()),
+            ("caller_share_percent", config.shares.remote.into()),
+        ])
+        .map(|(name, limit)| (name.to_owned(), limit))
         .collect();
         Self { rooms, limits }
     }

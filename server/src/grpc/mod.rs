@@ -2,8 +2,10 @@
 //! nothing.
 
 mod access;
+mod admin;
 mod follow;
 mod info;
+mod limits;
 mod new_room;
 mod pages;
 mod play;
@@ -18,7 +20,9 @@ mod tournaments;
 mod vector;
 
 pub use access::AccessLayer;
+pub use admin::AdminCalls;
 pub use info::Info;
+pub use limits::LimitsLayer;
 pub use play::Play;
 pub use recorded::Recorded;
 pub use records::Records;

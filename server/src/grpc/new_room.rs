@@ -16,6 +16,7 @@ use super::recorded::Recorded;
 use super::status::{field, request_id, status};
 use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
+use crate::limits::Key;
 use crate::rooms::NewRoom;
 use chefshat_room::ids::{Id, RequestKey};
 use chefshat_room::journal::{Branch, Fill, GameStart};
@@ -32,6 +33,7 @@ struct Beginning {
 pub(super) async fn new_room(
     recorded: &Recorded,
     mut request: v1::CreateRoomRequest,
+    charged: Key,
 ) -> Result<NewRoom, Status> {
     let request_id = request_id(&std::mem::take(&mut request.request_id))?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
@@ -78,6 +80,7 @@ pub(super) async fn new_room(
         physical: request.physical,
         seating: None,
         request: request_key,
+        charged,
     })
 }
 

@@ -14,20 +14,22 @@ use chefshat_record::signature::SigningKey;
 use chefshat_record::summary::summary;
 use futures::Stream;
 use prost::Message as _;
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::access::check;
+use super::limits::charged;
 use super::pages;
-use super::recorded::{Recorded, SERIES_OPEN, permit, read_failed};
+use super::recorded::{Recorded, SERIES_OPEN, read_failed};
 use super::status::{disk_nearly_full, field, has_reason, status};
 use crate::access::{Caller, Role};
 use crate::config::{
-    IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
-    RECORD_SEND_TIMEOUT, ServerConfig,
+    IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,
+    MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
+use crate::limits::{Key, Places};
 use crate::store::Part;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
@@ -45,8 +47,8 @@ pub struct Records {
     recorded: Recorded,
     tournaments: Arc<Tournaments>,
     /// Limits the records in memory while clients receive them.
-    sending: Arc<Semaphore>,
-    receiving: Arc<Semaphore>,
+    sending: Arc<Places>,
+    receiving: Arc<Places>,
     allow_import: bool,
     /// Signs records of which parts are left out.
     key: Option<Arc<SigningKey>>,
@@ -55,11 +57,12 @@ pub struct Records {
 impl Records {
     /// Creates the service for these games.
     pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, config: &ServerConfig) -> Self {
+        let shares = recorded.rooms().shares();
         Self {
             recorded,
             tournaments,
-            sending: Arc::new(Semaphore::new(MAX_RECORDS_SENT)),
-            receiving: Arc::new(Semaphore::new(MAX_IMPORTS)),
+            sending: Places::new(MAX_RECORDS_SENT, shares),
+            receiving: Places::new(MAX_IMPORTS, shares),
             allow_import: config.allow_import,
             key: config.signing_key.clone(),
         }
@@ -81,6 +84,7 @@ impl Records {
         &self,
         caller: &Caller,
         filter: &v1::RecordFilter,
+        key: Key,
         sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
     ) -> Result<(), Status> {
         let mut after = 0;
@@ -94,7 +98,7 @@ impl Records {
                 if !reaches(caller, &summary.room_id, &summary.tournament_id) {
                     continue;
                 }
-                let _permit = permit(&self.sending).await;
+                let _place = self.sending.take(key).await;
                 let role = caller.role;
                 let key = self.key.clone();
                 let shown = move |lines| seen_by(role, key.as_deref(), lines);
@@ -152,7 +156,8 @@ impl RecordService for Records {
         request: Request<v1::GetRecordRequest>,
     ) -> Result<Response<Self::GetRecordStream>, Status> {
         let caller = Caller::of(request.extensions());
-        let permit = permit(&self.sending).await;
+
+        let place = self.sending.take(charged(request.extensions())).await;
         let game_id = request.into_inner().game_id;
         let key = self.key.clone();
         let shown = move |lines: Vec<v1::RecordLine>| {
@@ -170,7 +175,7 @@ impl RecordService for Records {
         tokio::spawn(async move {
             let response = |lines| v1::GetRecordResponse { lines };
             let sent = send(&sender, lines, response).await;
-            drop(permit);
+            drop(place);
             end(&sender, sent).await;
         });
         Ok(Response::new(responses))
@@ -181,11 +186,12 @@ impl RecordService for Records {
         request: Request<v1::StreamRecordsRequest>,
     ) -> Result<Response<Self::StreamRecordsStream>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let filter = checked(request.into_inner().filter)?;
         let service = self.clone();
         let (sender, responses) = channel();
         tokio::spawn(async move {
-            let sent = service.send_all(&caller, &filter, &sender).await;
+            let sent = service.send_all(&caller, &filter, key, &sender).await;
             end(&sender, sent).await;
         });
         Ok(Response::new(responses))
@@ -195,6 +201,7 @@ impl RecordService for Records {
         &self,
         request: Request<Streaming<v1::ImportRecordRequest>>,
     ) -> Result<Response<v1::ImportRecordResponse>, Status> {
+        let key = charged(request.extensions());
         if !self.allow_import {
             return Err(status(
                 Code::PermissionDenied,
@@ -206,7 +213,7 @@ impl RecordService for Records {
         if !self.recorded.rooms().store().has_space() {
             return Err(disk_nearly_full("the server's disk is nearly full"));
         }
-        let _permit = permit(&self.receiving).await;
+        let _place = self.receiving.take(key).await;
         let lines = timeout(IMPORT_TIMEOUT, received(request.into_inner()))
             .await
             .map_err(|_| import_too_slow())??;
@@ -232,7 +239,7 @@ impl RecordService for Records {
                 [("field", "game_id")],
             ));
         }
-        rooms.record_writer().write_record(game);
+        rooms.record_writer().write_record(game, key);
         Ok(Response::new(v1::ImportRecordResponse {
             record: Some(summary),
         }))
@@ -312,7 +319,11 @@ async fn received(
     mut requests: Streaming<v1::ImportRecordRequest>,
 ) -> Result<Vec<v1::RecordLine>, Status> {
     let (mut lines, mut bytes) = (Vec::new(), 0);
-    while let Some(request) = requests.message().await? {
+    loop {
+        let next = timeout(IMPORT_IDLE_TIMEOUT, requests.message());
+        let Some(request) = next.await.map_err(|_| import_too_slow())?? else {
+            return Ok(lines);
+        };
         bytes += request.encoded_len();
         if bytes > MAX_IMPORT_BYTES {
             return Err(status(
@@ -336,7 +347,6 @@ async fn received(
         }
         lines.extend(request.lines);
     }
-    Ok(lines)
 }
 
 /// Refuses a line that belongs to no record, before more lines are received.
@@ -370,8 +380,9 @@ fn import_too_slow() -> Status {
         Code::DeadlineExceeded,
         "IMPORT_TOO_SLOW",
         format!(
-            "the record did not arrive within {} s",
-            IMPORT_TIMEOUT.as_secs()
+            "the record did not arrive within {} s, or its next part not within {} s",
+            IMPORT_TIMEOUT.as_secs(),
+            IMPORT_IDLE_TIMEOUT.as_secs()
         ),
         [],
     )

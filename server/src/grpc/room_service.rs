@@ -9,17 +9,23 @@ use futures::{Stream, StreamExt as _};
 use tonic::{Code, Request, Response, Status};
 
 use super::access::check_room;
+use super::limits::charged;
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, request_id, room_unknown, ticket_unknown};
 use crate::access::Caller;
 use crate::convert;
+use crate::limits::{CallLimits, Key};
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::ParticipantKind;
 
+/// Calls that creating a room counts as: it is written to the disk, with its game and record.
+const COST_OF_ROOM: u64 = 20;
+/// The same if the server plays all seats.
+const COST_OF_BUILT_IN_GAME: u64 = 100;
 /// Rooms examined for one page.
 const ROOMS_LOOKED_AT: usize = 200;
 
@@ -31,28 +37,36 @@ const ROOMS_ASKED: usize = 32;
 pub struct RoomCalls {
     rooms: Arc<Rooms>,
     recorded: Recorded,
+    calls: Arc<CallLimits>,
 }
 
 impl RoomCalls {
     /// Creates the service for these rooms. New ones may branch from these recorded games.
-    pub fn new(rooms: Arc<Rooms>, recorded: Recorded) -> Self {
-        Self { rooms, recorded }
+    pub fn new(rooms: Arc<Rooms>, recorded: Recorded, calls: Arc<CallLimits>) -> Self {
+        Self {
+            rooms,
+            recorded,
+            calls,
+        }
     }
 
     fn find(&self, room_id: &str) -> Result<Handle, Status> {
         find(&self.rooms, room_id)
     }
 
-    /// The room with a join code; if an id is given too, it must match.
-    fn find_by_code(&self, room_id: &str, join_code: &str) -> Result<Handle, Status> {
-        if room_id.is_empty() {
-            return self.rooms.by_code(join_code).ok_or_else(join_code_wrong);
-        }
-        let handle = self.find(room_id)?;
-        match self.rooms.code_is(handle.id(), join_code) {
-            true => Ok(handle),
-            false => Err(join_code_wrong()),
-        }
+    /// The room with a join code; if an id is given too, it must match. Wrong codes are charged.
+    fn find_by_code(&self, room_id: &str, join_code: &str, key: Key) -> Result<Handle, Status> {
+        let refused = |refused| Status::from(Refusal::from(refused));
+        self.calls.may_try_code(key).map_err(refused)?;
+        let found = match room_id {
+            "" => self.rooms.by_code(join_code),
+            room_id => Some(self.find(room_id)?)
+                .filter(|handle| self.rooms.code_is(handle.id(), join_code)),
+        };
+        found.ok_or_else(|| {
+            self.calls.wrong_code(key);
+            join_code_wrong()
+        })
     }
 }
 
@@ -83,8 +97,15 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::CreateRoomRequest>,
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
-        let new = new_room(&self.recorded, request.into_inner()).await?;
+        let key = charged(request.extensions());
+        let new = new_room(&self.recorded, request.into_inner(), key).await?;
         let physical = new.physical;
+        let built_in = new.fills.iter().all(|fill| fill.is_built_in());
+        let cost = match built_in {
+            true => COST_OF_BUILT_IN_GAME,
+            false => COST_OF_ROOM,
+        };
+        self.calls.charge(key, cost);
         let created = self.rooms.create(new).await.map_err(Refusal::from)?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
@@ -103,10 +124,11 @@ impl RoomService for RoomCalls {
         request: Request<v1::GetRoomRequest>,
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
             "" => self.find(&request.room_id)?,
-            code => self.find_by_code(&request.room_id, code)?,
+            code => self.find_by_code(&request.room_id, code, key)?,
         };
         check_room(&caller, &self.rooms, handle.id())?;
         let room = handle.describe().await.map_err(Refusal::from)?;
@@ -118,7 +140,9 @@ impl RoomService for RoomCalls {
         request: Request<v1::ListRoomsRequest>,
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
+        let _turn = self.calls.list(key).await;
         let page_size = pages::page_size(request.page_size);
         let before = pages::last_shown(&request.page_token)?;
         let over = match v1::RoomState::try_from(request.state) {
@@ -165,11 +189,12 @@ impl RoomService for RoomCalls {
         request: Request<v1::JoinRoomRequest>,
     ) -> Result<Response<v1::JoinRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         if self.rooms.is_shutting_down() {
             return Err(status::shutting_down());
         }
-        let handle = self.find_by_code(&request.room_id, &request.join_code)?;
+        let handle = self.find_by_code(&request.room_id, &request.join_code, key)?;
         check_room(&caller, &self.rooms, handle.id())?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?

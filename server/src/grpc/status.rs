@@ -11,6 +11,7 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::convert;
+use crate::limits::Refused;
 use crate::outbox::StreamEnd;
 use crate::room::{ReportRefusal, RoomGone, SpectateError};
 use crate::rooms::CreateError;
@@ -215,6 +216,20 @@ impl From<Refusal> for Status {
     }
 }
 
+impl From<Refused> for Refusal {
+    fn from(refused: Refused) -> Self {
+        let metadata = [("limit".to_owned(), refused.limit.to_string())];
+        let mut details = ErrorDetails::with_error_info(refused.reason, DOMAIN, metadata);
+        details.set_retry_info(Some(refused.retry_after));
+        let message = refused.to_string();
+        Self(Status::with_error_details(
+            Code::ResourceExhausted,
+            message,
+            details,
+        ))
+    }
+}
+
 impl From<JoinError> for Refusal {
     fn from(error: JoinError) -> Self {
         let (code, reason) = match error {
@@ -264,6 +279,7 @@ impl From<CreateError> for Refusal {
                 error.to_string(),
                 [("max_rooms", &limit.to_string())],
             ),
+            CreateError::Refused(refused) => return refused.into(),
             CreateError::RequestIdUsed => request_id_used(&error.to_string()),
             CreateError::ShuttingDown => shutting_down(),
             CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
@@ -314,6 +330,12 @@ impl From<SpectateError> for Refusal {
                 "TOO_MANY_SPECTATORS",
                 "this room has no space for more spectators",
                 [],
+            ),
+            SpectateError::EventsGone(first) => status(
+                Code::OutOfRange,
+                "EVENTS_GONE",
+                "a long game of built-in agents keeps only its last events; watch with `snapshot`, or from `first_sequence` on, or read its record when it has ended",
+                [("first_sequence", &(first + 1).to_string())],
             ),
             SpectateError::SnapshotDelayed => status(
                 Code::FailedPrecondition,

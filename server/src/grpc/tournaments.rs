@@ -15,15 +15,21 @@ use tonic::{Code, Request, Response, Status};
 
 use super::access::check_tournament;
 use super::follow::{compute_failed, end, follow};
+use super::limits::charged;
 use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
+    Refusal, disk_nearly_full, field, request_id, request_id_used, shutting_down, status,
+    store_failed,
 };
 use crate::access::Caller;
-use crate::config::{MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES};
+use crate::config::{
+    FOLLOW_SEND_TIMEOUT, MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE,
+    MAX_LEADERBOARD_LINES,
+};
 use crate::convert;
+use crate::limits::{CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
@@ -35,13 +41,17 @@ use chefshat_room::journal::ParticipantKind;
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;
 
+/// Calls that creating a tournament counts as: its games cost far more than the request.
+const COST_OF_TOURNAMENT: u64 = 100;
+
 /// The service.
 #[derive(Debug, Clone)]
 pub struct TournamentCalls {
     tournaments: Arc<Tournaments>,
     recorded: Recorded,
     leaderboard: Arc<Leaderboard>,
-    followers: Arc<Semaphore>,
+    calls: Arc<CallLimits>,
+    followers: Arc<Places>,
     /// Permits to compute updates for followers.
     update_permits: Arc<Semaphore>,
     /// Permits to compute results.
@@ -55,13 +65,16 @@ impl TournamentCalls {
     pub fn new(
         tournaments: Arc<Tournaments>,
         recorded: Recorded,
+        calls: Arc<CallLimits>,
         closing: CancellationToken,
     ) -> Self {
+        let shares = recorded.rooms().shares();
         Self {
+            calls,
             tournaments,
             leaderboard: Arc::new(Leaderboard::new(Arc::clone(recorded.rooms()))),
             recorded,
-            followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
+            followers: Places::new(MAX_FOLLOWERS, shares),
             update_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
             result_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
             closing,
@@ -75,19 +88,23 @@ impl TournamentCalls {
         Ok(handle)
     }
 
-    /// The tournament with a join code; if an id is given too, it must match.
+    /// The tournament with a join code; if an id is given too, it must match. Wrong codes are
+    /// charged.
     fn find_by_code(
         &self,
         caller: &Caller,
         id: &str,
         join_code: &str,
+        key: Key,
     ) -> Result<Arc<TournamentHandle>, Status> {
+        self.calls.may_try_code(key).map_err(Refusal::from)?;
         let handle = match id {
             "" => self.tournaments.by_code(join_code),
             id => Some(self.find(caller, id)?)
                 .filter(|handle| chefshat_room::ids::normal_code(join_code) == handle.join_code()),
         };
         let handle = handle.ok_or_else(|| {
+            self.calls.wrong_code(key);
             status(
                 Code::PermissionDenied,
                 "JOIN_CODE_WRONG",
@@ -127,6 +144,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CreateTournamentRequest>,
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
         let request_key = request_id(&request.request_id)?
@@ -142,9 +160,10 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
+        self.calls.charge(key, COST_OF_TOURNAMENT);
         let (handle, owner) = self
             .tournaments
-            .create(&name, plan, request_key)
+            .create(&name, plan, request_key, key)
             .await
             .map_err(create_refused)?;
         Ok(Response::new(v1::CreateTournamentResponse {
@@ -159,10 +178,11 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentRequest>,
     ) -> Result<Response<v1::GetTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
             "" => self.find(&caller, &request.tournament_id)?,
-            code => self.find_by_code(&caller, &request.tournament_id, code)?,
+            code => self.find_by_code(&caller, &request.tournament_id, code, key)?,
         };
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
@@ -200,11 +220,13 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::JoinTournamentRequest>,
     ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let handle = self.find_by_code(&caller, &request.tournament_id, &request.join_code)?;
+        let (id, code) = (&request.tournament_id, &request.join_code);
+        let handle = self.find_by_code(&caller, id, code, key)?;
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !handle.admits(kind) {
@@ -319,15 +341,15 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::FollowTournamentRequest>,
     ) -> Result<Response<Self::FollowTournamentStream>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let handle = self.find(&caller, &request.into_inner().tournament_id)?;
-        let place = Arc::clone(&self.followers).try_acquire_owned();
-        let place = place.map_err(|_| {
-            status(
-                Code::ResourceExhausted,
-                "TOO_MANY_FOLLOWERS",
-                "the server has no space for more followers of tournaments",
-                [("max_followers", &MAX_FOLLOWERS.to_string())],
-            )
+        let place = self.followers.try_take(key).ok_or_else(|| {
+            Refusal::from(Refused {
+                reason: "TOO_MANY_FOLLOWERS",
+                what: "too many streams that follow tournaments",
+                limit: self.followers.share_of(key) as u64,
+                retry_after: FOLLOW_SEND_TIMEOUT,
+            })
         })?;
         let (sender, responses) = mpsc::channel(1);
         let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
@@ -402,7 +424,7 @@ impl TournamentService for TournamentCalls {
     }
 }
 
-fn unknown() -> Status {
+pub(super) fn unknown() -> Status {
     status(
         Code::NotFound,
         "TOURNAMENT_UNKNOWN",
@@ -411,7 +433,7 @@ fn unknown() -> Status {
     )
 }
 
-fn stopped(_: Stopped) -> Status {
+pub(super) fn stopped(_: Stopped) -> Status {
     shutting_down()
 }
 
@@ -441,6 +463,7 @@ fn create_refused(problem: CreateProblem) -> Status {
             problem.to_string(),
             [("max_tournaments", &limit.to_string())],
         ),
+        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
         CreateProblem::RequestIdUsed => request_id_used(&problem.to_string()),
         CreateProblem::ShuttingDown => shutting_down(),
         CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),

@@ -26,15 +26,17 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::limits::charged;
 use super::new_room::branch_refused;
 use super::recorded::Recorded;
-use super::status::{field, internal, shutting_down, status};
+use super::status::{Refusal, field, internal, shutting_down, status};
 use crate::config::{
     MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
     VECTOR_SETUP_TIMEOUT,
 };
 use crate::convert;
 use crate::convert::Reset;
+use crate::limits::{Held, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
 use chefshat_record::convert::Played;
 use chefshat_room::ids::random_bytes;
@@ -53,7 +55,7 @@ const RECORD_PART_BYTES: usize = 512 * 1024;
 pub struct Vectors {
     recorded: Recorded,
     pool: Arc<ThreadPool>,
-    streams: Arc<Semaphore>,
+    streams: Arc<Places>,
     /// Permits for games times seats that clients play.
     seats: Arc<Semaphore>,
     closing: CancellationToken,
@@ -74,10 +76,11 @@ impl Vectors {
             .num_threads(threads)
             .thread_name(|index| format!("vector-{index}"))
             .build()?;
+        let shares = recorded.rooms().shares();
         Ok(Self {
             recorded,
             pool: Arc::new(pool),
-            streams: Arc::new(Semaphore::new(MAX_VECTOR_STREAMS)),
+            streams: Places::new(MAX_VECTOR_STREAMS, shares),
             seats: Arc::new(Semaphore::new(MAX_VECTOR_SEATS_IN_ALL)),
             closing,
         })
@@ -96,14 +99,14 @@ impl VectorService for Vectors {
         &self,
         request: Request<Streaming<v1::RunRequest>>,
     ) -> Result<Response<Self::RunStream>, Status> {
-        let permit = Arc::clone(&self.streams)
-            .try_acquire_owned()
-            .map_err(|_| too_many())?;
+        let key = charged(request.extensions());
+        let place = (self.streams.try_take(key))
+            .ok_or_else(|| Refusal::from(too_many(self.streams.share_of(key))))?;
         let (responses, stream) = mpsc::channel(SEND_AHEAD);
         let runner = Runner {
             service: self.clone(),
             responses,
-            _permit: permit,
+            _place: place,
             _counted: self.metrics().stream(StreamKind::Vector),
         };
         tokio::spawn(runner.run(request.into_inner()));
@@ -115,7 +118,7 @@ impl VectorService for Vectors {
 struct Runner {
     service: Vectors,
     responses: mpsc::Sender<Result<v1::RunResponse, Status>>,
-    _permit: OwnedSemaphorePermit,
+    _place: Held,
     _counted: Counted,
 }
 
@@ -472,18 +475,13 @@ fn step_refused(error: &StepError) -> Status {
     }
 }
 
-fn too_many() -> Status {
-    status(
-        Code::ResourceExhausted,
-        "TOO_MANY_VECTOR_STREAMS",
-        format!(
-            "this server serves {MAX_VECTOR_STREAMS} vector streams at a time; end one, or play more games on each"
-        ),
-        [
-            ("limit", "max_vector_streams"),
-            ("max_vector_streams", &MAX_VECTOR_STREAMS.to_string()),
-        ],
-    )
+fn too_many(limit: usize) -> Refused {
+    Refused {
+        reason: "TOO_MANY_VECTOR_STREAMS",
+        what: "too many vector streams; end one, or play more games on each",
+        limit: limit as u64,
+        retry_after: VECTOR_SETUP_TIMEOUT,
+    }
 }
 
 fn too_many_games(seats: u32) -> Status {

@@ -244,8 +244,9 @@ impl Handle {
         self.ask(|reply| Message::WatchTable(secret, reply)).await
     }
 
-    /// Closes the room because its tournament is closed; a running game is aborted.
-    pub async fn close_for_tournament(&self) {
+    /// Closes the room because its tournament is closed, or for the server's operator; a running
+    /// game is aborted.
+    pub async fn close_without_token(&self) {
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(Message::Abort(AbortReason::Closed)).await;
     }

@@ -86,6 +86,8 @@ pub enum SpectateError {
     Full,
     /// A snapshot of a delayed room would reveal its present state.
     SnapshotDelayed,
+    /// The requested events are no longer there; the position of the first one that is.
+    EventsGone(usize),
 }
 
 /// A command of a seat.

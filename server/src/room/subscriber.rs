@@ -4,6 +4,7 @@
 //! spectator that falls too far behind is disconnected.
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -183,6 +184,11 @@ impl Subscriber {
     /// Whether updates may be due even without a decision, an urgent event or a full backlog.
     pub fn must_always_be_visited(&self) -> bool {
         self.stalled || (self.connection()).is_none_or(|connection| connection.options.at_once)
+    }
+
+    /// Position in the log of the first event that has not been sent.
+    pub fn position(&self) -> usize {
+        self.position
     }
 
     /// Length of the log at which the backlog is due.
@@ -434,9 +440,19 @@ pub struct PublicEvents {
 }
 
 impl PublicEvents {
+    /// Drops what is encoded: nobody reads it. What follows starts at this position.
+    pub fn restart_at(&mut self, position: usize) {
+        self.events = Events::starting_at(position);
+    }
+
+    /// The positions of the encoded events.
+    pub fn encoded(&self) -> Range<usize> {
+        self.events.first()..self.events.end()
+    }
+
     /// Encodes the events added to the log.
     pub fn follow(&mut self, core: &Core) {
-        for position in self.events.len()..core.log().len() {
+        for position in self.events.end()..core.log().len() {
             let event = convert::event_to_proto(core, position, Viewer::Spectator);
             self.events
                 .add(&event.expect("the position is within the log"));

@@ -16,6 +16,8 @@ use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, Change, ParticipantKind, SeatedParticipant};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
 use smallvec::SmallVec;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
@@ -34,6 +36,7 @@ use crate::access::Client;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
+use crate::limits::{Background, Held, Key, Turn};
 use crate::metrics::{Counted, Metrics, Outcome};
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
@@ -42,6 +45,11 @@ use crate::store::{Journal, Signed, Store, StoreError};
 
 /// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;
+/// Most events that a room of built-in agents keeps for spectators who come late. Its record has
+/// all of them.
+const MAX_EVENTS_UNREAD: usize = 16_384;
+/// The same, once its game is over.
+const MAX_EVENTS_UNREAD_AFTERWARDS: usize = 1_024;
 
 /// The parts of the server that a room uses.
 #[derive(Clone)]
@@ -62,6 +70,10 @@ pub struct TaskContext {
     pub metrics: Arc<Metrics>,
     /// Notified when the game of a room has ended, and when the room is gone.
     pub watcher: Arc<dyn RoomWatcher>,
+    /// Plays the games of built-in agents.
+    pub background: Arc<Background>,
+    /// Who created the room.
+    pub owner: Key,
 }
 
 /// Maintains the list of rooms.
@@ -104,6 +116,7 @@ pub(super) fn spawn(
         backlog_due_at: 0,
         over_since,
         suspended: false,
+        place: None,
         timer_at: None,
         answers_in_place: false,
         table: physical.then(|| Box::new(TableView::new())),
@@ -173,6 +186,8 @@ pub(super) struct Room {
     /// Whether the room ends while its game is unfinished; the game resumes when the server is
     /// restarted.
     suspended: bool,
+    /// The place among the games that built-in agents play.
+    place: Option<Held>,
     /// When the timer of the task fires.
     timer_at: Option<Duration>,
     answers_in_place: bool,
@@ -239,6 +254,16 @@ impl Resting {
     }
 }
 
+/// What the task of a room does next.
+enum Next {
+    /// Reads this number of messages; 0: nobody has a handle any more.
+    Messages(usize),
+    /// Plays a slice of a game of built-in agents.
+    Turn(Turn),
+    /// Does what is due.
+    Timer,
+}
+
 /// Runs a room until it is gone.
 async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiver<Message>) {
     let id = room.core.header().room_id;
@@ -246,41 +271,65 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiv
     let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
     let timer = tokio::time::sleep_until(room.clock.instant(room.now));
     tokio::pin!(timer);
+    // The next slice of a game that nobody plays.
+    let mut turn: Option<BoxFuture<'static, Turn>> = None;
     while room.commit_and_publish().await {
         if room.suspended && room.over_since.is_none() {
             room.subscribers().for_each(Subscriber::stop);
             break;
         }
-        room.set_timer(timer.as_mut());
+        if !room.plays_in_background() {
+            (turn, room.place) = (None, None);
+        } else if turn.is_none() {
+            let background = Arc::clone(&room.context.background);
+            turn = Some(
+                background
+                    .turn(room.context.owner, room.place.take())
+                    .boxed(),
+            );
+        }
+        room.set_timer(timer.as_mut(), turn.is_some());
         room.answers_in_place = room.core.awaits_participants_only();
         let armed = room.timer_at.is_some();
         *resting.lock() = Some(room);
-        let (room_or_none, received) = poll_fn(|context| {
+        let (room_or_none, next) = poll_fn(|context| {
             // Under the lock, so that no answer in place overtakes a message.
             let mut resting = resting.lock();
             let received = inbox.poll_recv_many(context, &mut messages, INPUTS_PER_COMMIT);
             if let Poll::Ready(count) = received {
-                return Poll::Ready((resting.take(), Some(count)));
+                return Poll::Ready((resting.take(), Next::Messages(count)));
+            }
+            if let Some(Poll::Ready(granted)) = turn.as_mut().map(|turn| turn.poll_unpin(context)) {
+                return Poll::Ready((resting.take(), Next::Turn(granted)));
             }
             let fired = armed && timer.as_mut().poll(context).is_ready();
             if fired {
-                Poll::Ready((resting.take(), None))
+                Poll::Ready((resting.take(), Next::Timer))
             } else {
                 Poll::Pending
             }
         })
         .await;
         // There is no room any more if it panicked while it handled an answer in place.
-        let Some(state) = room_or_none.filter(|_| received != Some(0)) else {
+        let Some(state) = room_or_none.filter(|_| !matches!(next, Next::Messages(0))) else {
             break;
         };
         room = state;
+        if let Next::Turn(granted) = next {
+            turn = None;
+            let background = Arc::clone(&room.context.background);
+            let played = background.play(granted, move || room.play_slice()).await;
+            let Some((state, place)) = played else { break };
+            room = state;
+            room.place = Some(place);
+            continue;
+        }
         room.now = room.clock.now();
         for message in messages.drain(..) {
             room.receive(message);
         }
         // A busy mailbox must not delay deadlines.
-        let due = received.is_none() || room.timer_at.is_some_and(|at| at <= room.now);
+        let due = matches!(next, Next::Timer) || room.timer_at.is_some_and(|at| at <= room.now);
         if due && !room.fire() {
             break;
         }
@@ -320,17 +369,35 @@ impl Room {
         if self.is_expired() {
             return false;
         }
-        let handed = self.handed();
-        self.core.tick(self.now, handed);
+        if !self.plays_in_background() {
+            let handed = self.handed();
+            self.core.tick(self.now, handed);
+        }
         true
+    }
+
+    /// Whether the next decision is due and needs no participant.
+    fn plays_in_background(&self) -> bool {
+        let is_due = |deadline| deadline <= self.now;
+        self.core.is_unattended() && self.core.deadline().is_some_and(is_due)
+    }
+
+    /// Plays a slice of a game that nobody plays, and returns the number of decisions.
+    fn play_slice(mut self: Box<Self>) -> (Box<Self>, u64) {
+        self.now = self.clock.now();
+        let before = self.core.decisions();
+        self.core.tick(self.now, None);
+        let made = self.core.decisions() - before;
+        (self, made)
     }
 
     /// Sets the timer to the next deadline. A timer that fires too early finds nothing to do and is
     /// set again, so that moving a deadline back costs nothing.
-    fn set_timer(&mut self, timer: Pin<&mut Sleep>) {
+    /// While the room waits for its turn, the game has no deadline.
+    fn set_timer(&mut self, timer: Pin<&mut Sleep>, waits_for_turn: bool) {
         let deadline = match self.over_since {
             Some(since) => Some(since + self.context.retention),
-            None => self.core.deadline(),
+            None => self.core.deadline().filter(|_| !waits_for_turn),
         };
         if !self.timer_covers(deadline)
             && let Some(deadline) = deadline
@@ -588,6 +655,10 @@ impl Room {
         if request.snapshot && policy.spectator_delay_decisions > 0 {
             return Err(SpectateError::SnapshotDelayed);
         }
+        let first = self.core.log().first();
+        if !request.snapshot && request.from < first {
+            return Err(SpectateError::EventsGone(first));
+        }
         if self.spectators.len() >= MAX_SPECTATORS {
             return Err(SpectateError::Full);
         }
@@ -599,7 +670,12 @@ impl Room {
             request.snapshot,
             self.context.metrics.spectator(),
         );
+        let position = spectator.position();
         self.spectators.push(spectator);
+        if position < self.public.encoded().start {
+            self.public.restart_at(first);
+            self.public.follow(&self.core);
+        }
         Ok(())
     }
 
@@ -694,6 +770,9 @@ impl Room {
     /// Sends committed changes to subscribers and results to callers.
     fn publish(&mut self) {
         self.core.released(self.now);
+        if self.core.is_built_in_only() {
+            self.forget_unread();
+        }
         self.public.follow(&self.core);
         let mut releases = std::mem::take(&mut self.releases);
         for release in releases.drain(..) {
@@ -706,6 +785,24 @@ impl Room {
         self.deliver();
         self.trace_decision();
         self.count_published();
+    }
+
+    /// Drops old events of a game without participants that no spectator waits for.
+    fn forget_unread(&mut self) {
+        let length = self.core.log().len();
+        let unread = self.spectators.iter().map(Subscriber::position).min();
+        // What spectators have not read yet is encoded again, which is little: they keep up.
+        if unread.is_none() || self.public.encoded().len() > 2 * MAX_EVENTS_UNREAD {
+            self.public.restart_at(unread.unwrap_or(length));
+        }
+        let kept = match self.core.state().is_over() {
+            true => MAX_EVENTS_UNREAD_AFTERWARDS,
+            false => MAX_EVENTS_UNREAD,
+        };
+        let visible = self.core.visible_to_spectators();
+        let keep_from = length.saturating_sub(kept).min(visible);
+        let keep_from = unread.map_or(keep_from, |unread| keep_from.min(unread));
+        self.core.drop_log_before(keep_from);
     }
 
     fn release(&mut self, release: Release) {
@@ -835,7 +932,10 @@ impl Room {
             "the game has ended"
         );
         if has_record {
-            self.context.record_writer.write_record(header.game_id);
+            let owner = self.context.owner;
+            self.context
+                .record_writer
+                .write_record(header.game_id, owner);
         }
         true
     }
@@ -846,6 +946,11 @@ impl Room {
         if !has_record || signer.public().is_none() {
             return Ok(None);
         }
+        // One long game of built-in agents after another.
+        let _slice = match self.core.is_built_in_only() {
+            true => Some(self.context.background.slice(self.context.owner).await),
+            false => None,
+        };
         let entries = self.journal.entries().await?;
         Ok(signer.sign(Arc::clone(self.core.header()), entries).await)
     }

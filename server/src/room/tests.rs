@@ -22,6 +22,7 @@ use super::{
 };
 use crate::access::Client;
 use crate::clock::RoomClock;
+use crate::limits::{Background, Key, Shares};
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
@@ -77,20 +78,29 @@ async fn room_with(
         .create(Arc::clone(&header), Vec::new())
         .await
         .expect("a memory store");
+    let background = Background::new(Shares::default(), 1_000_000).expect("threads");
+    let background = Arc::new(background);
     spawn_room(
         Core::new(header),
         RoomClock::of_age(Duration::ZERO),
         None,
         change(journal),
         TaskContext {
-            record_writer: RecordWriter::new(store.clone(), None, TaskTracker::new()),
             signer: Signer::new(None),
+            record_writer: RecordWriter::new(
+                store.clone(),
+                None,
+                TaskTracker::new(),
+                Arc::clone(&background),
+            ),
             store,
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
             tracker: TaskTracker::new(),
             metrics: Arc::default(),
             watcher: Arc::new(NullWatcher),
+            background,
+            owner: Key::Local,
         },
     )
 }

@@ -14,12 +14,14 @@ use chefshat_agents::RecordedPlayer;
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSet, Seat};
 use chefshat_record::signature::PublicKey;
+use rayon::ThreadPoolBuildError;
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::config::ServerConfig;
+use crate::limits::{Background, Held, Key, Places, Refused, Shares};
 use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
@@ -31,6 +33,9 @@ use chefshat_room::journal::{Fill, GameHeader, GameStart, SeatedParticipant, Tou
 use chefshat_room::policy::{Durability, Policy};
 pub use table::CreateError;
 use table::{Entry, Table};
+
+/// When it is worth trying again to create a room.
+const RETRY_ROOMS: Duration = Duration::from_secs(30);
 
 /// The settings of a new room.
 #[derive(Debug)]
@@ -57,6 +62,8 @@ pub struct NewRoom {
     pub seating: Option<Seating>,
     /// The request for it, if it can be repeated.
     pub request: Option<RequestKey>,
+    /// Who is charged for it.
+    pub charged: Key,
 }
 
 /// The part of a room's settings that a tournament decides.
@@ -99,16 +106,27 @@ pub struct Rooms {
     ended: AtomicU64,
     context: TaskContext,
     max_rooms: usize,
+    places: Arc<Places>,
+    shares: Shares,
 }
 
 impl Rooms {
     /// Creates an empty set.
-    pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
+    ///
+    /// # Errors
+    /// The operating system cannot start the threads for games of built-in agents.
+    pub fn new(
+        config: &ServerConfig,
+        store: Arc<dyn Store>,
+        tracker: TaskTracker,
+    ) -> Result<Arc<Self>, ThreadPoolBuildError> {
         let metrics = Arc::new(Metrics::default());
         if let Some(store) = store.metrics() {
             metrics.add_store(store);
         }
-        Arc::new_cyclic(|rooms: &Weak<Self>| Self {
+        let background = Background::new(config.shares, config.built_in_decisions_per_second)?;
+        let background = Arc::new(background);
+        Ok(Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
             closed: Mutex::default(),
             changed: Notify::new(),
@@ -119,6 +137,7 @@ impl Rooms {
                     Arc::clone(&store),
                     config.data_dir.clone(),
                     tracker.clone(),
+                    Arc::clone(&background),
                 ),
                 store,
                 signer: Signer::new(config.signing_key.clone()),
@@ -127,9 +146,13 @@ impl Rooms {
                 tracker,
                 metrics,
                 watcher: Arc::new(Watcher(Weak::clone(rooms))),
+                background,
+                owner: Key::Resumed,
             },
             max_rooms: config.max_rooms,
-        })
+            places: Places::new(config.max_rooms, config.shares),
+            shares: config.shares,
+        }))
     }
 
     /// The public key that signs records, if the server has one.
@@ -150,7 +173,7 @@ impl Rooms {
         let reservation = loop {
             // A repetition of a request whose room is still being created waits for it.
             let created = self.created.notified();
-            match Reservation::of(self, owner)? {
+            match Reservation::of(self, owner, new.charged)? {
                 Claim::Reserved(reservation) => break reservation,
                 Claim::Created(created) => return Ok(created),
                 Claim::InProgress => created.await,
@@ -292,9 +315,29 @@ impl Rooms {
         handles.map(Handle::mailbox_depth).collect()
     }
 
+    /// How much of each limit one caller may use.
+    pub fn shares(&self) -> Shares {
+        self.shares
+    }
+
+    /// Plays the games of built-in agents, and does other work that nobody waits for.
+    pub fn background(&self) -> &Arc<Background> {
+        &self.context.background
+    }
+
     /// Writes records to files.
     pub fn record_writer(&self) -> &RecordWriter {
         &self.context.record_writer
+    }
+
+    /// The refusal of one more room of a caller.
+    fn too_many_of(&self, key: Key) -> Refused {
+        Refused {
+            reason: "TOO_MANY_ROOMS",
+            what: "too many rooms that wait or play; close one, or try later",
+            limit: self.places.share_of(key) as u64,
+            retry_after: RETRY_ROOMS,
+        }
     }
 
     fn is_durable(&self, header: &GameHeader) -> bool {
@@ -399,11 +442,12 @@ enum Claim {
 struct Reservation {
     rooms: Arc<Rooms>,
     owner: Token,
+    place: Option<Held>,
 }
 
 impl Reservation {
     /// Reserves space for the room of this owner token.
-    fn of(rooms: &Arc<Rooms>, owner: Token) -> Result<Claim, CreateError> {
+    fn of(rooms: &Arc<Rooms>, owner: Token, charged: Key) -> Result<Claim, CreateError> {
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.room) {
             return match entry.owner.matches(&owner.secret) {
@@ -418,13 +462,18 @@ impl Reservation {
         if table.in_creation.contains(&owner.room) {
             return Ok(Claim::InProgress);
         }
+        let place = rooms.places.try_take(charged);
+        let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
         table.reserve(owner.room, rooms.max_rooms)?;
         drop(table);
-        let rooms = Arc::clone(rooms);
-        Ok(Claim::Reserved(Self { rooms, owner }))
+        Ok(Claim::Reserved(Self {
+            rooms: Arc::clone(rooms),
+            owner,
+            place: Some(place),
+        }))
     }
 
-    async fn create(self, new: NewRoom) -> Result<Created, CreateError> {
+    async fn create(mut self, new: NewRoom) -> Result<Created, CreateError> {
         let rooms = &self.rooms;
         let seating = new.seating.as_ref();
         let server_seed = seating.and_then(|seating| seating.server_seed);
@@ -469,7 +518,11 @@ impl Reservation {
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
             let clock = RoomClock::of_age(Duration::ZERO);
-            let handle = spawn_room(core, clock, None, journal, rooms.context.clone());
+            let context = TaskContext {
+                owner: new.charged,
+                ..rooms.context.clone()
+            };
+            let handle = spawn_room(core, clock, None, journal, context);
             table.enter(Entry {
                 handle: handle.clone(),
                 game_id: header.game_id,
@@ -479,6 +532,7 @@ impl Reservation {
                 durable: rooms.is_durable(&header),
                 over: false,
                 suspended: false,
+                place: self.place.take(),
             });
             return Ok(Created {
                 handle,
@@ -509,6 +563,7 @@ impl RoomWatcher for Watcher {
                 && let Some(entry) = table.by_number.get_mut(&number)
             {
                 entry.over = true;
+                entry.place = None;
             }
             drop(table);
             rooms.ended.fetch_add(1, Ordering::AcqRel);

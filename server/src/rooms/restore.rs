@@ -15,6 +15,7 @@ use tracing::{error, info, warn};
 use super::{Entry, Rooms};
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::convert;
+use crate::limits::Key;
 use crate::room::spawn_room;
 use crate::store::{ResumableGame, Store, StoreError};
 use chefshat_room::Core;
@@ -55,7 +56,7 @@ impl Rooms {
             info!(games = restored, "games resumed");
         }
         for game in without_record_file {
-            self.context.record_writer.write_record(game);
+            self.context.record_writer.write_record(game, Key::Resumed);
         }
         Ok(restored)
     }
@@ -89,6 +90,7 @@ impl Rooms {
             durable: true,
             over: game.concluded,
             suspended: false,
+            place: None,
         });
         Ok(())
     }

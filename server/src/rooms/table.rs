@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use crate::limits::{Held, Refused};
 use crate::room::Handle;
 use crate::store::StoreError;
 use chefshat_room::ids::{Id, SecretHash};
@@ -12,6 +13,9 @@ pub enum CreateError {
     /// The limit of rooms is reached.
     #[error("the server already has {0} rooms; close one or try later")]
     TooMany(usize),
+    /// Its creator has too many rooms.
+    #[error(transparent)]
+    Refused(#[from] Refused),
     /// The request id was used for another room.
     #[error("this request id was used to create another room; draw a new one")]
     RequestIdUsed,
@@ -53,6 +57,8 @@ pub(super) struct Entry {
     /// The room has ended but its game resumes when the server is restarted. It stays in the table,
     /// so that clients are told to try again rather than that the room is unknown.
     pub(super) suspended: bool,
+    /// Its place among its creator's rooms, until its game is over.
+    pub(super) place: Option<Held>,
 }
 
 impl Entry {

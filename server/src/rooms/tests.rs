@@ -11,7 +11,7 @@ use chefshat_room::journal::ParticipantKind;
 async fn participants_of_a_tournament_are_committed_with_their_room() {
     // It stores new games, but no further entries.
     let store = Arc::new(FailingStore::after(0));
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
     let fill = Fill::Open {
         reserved_for: Some(ParticipantKind::Agent),
     };
@@ -31,6 +31,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         game_seed: None,
         physical: false,
         request: None,
+        charged: Key::Local,
         seating: Some(Seating {
             game: TournamentGame {
                 tournament: Id([1; 16]),

@@ -313,8 +313,15 @@ async fn serve_edited(which: usize, edits: &Edits, frames: bool) {
         .await
         .expect("an empty store");
     let closing = CancellationToken::new();
-    let routes = routes(&server.rooms, &server.tournaments, &server.config, &closing)
-        .expect("valid settings");
+    let routes = routes(
+        &server.rooms,
+        &server.tournaments,
+        &server.calls,
+        &server.connections,
+        &server.config,
+        &closing,
+    )
+    .expect("valid settings");
     let room: v1::CreateRoomResponse =
         call_once(&routes, "RoomService/CreateRoom", &create_room()).await;
     let seat: v1::JoinRoomResponse = call_once(&routes, "RoomService/JoinRoom", &join(&room)).await;

@@ -9,7 +9,10 @@ use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame};
+use super::{
+    Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoreUsage,
+    StoredGame,
+};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -90,6 +93,23 @@ impl Store for FailingStore {
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
         self.inner.import(game, summary, lines)
+    }
+
+    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
+        self.inner.usage()
+    }
+
+    fn prunable(
+        &self,
+        keep: Keep,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+        self.inner.prunable(keep, after, count)
+    }
+
+    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.delete(games)
     }
 
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {

@@ -8,7 +8,10 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Part, ResumableGame, Signed, Store, StoreError, StoredGame, matches_filter};
+use super::{
+    Journal, Keep, Part, ResumableGame, Signed, Store, StoreError, StoreUsage, StoredGame,
+    matches_filter,
+};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -62,6 +65,14 @@ impl Finished {
         {
             self.numbers.remove(&oldest.id);
             self.entries -= oldest.entries();
+        }
+    }
+
+    fn remove(&mut self, game: Id) {
+        if let Some(number) = self.numbers.remove(&game)
+            && let Some(game) = self.games.remove(&number)
+        {
+            self.entries -= game.entries();
         }
     }
 
@@ -135,6 +146,41 @@ impl Store for MemoryStore {
             });
         }
         ready(Ok(new)).boxed()
+    }
+
+    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
+        let usage = StoreUsage {
+            finished_games: lock(&self.finished).games.len() as u64,
+            ..StoreUsage::default()
+        };
+        ready(Ok(usage)).boxed()
+    }
+
+    fn prunable(
+        &self,
+        keep: Keep,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+        let finished = lock(&self.finished);
+        let newest = usize::try_from(keep.newest.unwrap_or(1)).unwrap_or(usize::MAX);
+        let old = finished.games.len().saturating_sub(newest.max(1));
+        let ended = |game: &FinishedGame| game.summary.ended_at_ms;
+        let found = (finished.games.iter().take(old))
+            .filter(|(number, _)| **number > after)
+            .filter(|(_, game)| keep.ended_since_ms.is_none_or(|since| ended(game) < since))
+            .take(count)
+            .map(|(number, game)| (*number, game.id))
+            .collect();
+        ready(Ok(found)).boxed()
+    }
+
+    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        let mut finished = lock(&self.finished);
+        for game in games {
+            finished.remove(game);
+        }
+        ready(Ok(())).boxed()
     }
 
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {

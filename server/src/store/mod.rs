@@ -11,7 +11,8 @@ pub mod tournaments;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use futures::future::BoxFuture;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
 
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
@@ -93,6 +94,26 @@ pub struct ResumableGame {
     pub concluded: bool,
 }
 
+/// Which finished games stay. All conditions that are set must allow the deletion of a game.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Keep {
+    /// Those that ended at this time or later, milliseconds since the Unix epoch.
+    pub ended_since_ms: Option<u64>,
+    /// The newest ones, this many.
+    pub newest: Option<u64>,
+}
+
+/// How much a store takes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StoreUsage {
+    /// Bytes on the disk.
+    pub bytes: u64,
+    /// Bytes that are free on that disk.
+    pub free_bytes: u64,
+    /// Number of finished games.
+    pub finished_games: u64,
+}
+
 /// Stores games.
 pub trait Store: Send + Sync + 'static {
     /// Whether unfinished games survive the end of the server, a crash included.
@@ -139,6 +160,25 @@ pub trait Store: Send + Sync + 'static {
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// How much is stored.
+    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
+        ready(Ok(StoreUsage::default())).boxed()
+    }
+    /// At most `count` finished games after a number that need not be kept, with their numbers,
+    /// oldest first. Never the newest game, nor one whose record is still to be written.
+    /// A store that keeps everything returns none.
+    fn prunable(
+        &self,
+        _keep: Keep,
+        _after: u64,
+        _count: usize,
+    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
+    }
+    /// Deletes games that were prunable and gives their space back.
+    fn delete(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Ok(())).boxed()
+    }
     /// Finished games whose record is not yet written to a file.
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
     /// Marks the record of a game as written to a file.

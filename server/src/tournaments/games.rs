@@ -74,14 +74,17 @@ impl Task {
         let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.handle.id())
         };
+        let background = self.rooms.background();
+        // Before it is read: the record of a long game takes much time and memory.
+        let slice = background.slice(self.handle.charged).await;
         if let Some(stored) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
-            let reading = tokio::task::spawn_blocking(move || {
+            let reading = background.run(move || {
                 let lines = convert::lines_of(&stored);
                 (outcome::outcome(&lines), abort_reason(&lines))
             });
-            let (outcome, reason) = reading
-                .await
-                .map_err(|error| StoreError::Failed(format!("reading a record failed: {error}")))?;
+            let (outcome, reason) = (reading.await)
+                .ok_or_else(|| StoreError::Failed("reading a record failed".into()))?;
+            drop(slice);
             return Ok(match (outcome, reason) {
                 (Ok(outcome), _) => Some(Ended::Played {
                     shifts: outcome.shifts,
@@ -229,6 +232,7 @@ impl Task {
             game_seed: self.handle.game_seed(number, game.deal),
             physical,
             request: None,
+            charged: self.handle.charged,
             seating: Some(Seating {
                 game: TournamentGame {
                     tournament: self.handle.id(),

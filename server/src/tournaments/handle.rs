@@ -10,6 +10,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::shared::{AsOf, Shared};
 use crate::convert::{self, TournamentPlan};
+use crate::limits::Key;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::rooms::Rooms;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
@@ -207,6 +208,8 @@ impl TournamentState {
 pub struct TournamentHandle {
     pub(super) header: TournamentHeader,
     pub(super) plan: TournamentPlan,
+    /// Who is charged for its games.
+    pub(super) charged: Key,
     /// The state with only committed changes.
     pub(super) committed: Mutex<TournamentState>,
     pub(super) mailbox: mpsc::Sender<Message>,
@@ -425,7 +428,7 @@ impl TournamentHandle {
             if rooms.is_over(room) == Some(false)
                 && let Some(room) = rooms.get(room)
             {
-                tokio::spawn(async move { room.close_for_tournament().await });
+                tokio::spawn(async move { room.close_without_token().await });
             }
         }
     }

@@ -12,6 +12,7 @@ mod tests;
 mod views;
 
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
@@ -26,6 +27,7 @@ pub use shared::ComputeError;
 use crate::clock::since_epoch_ms;
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
+use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
@@ -34,6 +36,9 @@ use handle::TournamentState;
 use shared::Shared;
 use table::Table;
 use task::{Stop, Task};
+
+/// When it is worth trying again to create a tournament.
+const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
 
 /// Why a tournament was not created.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +49,9 @@ pub enum CreateProblem {
     /// The limit of tournaments is reached.
     #[error("the server has {0} tournaments that are not over; close one or try later")]
     TooMany(usize),
+    /// Its creator has too many tournaments.
+    #[error(transparent)]
+    Refused(#[from] Refused),
     /// The request id was used for another tournament.
     #[error("this request id was used to create another tournament; draw a new one")]
     RequestIdUsed,
@@ -67,17 +75,20 @@ pub struct Tournaments {
     table: Mutex<Table>,
     /// Notified when the creation of a tournament has ended.
     created: Notify,
+    places: Arc<Places>,
 }
 
 impl Tournaments {
     /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
     pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        let places = Places::new(MAX_TOURNAMENTS, rooms.shares());
         Arc::new(Self {
             rooms,
             tracker,
             stop: Stop::default(),
             table: Mutex::default(),
             created: Notify::new(),
+            places,
         })
     }
 
@@ -90,6 +101,7 @@ impl Tournaments {
         name: &str,
         plan: TournamentPlan,
         request: Option<RequestKey>,
+        charged: Key,
     ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
         let core = Tournament::new(plan.core.clone())?;
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
@@ -108,7 +120,7 @@ impl Tournaments {
                     false => Err(CreateProblem::RequestIdUsed),
                 };
             }
-            match Reservation::of(self, owner)? {
+            match Reservation::of(self, owner, charged)? {
                 Some(reservation) => break reservation,
                 None => created.await,
             }
@@ -117,7 +129,7 @@ impl Tournaments {
         // stored and restored with the server.
         let creating = self
             .tracker
-            .spawn(reservation.make(name.to_owned(), plan, core));
+            .spawn(reservation.make(name.to_owned(), plan, core, charged));
         creating
             .await
             .map_err(|error| StoreError::Failed(format!("creating a tournament failed: {error}")))?
@@ -135,7 +147,8 @@ impl Tournaments {
             match restored(&stored) {
                 Ok((plan, state)) => {
                     unfinished += usize::from(state.core.state() == State::Playing);
-                    self.start_task(stored.header, stored.rows, plan, state);
+                    let charged = (Key::Tournament(id), None);
+                    self.start_task(stored.header, stored.rows, plan, state, charged);
                 }
                 Err(problem) => {
                     // The deals it would withhold are unknown.
@@ -182,6 +195,19 @@ impl Tournaments {
         all.iter().any(announces)
     }
 
+    /// Whether a tournament that is not over has announced a game with this id: its result may
+    /// still be read.
+    pub fn needs(&self, game: Id) -> bool {
+        let all: Vec<_> = (self.lock().earlier(None))
+            .map(|(_, handle)| Arc::clone(handle))
+            .collect();
+        let needs = |handle: &Arc<TournamentHandle>| {
+            !handle.is_over()
+                && (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
+        };
+        all.iter().any(needs)
+    }
+
     /// The newest `count` tournaments in this state, or in any; only those created before number
     /// `before`, if set. With their numbers, newest first.
     pub fn newest(
@@ -208,11 +234,13 @@ impl Tournaments {
         rows: u64,
         plan: TournamentPlan,
         state: TournamentState,
+        (charged, place): (Key, Option<Held>),
     ) -> Arc<TournamentHandle> {
         let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
         let handle = Arc::new(TournamentHandle {
             header,
             plan,
+            charged,
             committed: Mutex::new(state),
             mailbox,
             changes: watch::Sender::new(0),
@@ -227,7 +255,7 @@ impl Tournaments {
             handle.close_rooms(&self.rooms);
             return handle;
         }
-        let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows);
+        let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
         self.tracker.spawn(task.run(inbox, self.stop.clone()));
         handle
     }
@@ -241,30 +269,47 @@ impl Tournaments {
 struct Reservation {
     tournaments: Arc<Tournaments>,
     owner: Token,
+    place: Option<Held>,
 }
 
 impl Reservation {
     /// Reserves space for the tournament of this owner token; `None` if it is being created or has
     /// just been.
-    fn of(tournaments: &Arc<Tournaments>, owner: Token) -> Result<Option<Self>, CreateProblem> {
+    fn of(
+        tournaments: &Arc<Tournaments>,
+        owner: Token,
+        charged: Key,
+    ) -> Result<Option<Self>, CreateProblem> {
         let mut table = tournaments.lock();
         if table.is_in_creation(owner.room) || table.get(owner.room).is_some() {
             return Ok(None);
         }
+        let place = tournaments.places.try_take(charged).ok_or(Refused {
+            reason: "TOO_MANY_TOURNAMENTS",
+            what: "too many tournaments that are not over; close one, or try later",
+            limit: tournaments.places.share_of(charged) as u64,
+            retry_after: RETRY_TOURNAMENTS,
+        })?;
         if !table.reserve(owner.room) {
             return Err(CreateProblem::TooMany(MAX_TOURNAMENTS));
         }
         drop(table);
         let tournaments = Arc::clone(tournaments);
-        Ok(Some(Self { tournaments, owner }))
+        Ok(Some(Self {
+            tournaments,
+            owner,
+            place: Some(place),
+        }))
     }
 
     async fn make(
-        self,
+        mut self,
         name: String,
         plan: TournamentPlan,
         core: Tournament,
+        charged: Key,
     ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
+        let place = self.place.take();
         let tournaments = &self.tournaments;
         let owner = self.owner;
         let header = TournamentHeader {
@@ -283,7 +328,9 @@ impl Reservation {
             .await?;
         let mut state = TournamentState::new(core);
         entries.iter().for_each(|entry| state.apply(entry));
-        Ok((tournaments.start_task(header, 1, plan, state), owner))
+        let charged = (charged, place);
+        let handle = tournaments.start_task(header, 1, plan, state, charged);
+        Ok((handle, owner))
     }
 }
 

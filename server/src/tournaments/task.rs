@@ -15,6 +15,7 @@ use super::handle::{
     Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
 };
 use crate::config::TOURNAMENT_OPEN_TIME;
+use crate::limits::Held;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
@@ -60,11 +61,18 @@ pub(super) struct Task {
     /// Answers that wait for a commit.
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     began: Instant,
+    /// Its place among its creator's tournaments.
+    _place: Option<Held>,
 }
 
 impl Task {
     /// Creates the task of a tournament with this number of committed rows.
-    pub(super) fn new(handle: Arc<TournamentHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
+    pub(super) fn new(
+        handle: Arc<TournamentHandle>,
+        rooms: Arc<Rooms>,
+        rows: u64,
+        place: Option<Held>,
+    ) -> Self {
         let state = handle.committed().clone();
         Self {
             state,
@@ -81,6 +89,7 @@ impl Task {
             retry: None,
             replies: Vec::new(),
             began: Instant::now(),
+            _place: place,
         }
     }
 

@@ -4,6 +4,7 @@ use futures::FutureExt as _;
 
 use super::*;
 use crate::config::ServerConfig;
+use crate::limits::Key;
 use crate::store::{SqliteStore, Store};
 
 #[tokio::test]
@@ -16,7 +17,8 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
         &ServerConfig::default(),
         Arc::clone(&store),
         tracker.clone(),
-    );
+    )
+    .expect("threads");
     let tournaments = Tournaments::new(rooms, tracker.clone());
     let settings = chefshat_proto::v1::TournamentSettings {
         format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
@@ -24,7 +26,9 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
     };
     let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
     // The caller is cancelled during the commit.
-    let asked = tournaments.create("Coppa", plan, None).now_or_never();
+    let asked = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .now_or_never();
     assert!(asked.is_none(), "the commit takes a while");
     tournaments.end();
     tracker.close();
@@ -76,10 +80,13 @@ fn entrant(name: &str) -> Entry {
 async fn readers_see_only_committed_changes() {
     let store = Arc::new(crate::store::FailingStore::after(u64::MAX));
     let commits = Arc::clone(&store.tournament_commits);
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
     let tournaments = Tournaments::new(rooms, TaskTracker::new());
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments.create("Coppa", plan, None).await.expect("made");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
 
@@ -114,13 +121,16 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
             max_rooms,
             ..ServerConfig::default()
         };
-        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
         Tournaments::new(rooms, TaskTracker::new())
     };
     // No room can be created: the game has its id, and waits.
     let tournaments = start(0);
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments.create("Coppa", plan, None).await.expect("made");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
     let mut changes = handle.changes();
     handle
         .begin()
@@ -176,7 +186,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let store: Arc<dyn Store> = Arc::new(store);
     let start = || {
         let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
         Tournaments::new(rooms, TaskTracker::new())
     };
     let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
@@ -186,12 +196,14 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
         ..entrant("Ada")
     };
     let tournaments = start();
-    let create = || tournaments.create("Coppa", plan(), Some(request));
+    let create = || tournaments.create("Coppa", plan(), Some(request), Key::Local);
     let (first, second) = tokio::join!(create(), create());
     let ((handle, owner), (other, again)) = (first.expect("made"), second.expect("made"));
     assert!(Arc::ptr_eq(&handle, &other) && owner == again);
     let other = RequestKey::new([1; 32], b"other content");
-    let refused = tournaments.create("Coppa", plan(), Some(other)).await;
+    let refused = tournaments
+        .create("Coppa", plan(), Some(other), Key::Local)
+        .await;
     assert!(matches!(refused, Err(CreateProblem::RequestIdUsed)));
 
     let (first, second) = tokio::join!(handle.join(ada()), handle.join(ada()));
@@ -208,7 +220,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let tournaments = start();
     tournaments.restore().await.expect("readable");
     let (handle, again) = tournaments
-        .create("Coppa", plan(), Some(request))
+        .create("Coppa", plan(), Some(request), Key::Local)
         .await
         .expect("there");
     assert!(again == owner && handle.is_owner(&owner.to_text()));

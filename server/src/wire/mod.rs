@@ -256,14 +256,28 @@ impl Message for Updates {
     }
 }
 
-/// Encoded events, in order: the body of an `EventBatch`.
+/// Encoded events, in order from a first position on: the body of an `EventBatch`.
 #[derive(Debug, Default)]
 pub struct Events {
+    first: usize,
     bytes: Vec<u8>,
     ends: Vec<u32>,
 }
 
 impl Events {
+    /// No events yet; the next one has this position.
+    pub fn starting_at(first: usize) -> Self {
+        Self {
+            first,
+            ..Self::default()
+        }
+    }
+
+    /// Position of the first event.
+    pub fn first(&self) -> usize {
+        self.first
+    }
+
     /// Adds an event.
     pub fn add(&mut self, event: &v1::GameEvent) {
         put_event(&mut self.bytes, event);
@@ -272,10 +286,10 @@ impl Events {
         self.ends.push(end);
     }
 
-    /// The events between two positions.
+    /// The events between two positions, neither of which is before the first.
     pub fn range(&self, from: usize, to: usize) -> &[u8] {
         let start = |position: usize| {
-            let end = position
+            let end = (position - self.first)
                 .checked_sub(1)
                 .and_then(|before| self.ends.get(before));
             end.map_or(0, |end| usize::try_from(*end).expect("positions fit usize"))
@@ -283,14 +297,9 @@ impl Events {
         &self.bytes[start(from)..start(to)]
     }
 
-    /// Number of events.
-    pub fn len(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.ends.is_empty()
+    /// The position after the last event.
+    pub fn end(&self) -> usize {
+        self.first + self.ends.len()
     }
 }
 

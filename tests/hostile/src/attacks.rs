@@ -242,7 +242,7 @@ fn a_record(target: Target) -> BoxFuture<'static, Result<(), Status>> {
             .await?;
         let mut records = RecordServiceClient::new(channel);
         loop {
-            match newest_record(&mut records).await {
+            match newest_record(&mut records, "hostile").await {
                 Ok(_) => return Ok(()),
                 Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
             }
@@ -392,9 +392,9 @@ pub(crate) static ATTACKS: &[Attack] = &[
     ),
     attack!(
         "idle-vector-streams",
-        "256 vector streams without a setup",
+        "512 vector streams without a setup",
         StartVector,
-        |target| target.hold_streams(4, 64, "VectorService/Run", None).await
+        |target| target.hold_streams(4, 128, "VectorService/Run", None).await
     ),
     attack!(
         "slow-record-readers",
@@ -402,7 +402,7 @@ pub(crate) static ATTACKS: &[Attack] = &[
         ReadRecord,
         |target| {
             let mut records = RecordServiceClient::new(target.channel().await?);
-            let game_id = newest_record(&mut records).await?;
+            let game_id = newest_record(&mut records, "hostile").await?;
             let body = raw::framed(&v1::GetRecordRequest { game_id });
             target.hold_streams(4, 64, "RecordService/GetRecord", Some(body)).await
         },

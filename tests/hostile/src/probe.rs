@@ -98,7 +98,7 @@ async fn call(probe: Probe, channel: Channel) -> Result<(), Status> {
         }
         Probe::ReadRecord => {
             let mut service = RecordServiceClient::new(channel);
-            let game_id = newest_record(&mut service).await?;
+            let game_id = newest_record(&mut service, "hostile").await?;
             let request = v1::GetRecordRequest { game_id };
             let mut lines = service.get_record(request).await?.into_inner();
             while lines.message().await?.is_some() {}
@@ -116,11 +116,16 @@ async fn call(probe: Probe, channel: Channel) -> Result<(), Status> {
     Ok(())
 }
 
-/// The id of the newest recorded game.
+/// The id of the newest recorded game of rooms with this name.
 pub(crate) async fn newest_record(
     service: &mut RecordServiceClient<Channel>,
+    room_name: &str,
 ) -> Result<String, Status> {
     let request = v1::ListRecordsRequest {
+        filter: Some(v1::RecordFilter {
+            room_name: room_name.into(),
+            ..v1::RecordFilter::default()
+        }),
         page_size: 1,
         newest_first: true,
         ..v1::ListRecordsRequest::default()

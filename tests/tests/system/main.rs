@@ -15,6 +15,7 @@ mod faults;
 mod languages;
 mod lists;
 mod observing;
+mod operator;
 mod physical;
 mod played;
 mod records;

@@ -1,8 +1,9 @@
-//! `chefshat records`: lists, downloads and imports records of a server. `chefshat verify` checks a
+//! `chefshat records`: lists, downloads, imports and deletes records of a server. `chefshat verify` checks a
 //! downloaded record; a server verifies an imported one.
 
 mod filter;
 mod list;
+pub(super) mod prune;
 mod transfer;
 
 use std::process::ExitCode;
@@ -11,7 +12,7 @@ use clap::{Args, Subcommand};
 
 use super::CommandError;
 
-/// List, download and import records of finished games.
+/// List, download, import and delete records of finished games.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat records list --participant Greta --json\n  \
@@ -34,6 +35,8 @@ enum RecordsAction {
     Stream(transfer::Stream),
     /// Import records of games played elsewhere.
     Import(transfer::Import),
+    /// Delete old games of a server with their records.
+    Prune(prune::Prune),
 }
 
 impl RecordsCommand {
@@ -43,6 +46,7 @@ impl RecordsCommand {
             RecordsAction::Get(command) => command.run().await,
             RecordsAction::Stream(command) => command.run().await,
             RecordsAction::Import(command) => command.run().await,
+            RecordsAction::Prune(command) => command.run().await,
         }
     }
 }

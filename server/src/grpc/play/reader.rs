@@ -2,7 +2,7 @@
 //! leave. Participants of tournaments attach once and are then seated in each of their games.
 
 use std::collections::BTreeMap;
-use std::future::poll_fn;
+use std::future::{Future as _, poll_fn};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::task::Poll;
@@ -17,7 +17,9 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
 use crate::access::Caller;
-use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
+use crate::config::{
+    FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
+};
 use crate::convert;
 use crate::grpc::access::{check_room, check_tournament};
 use crate::grpc::refusals::count;
@@ -116,8 +118,15 @@ impl Reader {
         closing: CancellationToken,
     ) {
         let outbox = Arc::clone(&self.outbox);
+        // Boxed and dropped soon: the future of a stream stays small.
+        let mut silence = Some(Box::pin(tokio::time::sleep(FIRST_MESSAGE_TIMEOUT)));
         let end = loop {
             let next = poll_fn(|context| {
+                if let Some(silence) = &mut silence
+                    && silence.as_mut().poll(context).is_ready()
+                {
+                    return Poll::Ready(Next::Message(Some(Err(silent()))));
+                }
                 if outbox.poll_reading_stopped(context) {
                     return Poll::Ready(Next::Message(None));
                 }
@@ -137,6 +146,7 @@ impl Reader {
                     continue;
                 }
             };
+            silence = None;
             let arrived = Instant::now();
             match message {
                 Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {
@@ -508,6 +518,17 @@ impl Reader {
     }
 }
 
+/// A stream was opened and nothing was sent on it.
+fn silent() -> Status {
+    let seconds = FIRST_MESSAGE_TIMEOUT.as_secs();
+    status(
+        Code::DeadlineExceeded,
+        "STREAM_SILENT",
+        format!("nothing was sent within {seconds} s; open the stream again and attach a seat"),
+        [],
+    )
+}
+
 /// The action for an expression.
 ///
 /// # Errors
@@ -527,13 +548,15 @@ mod tests {
 
     use super::*;
     use crate::config::ServerConfig;
+    use crate::limits::Key;
     use crate::store::MemoryStore;
     use crate::tournaments::Entry;
 
     #[tokio::test]
     async fn a_flood_of_commands_yields_to_other_tasks() {
         let store = Arc::new(MemoryStore::default());
-        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms =
+            Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let (outbox, _updates) = Outbox::new();
         let mut reader = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
@@ -558,14 +581,15 @@ mod tests {
     #[tokio::test]
     async fn a_stream_whose_client_has_gone_attaches_nothing() {
         let store = Arc::new(MemoryStore::default());
-        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms =
+            Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let settings = v1::TournamentSettings {
             format: v1::TournamentFormat::Swiss.into(),
             ..v1::TournamentSettings::default()
         };
         let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-        let created = tournaments.create("Coppa", plan, None).await;
+        let created = tournaments.create("Coppa", plan, None, Key::Local).await;
         let (tournament, _owner) = created.expect("a tournament");
         let entry = Entry {
             name: "Ada".into(),

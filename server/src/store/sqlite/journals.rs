@@ -138,18 +138,35 @@ impl Journal for DurableJournal {
     }
 }
 
-/// The journal of a game that is stored when it ends.
+/// The journal of a game that is stored when it ends. Until then its entries are in memory,
+/// encoded, which takes a small part of the space.
 pub(super) struct EphemeralJournal {
-    pub(super) number: i64,
-    pub(super) header: Arc<GameHeader>,
-    pub(super) entries: Vec<Entry>,
-    pub(super) queue: WriteQueue,
-    pub(super) codec: Codec,
+    number: i64,
+    header: Arc<GameHeader>,
+    encoded: Vec<u8>,
+    queue: WriteQueue,
+}
+
+impl EphemeralJournal {
+    /// A journal that begins with these entries.
+    pub(super) fn new(
+        number: i64,
+        header: Arc<GameHeader>,
+        mut entries: Vec<Entry>,
+        queue: WriteQueue,
+    ) -> Self {
+        Self {
+            number,
+            header,
+            encoded: encode(&mut entries),
+            queue,
+        }
+    }
 }
 
 impl Journal for EphemeralJournal {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
-        self.entries.append(entries);
+        put_all(entries, &mut self.encoded);
         true
     }
 
@@ -162,7 +179,10 @@ impl Journal for EphemeralJournal {
     }
 
     fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        ready(Ok(self.entries.clone())).boxed()
+        let mut entries = Vec::new();
+        let read = form::read_entries(&self.encoded, &mut entries);
+        let failed = |problem: form::Unreadable| StoreError::Failed(problem.to_string());
+        ready(read.map(|()| entries).map_err(failed)).boxed()
     }
 
     fn finish(
@@ -173,17 +193,13 @@ impl Journal for EphemeralJournal {
         let Some(summary) = summary else {
             return ready(Ok(())).boxed();
         };
-        let mut entries = std::mem::take(&mut self.entries);
-        let header = Arc::clone(&self.header);
-        let count = entries.len();
-        let encoding = move || (form::header_to_bytes(&header), encode(&mut entries));
+        let entries = std::mem::take(&mut self.encoded);
         async move {
-            let (header, entries) = self.codec.run(count, encoding).await?;
             let game_id = self.header.game_id;
             let game = WriteCommand::Whole {
                 number: self.number,
                 game_id,
-                header,
+                header: form::header_to_bytes(&self.header),
                 row: self.queue.new_row(),
                 entries,
                 summary,
@@ -204,8 +220,12 @@ impl Journal for EphemeralJournal {
 
 fn encode(entries: &mut Vec<Entry>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(entries.len() * 32);
-    for entry in entries.drain(..) {
-        form::put_entry(&entry, &mut bytes);
-    }
+    put_all(entries, &mut bytes);
     bytes
+}
+
+fn put_all(entries: &mut Vec<Entry>, bytes: &mut Vec<u8>) {
+    for entry in entries.drain(..) {
+        form::put_entry(&entry, bytes);
+    }
 }

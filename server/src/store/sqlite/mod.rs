@@ -31,8 +31,9 @@ pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::OpenError;
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame};
+use super::{Journal, Part, ResumableGame, Store, StoreError, StoreUsage, StoredGame};
 use crate::metrics::StoreMetrics;
+use crate::store::Keep;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
@@ -142,13 +143,7 @@ impl Store for SqliteStore {
         let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
         let codec = self.codec.clone();
         if header.policy.durability == Durability::Ephemeral {
-            let journal = EphemeralJournal {
-                number,
-                header,
-                entries,
-                queue: commands,
-                codec,
-            };
+            let journal = EphemeralJournal::new(number, header, entries, commands);
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
         }
         async move {
@@ -213,6 +208,36 @@ impl Store for SqliteStore {
             }
         }
         .boxed()
+    }
+
+    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
+        async move {
+            let files = ["", "-wal"].map(|ending| format!("{}{ending}", errors::FILE));
+            let bytes = (files.iter())
+                .filter_map(|file| self.data_dir.join(file).metadata().ok())
+                .map(|about| about.len())
+                .sum();
+            let free = rustix::fs::statvfs(&self.data_dir);
+            Ok(StoreUsage {
+                bytes,
+                free_bytes: free.map_or(0, |disk| disk.f_bavail * disk.f_frsize),
+                finished_games: self.reader.finished_games().await?,
+            })
+        }
+        .boxed()
+    }
+
+    fn prunable(
+        &self,
+        keep: Keep,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+        self.reader.prunable(keep, after, count).boxed()
+    }
+
+    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.commands.send(WriteCommand::Delete { games }).boxed()
     }
 
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {

@@ -81,6 +81,20 @@ pub(super) struct Opened {
     pub(super) lock: File,
 }
 
+/// Lets a new database give back the pages of deleted games while rooms commit. Later that would
+/// take a copy of the database.
+async fn make_shrinkable(writer: &mut SqliteConnection) -> sqlx::Result<()> {
+    let pages: i64 = sqlx::query_scalar("PRAGMA page_count")
+        .fetch_one(&mut *writer)
+        .await?;
+    if pages <= 1 {
+        for text in ["PRAGMA auto_vacuum = INCREMENTAL", "VACUUM"] {
+            sqlx::query(text).execute(&mut *writer).await?;
+        }
+    }
+    Ok(())
+}
+
 /// Opens the database of a data directory; creates it if it is missing.
 pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
     let path = data_dir.join(FILE);
@@ -130,6 +144,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
     let mut writer = SqliteConnection::connect_with(&options)
         .await
         .map_err(failed)?;
+    make_shrinkable(&mut writer).await.map_err(failed)?;
     migrations()
         .run(&mut writer)
         .await

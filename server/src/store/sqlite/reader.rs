@@ -15,6 +15,7 @@ use super::errors::explain;
 use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, WriteQueue};
 use super::rows::{self, Read};
+use crate::store::Keep;
 use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
@@ -258,6 +259,44 @@ impl Reader {
                 Ok((u64::try_from(number).unwrap_or_default(), summary))
             })
             .collect()
+    }
+
+    /// Number of finished games.
+    pub(super) async fn finished_games(&self) -> Result<u64, StoreError> {
+        let count: i64 = sqlx::query_scalar("SELECT count(*) FROM games WHERE state <> 0")
+            .fetch_one(&self.pool)
+            .await
+            .map_err(failure)?;
+        Ok(u64::try_from(count).unwrap_or_default())
+    }
+
+    /// Finished games after a number that need not be kept.
+    pub(super) async fn prunable(
+        &self,
+        keep: Keep,
+        after: u64,
+        count: usize,
+    ) -> Result<Vec<(u64, Id)>, StoreError> {
+        let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
+        let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
+            "SELECT number, game_id FROM games
+             WHERE state <> 0 AND (filed = 1 OR added = 1 OR summary IS NULL) AND number > $1
+               AND number < coalesce((SELECT number FROM games WHERE listed IS NOT NULL
+                                      ORDER BY number DESC LIMIT 1 OFFSET $2), 0) + 1
+               AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+               AND number < (SELECT max(number) FROM games WHERE listed IS NOT NULL)
+             ORDER BY number LIMIT $4",
+        )
+        .bind(integer(after))
+        .bind(integer(keep.newest.unwrap_or_default()))
+        .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+        .bind(integer(count as u64))
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        Ok((rows.into_iter())
+            .filter_map(|(number, id)| Some((u64::try_from(number).ok()?, Id(id.try_into().ok()?))))
+            .collect())
     }
 
     /// See `Store::without_record_file`.

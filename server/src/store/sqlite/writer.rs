@@ -26,6 +26,8 @@ use chefshat_room::ids::Id;
 pub(super) const QUEUE: usize = 1_024;
 /// Most commands in one transaction.
 const MAX_COMMANDS_PER_TRANSACTION: usize = 1_024;
+/// Unused pages that are given back to the disk with each deletion of games.
+const FREED_PAGES: u32 = 2_048;
 /// Numbers of rows that one statement inserts. There are only these, so that few statements need to
 /// be prepared.
 const ROWS: [usize; 5] = [1, 4, 16, 32, 64];
@@ -71,6 +73,8 @@ pub(super) enum WriteCommand {
     },
     /// Marks the record of a game as written to a file.
     RecordWritten { game_id: Id },
+    /// Deletes finished games.
+    Delete { games: Vec<Id> },
     /// Creates a tournament.
     Tournament {
         header: Vec<u8>,
@@ -310,6 +314,11 @@ async fn write(
                 }
             }
             WriteCommand::TournamentEntries(row) => move_tournament(connection, row).await?,
+            WriteCommand::Delete { games } => {
+                for game in games {
+                    delete(connection, *game).await?;
+                }
+            }
             WriteCommand::RecordWritten { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
                     .bind(game_id.0.as_slice())
@@ -331,8 +340,36 @@ async fn write(
             .bind(row.previous)
             .bind(row.entries.as_slice());
     }
-    query.execute(connection).await?;
+    query.execute(&mut *connection).await?;
+    let deletes = |(order, _): &Pending| matches!(order, WriteCommand::Delete { .. });
+    if pending.iter().any(deletes) {
+        // Some pages at a time: rooms wait for it. The rest is used again.
+        let text = format!("PRAGMA incremental_vacuum({FREED_PAGES})");
+        connection.execute(AssertSqlSafe(text)).await?;
+    }
     Ok(taken)
+}
+
+/// Deletes a finished game. The rows of its journal are found from the last to the first.
+async fn delete(connection: &mut SqliteConnection, game: Id) -> sqlx::Result<()> {
+    for text in [
+        "WITH RECURSIVE rows (row, previous) AS (
+             SELECT row, previous FROM journal
+             WHERE row = (SELECT last_row FROM games WHERE game_id = $1 AND state <> 0)
+             UNION ALL
+             SELECT journal.row, journal.previous FROM journal JOIN rows ON journal.row = rows.previous
+         )
+         DELETE FROM journal WHERE row IN (SELECT row FROM rows)",
+        "DELETE FROM added_records WHERE game = (SELECT number FROM games WHERE game_id = $1 AND state <> 0)",
+        "DELETE FROM participants WHERE game = (SELECT number FROM games WHERE game_id = $1 AND state <> 0)",
+        "DELETE FROM games WHERE game_id = $1 AND state <> 0",
+    ] {
+        sqlx::query(text)
+            .bind(game.0.as_slice())
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(())
 }
 
 /// Statements that insert this number of rows into the journal. Unused placeholders of the last one

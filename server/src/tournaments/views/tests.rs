@@ -13,6 +13,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::*;
 use crate::config::MAX_NAME_CHARS;
+use crate::limits::Key;
 use crate::tournaments::handle::TournamentState;
 use crate::tournaments::shared::Shared;
 use chefshat_room::ids::{Id, Token};
@@ -64,6 +65,7 @@ impl TournamentHandle {
                 deal_secret: [2; 32],
             },
             plan,
+            charged: Key::Local,
             committed: Mutex::new(TournamentState {
                 core,
                 tickets: BTreeMap::new(),

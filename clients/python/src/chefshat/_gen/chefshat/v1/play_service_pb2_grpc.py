@@ -59,7 +59,8 @@ class PlayServiceServicer:
     def Play(self, request_iterator, context):
         """One stream for an agent process: any number of seats in any number of games. Half-close to
         leave; the stream then ends. The server sends response headers immediately, before the first
-        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
+        (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
         (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
         and attach again.
         """

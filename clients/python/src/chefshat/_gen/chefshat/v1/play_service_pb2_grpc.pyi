@@ -36,7 +36,8 @@ class PlayServiceStub:
     Play: _grpc.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]
     """One stream for an agent process: any number of seats in any number of games. Half-close to
     leave; the stream then ends. The server sends response headers immediately, before the first
-    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
+    (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
     (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
     and attach again.
     """
@@ -60,7 +61,8 @@ class PlayServiceAsyncStub(PlayServiceStub):
     Play: _aio.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]  # type: ignore[assignment]
     """One stream for an agent process: any number of seats in any number of games. Half-close to
     leave; the stream then ends. The server sends response headers immediately, before the first
-    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
+    (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
     (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
     and attach again.
     """
@@ -87,7 +89,8 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayResponse], _abc.AsyncIterator[_play_service_pb2.PlayResponse]]:
         """One stream for an agent process: any number of seats in any number of games. Half-close to
         leave; the stream then ends. The server sends response headers immediately, before the first
-        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
+        (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
         (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
         and attach again.
         """

@@ -1,0 +1,173 @@
+//! `AdminService`: operates the server. The role that its calls need stands in `access`.
+
+use std::sync::Arc;
+use std::time::UNIX_EPOCH;
+
+use chefshat_proto::v1::{self, admin_service_server::AdminService};
+use chefshat_record::convert::FieldProblem;
+use tonic::{Code, Request, Response, Status};
+use tracing::info;
+
+use super::pages;
+use super::status::{Refusal, field, status, store_failed};
+use super::tournaments;
+use crate::connections::{Client, Connections};
+use crate::retention::Retention;
+use crate::rooms::Rooms;
+use crate::store::Keep;
+use crate::tournaments::Tournaments;
+use chefshat_room::ids::Id;
+
+/// Most clients in a page.
+const CLIENTS_PER_PAGE: u32 = 1_000;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct AdminCalls {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    connections: Arc<Connections>,
+    retention: Retention,
+}
+
+impl AdminCalls {
+    /// Creates the service for this server.
+    pub fn new(
+        rooms: Arc<Rooms>,
+        tournaments: Arc<Tournaments>,
+        connections: Arc<Connections>,
+        retention: Retention,
+    ) -> Self {
+        Self {
+            rooms,
+            tournaments,
+            connections,
+            retention,
+        }
+    }
+}
+
+#[tonic::async_trait]
+impl AdminService for AdminCalls {
+    async fn list_clients(
+        &self,
+        request: Request<v1::ListClientsRequest>,
+    ) -> Result<Response<v1::ListClientsResponse>, Status> {
+        let request = request.into_inner();
+        let after = pages::last_shown(&request.page_token)?.unwrap_or_default();
+        let size = match request.page_size {
+            0 => CLIENTS_PER_PAGE,
+            size => size.min(CLIENTS_PER_PAGE),
+        };
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let clients = self.connections.clients();
+        let mut later = clients.iter().filter(|client| client.id > after);
+        let page: Vec<_> = later.by_ref().take(size).collect();
+        let next_page_token = match (later.next(), page.last()) {
+            (Some(_), Some(last)) => last.id.to_string(),
+            _ => String::new(),
+        };
+        Ok(Response::new(v1::ListClientsResponse {
+            clients: page.into_iter().map(|client| described(client)).collect(),
+            next_page_token,
+        }))
+    }
+
+    async fn disconnect_client(
+        &self,
+        request: Request<v1::DisconnectClientRequest>,
+    ) -> Result<Response<v1::DisconnectClientResponse>, Status> {
+        let id = request.into_inner().client_id;
+        let client = self.connections.client(id).ok_or_else(|| {
+            status(
+                Code::NotFound,
+                "CLIENT_UNKNOWN",
+                "no connected client has this id; list the clients to see which there are",
+                [("field", "client_id")],
+            )
+        })?;
+        info!(address = ?client.address, "an operator disconnects a client");
+        client.close();
+        Ok(Response::new(v1::DisconnectClientResponse {}))
+    }
+
+    async fn close_room(
+        &self,
+        request: Request<v1::AdminServiceCloseRoomRequest>,
+    ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
+        let handle = super::room_service::find(&self.rooms, &request.into_inner().room_id)?;
+        info!(room = %handle.id(), "an operator closes a room");
+        handle.close_without_token().await;
+        let room = handle.describe().await.map_err(Refusal::from)?;
+        let room = Some(room);
+        Ok(Response::new(v1::AdminServiceCloseRoomResponse { room }))
+    }
+
+    async fn close_tournament(
+        &self,
+        request: Request<v1::AdminServiceCloseTournamentRequest>,
+    ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
+        let id = request.into_inner().tournament_id;
+        let handle = Id::parse(&id).and_then(|id| self.tournaments.get(id));
+        let handle = handle.ok_or_else(tournaments::unknown)?;
+        info!(tournament = %handle.id(), "an operator closes a tournament");
+        handle.close().await.map_err(tournaments::stopped)?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::AdminServiceCloseTournamentResponse {
+            tournament,
+        }))
+    }
+
+    async fn get_storage(
+        &self,
+        _request: Request<v1::GetStorageRequest>,
+    ) -> Result<Response<v1::GetStorageResponse>, Status> {
+        let usage = self.retention.usage().await.map_err(failed)?;
+        Ok(Response::new(v1::GetStorageResponse {
+            database_bytes: usage.store.bytes,
+            record_bytes: usage.record_bytes,
+            record_files: usage.record_files,
+            free_bytes: usage.store.free_bytes,
+            finished_games: usage.store.finished_games,
+            open_rooms: self.rooms.open_count() as u64,
+            connections: self.connections.clients().len() as u64,
+        }))
+    }
+
+    async fn prune_records(
+        &self,
+        request: Request<v1::PruneRecordsRequest>,
+    ) -> Result<Response<v1::PruneRecordsResponse>, Status> {
+        let request = request.into_inner();
+        let keep = Keep {
+            ended_since_ms: Some(request.ended_before_ms).filter(|ms| *ms > 0),
+            newest: Some(request.keep).filter(|count| *count > 0),
+        };
+        if keep == Keep::default() {
+            let problem = FieldProblem::new("keep", "set ended_before_ms, keep or both");
+            return Err(field("PRUNE_REFUSED", &problem));
+        }
+        let pruned = self.retention.prune(keep).await.map_err(failed)?;
+        Ok(Response::new(v1::PruneRecordsResponse {
+            games: pruned.games,
+            freed_bytes: pruned.freed_bytes,
+        }))
+    }
+}
+
+fn described(client: &Client) -> v1::ConnectedClient {
+    let since = client.since.duration_since(UNIX_EPOCH).unwrap_or_default();
+    v1::ConnectedClient {
+        client_id: client.id,
+        address: (client.address).map_or_else(String::new, |it| it.to_string()),
+        token_id: client.token().map_or_else(String::new, |id| id.to_string()),
+        connected_at_ms: u64::try_from(since.as_millis()).unwrap_or(u64::MAX),
+        calls: client.calls(),
+        streams: client.streams() as u64,
+    }
+}
+
+fn failed(error: crate::store::StoreError) -> Status {
+    tracing::error!(%error, "an operator's request failed");
+    store_failed()
+}

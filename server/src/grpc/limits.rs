@@ -1,0 +1,261 @@
+//! The layer in front of all services that holds each caller to its share: of calls, of answers
+//! that it does not read, and of streams. `limits` decides; this file keeps the places of calls
+//! until their answers have been read.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use axum::body::HttpBody;
+use bytes::Bytes;
+use futures::future::BoxFuture;
+use http::{Request, Response};
+use http_body::{Frame, SizeHint};
+use tonic::body::Body;
+use tonic::{Code, Status};
+use tower::{Layer, Service};
+
+use super::status::{Refusal, status};
+use crate::access::Caller;
+use crate::connections::{Client, peer_address};
+use crate::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
+
+/// Calls whose requests or answers are streams.
+const STREAMS: &[&str] = &[
+    "/chefshat.v1.PlayService/Play",
+    "/chefshat.v1.PlayService/Watch",
+    "/chefshat.v1.SpectatorService/Watch",
+    "/chefshat.v1.TableService/Watch",
+    "/chefshat.v1.TournamentService/FollowTournament",
+    "/chefshat.v1.VectorService/Run",
+    "/chefshat.v1.RecordService/GetRecord",
+    "/chefshat.v1.RecordService/StreamRecords",
+    "/chefshat.v1.RecordService/ImportRecord",
+    "/grpc.health.v1.Health/Watch",
+    "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+];
+
+/// Who is charged for a request.
+pub(super) fn charged(extensions: &http::Extensions) -> Key {
+    match Caller::of(extensions).token {
+        Some(token) => Key::Token(token),
+        None => Key::of_address(peer_address(extensions)),
+    }
+}
+
+/// Puts the limits in front of the services.
+#[derive(Debug, Clone)]
+pub struct LimitsLayer {
+    limits: Arc<CallLimits>,
+}
+
+impl LimitsLayer {
+    /// Creates a layer that asks `limits`.
+    pub fn new(limits: Arc<CallLimits>) -> Self {
+        Self { limits }
+    }
+}
+
+impl<S> Layer<S> for LimitsLayer {
+    type Service = WithLimits<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithLimits {
+            limits: Arc::clone(&self.limits),
+            services,
+        }
+    }
+}
+
+/// The services with the limits in front of them.
+#[derive(Debug, Clone)]
+pub struct WithLimits<S> {
+    limits: Arc<CallLimits>,
+    services: S,
+}
+
+impl<S, B> Service<Request<B>> for WithLimits<S>
+where
+    S: Service<Request<B>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+    B: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = BoxFuture<'static, Result<Self::Response, Self::Error>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        let key = charged(request.extensions());
+        // The connection of a proxy belongs to many callers.
+        let address = peer_address(request.extensions());
+        let is_own = |client: &&Arc<Client>| {
+            client.address.map(|address| address.ip().to_canonical()) == address
+        };
+        let client = Client::of(request.extensions()).filter(is_own).cloned();
+        let token = Caller::of(request.extensions()).token;
+        let number = (client.as_ref()).map_or(0, |client| client.called(token));
+        let is_stream = STREAMS.contains(&request.uri().path());
+        let mut place = Place {
+            limits: Arc::clone(&self.limits),
+            key,
+            client,
+            number,
+            is_stream,
+            admitted: None,
+        };
+        if let Some(admitted) = self.limits.admit_now(key, is_stream) {
+            place.admit(admitted);
+            let answering = self.services.call(request);
+            return Box::pin(async move { Ok(place.keep(answering.await?)) });
+        }
+        let Some(waiting) = self.limits.place_to_wait(key) else {
+            // Refusing costs work as well: a caller that ignores so many refusals is cut off.
+            if let Some(client) = &place.client {
+                client.close();
+            }
+            let status = status(
+                Code::ResourceExhausted,
+                "TOO_MANY_WAITING_CALLS",
+                "too many calls wait; the connection is closed",
+                [],
+            );
+            return Box::pin(async move { Ok(status.into_http()) });
+        };
+        // The clone that is ready serves this call.
+        let clone = self.services.clone();
+        let mut services = std::mem::replace(&mut self.services, clone);
+        let limits = Arc::clone(&self.limits);
+        Box::pin(async move {
+            match limits.admit(key, is_stream).await {
+                Ok(admitted) => {
+                    drop(waiting);
+                    place.admit(admitted);
+                    Ok(place.keep(services.call(request).await?))
+                }
+                Err(refused) => {
+                    limits.delay_refusal().await;
+                    Ok(Status::from(Refusal::from(refused)).into_http())
+                }
+            }
+        })
+    }
+}
+
+/// What a call has until its answer has been read.
+struct Place {
+    limits: Arc<CallLimits>,
+    key: Key,
+    client: Option<Arc<Client>>,
+    /// The number of the call on its connection.
+    number: u64,
+    is_stream: bool,
+    admitted: Option<Admitted>,
+}
+
+impl Place {
+    fn admit(&mut self, admitted: Admitted) {
+        self.admitted = Some(admitted);
+        if let Some(client) = self.client.as_ref().filter(|_| self.is_stream) {
+            client.count_stream(true);
+        }
+    }
+
+    /// Keeps the place until the answer has been read.
+    fn keep(mut self, response: Response<Body>) -> Response<Body> {
+        if let Some(admitted) = &mut self.admitted {
+            admitted.executed();
+        }
+        response.map(|body| {
+            // A refusal has no body to be read.
+            if body.is_end_stream() {
+                return body;
+            }
+            if let Some(client) = self.client.as_ref().filter(|_| !self.is_stream) {
+                client.answer_ready(self.number);
+            }
+            Body::new(KeptBody { body, place: self })
+        })
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        match &self.client {
+            Some(client) if self.is_stream && self.admitted.is_some() => {
+                client.count_stream(false);
+            }
+            Some(client) if !self.is_stream => client.answer_gone(self.number),
+            _ => {}
+        }
+    }
+}
+
+/// An answer, with the place of its call. Large answers are charged.
+struct KeptBody {
+    body: Body,
+    place: Place,
+}
+
+impl HttpBody for KeptBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let frame = Pin::new(&mut self.body).poll_frame(context);
+        if !self.place.is_stream
+            && let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(data) = frame.data_ref()
+        {
+            let cost = data.len() as u64 / BYTES_PER_CALL;
+            if cost > 0 {
+                self.place.limits.charge(self.place.key, cost);
+            }
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use prost::Message as _;
+
+    use super::*;
+
+    #[test]
+    fn every_call_with_a_stream_is_known_as_one() {
+        let descriptors = prost_types::FileDescriptorSet::decode(chefshat_proto::DESCRIPTORS);
+        let mut streams = Vec::new();
+        for file in descriptors.expect("descriptors").file {
+            for service in &file.service {
+                for method in &service.method {
+                    if method.client_streaming() || method.server_streaming() {
+                        let (package, service) = (file.package(), service.name());
+                        streams.push(format!("/{package}.{service}/{}", method.name()));
+                    }
+                }
+            }
+        }
+        let mut known: Vec<_> = (STREAMS.iter().copied())
+            .filter(|path| path.starts_with("/chefshat."))
+            .collect();
+        streams.sort();
+        known.sort_unstable();
+        assert_eq!(known, streams);
+    }
+}

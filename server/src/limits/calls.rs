@@ -1,0 +1,287 @@
+//! What the calls of one caller may take: how many calls, how many answers that it has not read,
+//! how many streams, and how many wrong join codes.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{Held, Key, Places, Rate, Refused, Shares};
+
+/// Most streams of all callers, except those that have limits of their own.
+const MAX_STREAMS: usize = 20_000;
+/// Most answers of all callers that have not been read.
+const MAX_ANSWERS: usize = 1_024;
+/// Most calls of all callers that are executed at a time.
+const MAX_EXECUTED: usize = 64;
+/// Most lists of rooms that are made at a time: each asks many rooms.
+const MAX_LISTS: usize = 4;
+/// Most calls of all callers that wait for something.
+const MAX_WAITING: usize = 16_384;
+/// Calls of one caller in a second; an answer counts as one more call for each 512 bytes.
+const CALLS_PER_SECOND: u64 = 2_000;
+/// Calls of one caller at once.
+const CALLS_AT_ONCE: u64 = 20_000;
+/// Bytes of an answer that cost as much as one call.
+pub const BYTES_PER_CALL: u64 = 512;
+/// Calls that opening a stream counts as.
+const COST_OF_STREAM: u64 = 5;
+/// Longest time that a call waits until its caller may make another one.
+const MAX_WAIT: Duration = Duration::from_secs(5);
+/// How long a refusal takes: whoever ignores it and calls again waits each time.
+const REFUSAL_DELAY: Duration = Duration::from_secs(1);
+/// Wrong join codes of one caller in a second, and at once.
+const WRONG_CODES_PER_SECOND: u64 = 1;
+const WRONG_CODES_AT_ONCE: u64 = 100;
+/// Wrong join codes of all callers in a second, and at once. Beyond them, callers that have just
+/// sent wrong codes are refused.
+const ALL_WRONG_CODES_PER_SECOND: u64 = 50;
+const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
+
+/// What the calls of all callers take.
+#[derive(Debug)]
+pub struct CallLimits {
+    streams: Arc<Places>,
+    answers: Arc<Places>,
+    executed: Arc<Places>,
+    lists: Arc<Places>,
+    waiting: Arc<Places>,
+    calls: Rate,
+    wrong_codes: Rate,
+    all_wrong_codes: Rate,
+}
+
+/// A call that may be executed. Keeps its places until it is dropped.
+#[derive(Debug)]
+pub struct Admitted {
+    executed: Option<Held>,
+    _kept: Held,
+}
+
+impl Admitted {
+    /// The answer is ready: others may be executed.
+    pub fn executed(&mut self) {
+        self.executed = None;
+    }
+}
+
+impl CallLimits {
+    /// No calls yet.
+    pub fn new(shares: Shares) -> Self {
+        Self {
+            streams: Places::new(MAX_STREAMS, shares),
+            answers: Places::new(MAX_ANSWERS, shares),
+            executed: Places::new(MAX_EXECUTED, shares),
+            lists: Places::new(MAX_LISTS, shares),
+            waiting: Places::new(MAX_WAITING, shares),
+            calls: Rate::new(CALLS_PER_SECOND, CALLS_AT_ONCE),
+            wrong_codes: Rate::new(WRONG_CODES_PER_SECOND, WRONG_CODES_AT_ONCE),
+            all_wrong_codes: Rate::new(ALL_WRONG_CODES_PER_SECOND, ALL_WRONG_CODES_AT_ONCE),
+        }
+    }
+
+    /// The limits by their names in `GetServerInfo`.
+    pub fn named(&self) -> [(&'static str, u64); 4] {
+        [
+            ("max_streams", self.streams.total() as u64),
+            ("max_unread_answers", self.answers.total() as u64),
+            ("max_calls_per_second", self.calls.per_second()),
+            ("max_wrong_codes_per_second", self.wrong_codes.per_second()),
+        ]
+    }
+
+    /// Admits a call, or a stream, at once, if its caller has made few.
+    pub fn admit_now(&self, key: Key, is_stream: bool) -> Option<Admitted> {
+        if !self.calls.wait(key).is_zero() {
+            return None;
+        }
+        let kept = match is_stream {
+            true => self.streams.try_take(key)?,
+            false => self.answers.try_take(key)?,
+        };
+        // A stream may wait for a long time before it begins.
+        let executed = match is_stream {
+            true => None,
+            false => Some(self.executed.try_take(key)?),
+        };
+        self.calls.charge(key, cost(is_stream));
+        Some(Admitted {
+            executed,
+            _kept: kept,
+        })
+    }
+
+    /// Admits a call, or a stream, as soon as its caller may make another one.
+    ///
+    /// # Errors
+    /// That would take too long.
+    pub async fn admit(&self, key: Key, is_stream: bool) -> Result<Admitted, Refused> {
+        let wait = self.calls.wait(key);
+        if wait > MAX_WAIT {
+            return Err(Refused {
+                reason: "TOO_MANY_CALLS",
+                what: "too many calls in a second; large answers count as several",
+                limit: self.calls.per_second(),
+                retry_after: wait,
+            });
+        }
+        self.calls.charge(key, cost(is_stream));
+        tokio::time::sleep(wait).await;
+        let kept = match is_stream {
+            true => self.streams.try_take(key).ok_or(Refused {
+                reason: "TOO_MANY_STREAMS",
+                what: "too many open streams; end some, or attach more seats to each",
+                limit: self.streams.share_of(key) as u64,
+                retry_after: REFUSAL_DELAY,
+            })?,
+            false => within(self.answers.take(key)).await.ok_or(Refused {
+                reason: "TOO_MANY_UNREAD_ANSWERS",
+                what: "too many calls whose answers have not been read; read them, or make fewer calls at a time",
+                limit: self.answers.share_of(key) as u64,
+                retry_after: MAX_WAIT,
+            })?,
+        };
+        if is_stream {
+            return Ok(Admitted {
+                executed: None,
+                _kept: kept,
+            });
+        }
+        let executed = within(self.executed.take(key)).await.ok_or(Refused {
+            reason: "TOO_MANY_CALLS_AT_ONCE",
+            what: "too many calls at a time",
+            limit: self.executed.share_of(key) as u64,
+            retry_after: MAX_WAIT,
+        })?;
+        Ok(Admitted {
+            executed: Some(executed),
+            _kept: kept,
+        })
+    }
+
+    /// Waits for the right to make a list of rooms.
+    pub async fn list(&self, key: Key) -> Held {
+        self.lists.take(key).await
+    }
+
+    /// A place to wait in, for a call or for a refusal; `None` if its caller has too many calls
+    /// that wait.
+    pub fn place_to_wait(&self, key: Key) -> Option<Held> {
+        self.waiting.try_take(key)
+    }
+
+    /// Delays a refusal.
+    pub async fn delay_refusal(&self) {
+        tokio::time::sleep(REFUSAL_DELAY).await;
+    }
+
+    /// Charges what a call cost beyond its request.
+    pub fn charge(&self, key: Key, cost: u64) {
+        self.calls.charge(key, cost);
+    }
+
+    /// Checks whether a caller may try a join code.
+    ///
+    /// # Errors
+    /// It has tried too many wrong ones.
+    pub fn may_try_code(&self, key: Key) -> Result<(), Refused> {
+        let own = self.wrong_codes.wait(key);
+        let all = self.all_wrong_codes.wait(Key::Local);
+        let wait = match self.wrong_codes.is_full(key) {
+            true => own,
+            false => own.max(all),
+        };
+        match wait.is_zero() {
+            true => Ok(()),
+            false => Err(Refused {
+                reason: "TOO_MANY_WRONG_CODES",
+                what: "too many wrong join codes; check the code",
+                limit: self.wrong_codes.per_second(),
+                retry_after: wait.max(REFUSAL_DELAY),
+            }),
+        }
+    }
+
+    /// Counts a wrong join code.
+    pub fn wrong_code(&self, key: Key) {
+        self.wrong_codes.charge(key, 1);
+        self.all_wrong_codes.charge(Key::Local, 1);
+    }
+}
+
+/// Calls that a call or stream counts as, besides what its answer costs.
+fn cost(is_stream: bool) -> u64 {
+    match is_stream {
+        true => COST_OF_STREAM,
+        false => 1,
+    }
+}
+
+/// Waits at most [`MAX_WAIT`].
+async fn within<T>(waiting: impl Future<Output = T>) -> Option<T> {
+    tokio::time::timeout(MAX_WAIT, waiting).await.ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(last: u8) -> Key {
+        Key::Address([192, 0, 2, last].into())
+    }
+
+    fn limits() -> CallLimits {
+        CallLimits::new(Shares::default())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_caller_with_too_many_calls_waits_and_others_do_not() {
+        let limits = limits();
+        limits.charge(key(1), CALLS_AT_ONCE + CALLS_PER_SECOND);
+        assert!(limits.admit_now(key(1), false).is_none());
+        assert!(limits.admit_now(key(2), false).is_some());
+        let begun = tokio::time::Instant::now();
+        limits.admit(key(1), false).await.expect("after a second");
+        assert_eq!(begun.elapsed().as_secs(), 1);
+        limits.charge(key(1), 100 * CALLS_PER_SECOND);
+        let refused = limits
+            .admit(key(1), false)
+            .await
+            .expect_err("it would take long");
+        assert_eq!(refused.reason, "TOO_MANY_CALLS");
+        assert!(refused.retry_after.as_secs() > 90);
+        assert!(limits.admit(key(1), true).await.is_err());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn unread_answers_hold_back_their_caller_alone() {
+        let limits = limits();
+        let unread: Vec<_> = std::iter::from_fn(|| {
+            let mut admitted = limits.admit_now(key(1), false)?;
+            admitted.executed();
+            Some(admitted)
+        })
+        .collect();
+        assert_eq!(unread.len(), MAX_ANSWERS / 10);
+        let refused = limits.admit(key(1), false).await.expect_err("none is read");
+        assert_eq!(refused.reason, "TOO_MANY_UNREAD_ANSWERS");
+        assert!(limits.admit_now(key(2), false).is_some());
+        drop(unread);
+        assert!(limits.admit_now(key(1), false).is_some());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn wrong_codes_are_limited_for_each_caller_and_in_all() {
+        let limits = limits();
+        for _ in 0..=WRONG_CODES_AT_ONCE {
+            limits.may_try_code(key(1)).expect("few so far");
+            limits.wrong_code(key(1));
+        }
+        assert!(limits.may_try_code(key(1)).is_err());
+        limits.may_try_code(key(2)).expect("another caller");
+        // Many callers together, each below its own limit.
+        for last in 3..=255 {
+            (0..ALL_WRONG_CODES_AT_ONCE / 250).for_each(|_| limits.wrong_code(key(last)));
+        }
+        assert!(limits.may_try_code(key(3)).is_err(), "it has just guessed");
+        limits.may_try_code(key(2)).expect("it has not");
+    }
+}

@@ -1,0 +1,242 @@
+//! Slows down connections that send frames of HTTP/2 which cost work and carry nothing: PING,
+//! SETTINGS, PRIORITY, RST_STREAM and frames of unknown types. The transport answers them without
+//! limit. Requests and data are not slowed down here.
+
+use std::io;
+use std::pin::Pin;
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::time::{Instant, Sleep};
+use tonic::transport::server::Connected;
+
+/// Control frames that a connection may send in a second.
+const PER_SECOND: u32 = 1_000;
+/// Control frames that it may send at once.
+const BURST: u32 = 4_000;
+/// Window updates that cost as much as one control frame. A client sends about one for each
+/// message that it reads.
+const WINDOW_UPDATES: u32 = 20;
+/// What clients of HTTP/2 send first.
+const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+/// Bytes of the header of a frame.
+const HEADER: usize = 9;
+
+/// A connection whose control frames are counted.
+#[derive(Debug)]
+pub struct Metered<S> {
+    stream: S,
+    position: Position,
+    /// When the allowance is full again.
+    full_at: Option<Instant>,
+    pause: Option<Pin<Box<Sleep>>>,
+}
+
+/// Where the bytes of a connection are.
+#[derive(Debug)]
+enum Position {
+    /// In the preface, of which this many bytes were read.
+    Preface(usize),
+    /// In frames: the header of the next one, as far as it was read, and bytes before it.
+    Frames {
+        header: [u8; HEADER],
+        read: usize,
+        skip: usize,
+    },
+    /// Another protocol.
+    Other,
+}
+
+impl Position {
+    /// Reads bytes; returns the cost of the frames that begin in them, in window updates.
+    fn advance(&mut self, mut bytes: &[u8]) -> u32 {
+        if let Self::Preface(read) = self {
+            let length = bytes.len().min(PREFACE.len() - *read);
+            if bytes[..length] != PREFACE[*read..*read + length] {
+                *self = Self::Other;
+                return 0;
+            }
+            *read += length;
+            bytes = &bytes[length..];
+            if *read == PREFACE.len() {
+                *self = Self::Frames {
+                    header: [0; HEADER],
+                    read: 0,
+                    skip: 0,
+                };
+            }
+        }
+        let Self::Frames { header, read, skip } = self else {
+            return 0;
+        };
+        let mut cost = 0;
+        while !bytes.is_empty() {
+            let skipped = bytes.len().min(*skip);
+            *skip -= skipped;
+            bytes = &bytes[skipped..];
+            let length = bytes.len().min(HEADER - *read);
+            header[*read..*read + length].copy_from_slice(&bytes[..length]);
+            *read += length;
+            bytes = &bytes[length..];
+            if *read == HEADER {
+                *read = 0;
+                *skip = usize::from(header[0]) << 16
+                    | usize::from(header[1]) << 8
+                    | usize::from(header[2]);
+                cost += match header[3] {
+                    // DATA, HEADERS, CONTINUATION: the services and the transport limit them.
+                    0 | 1 | 9 => 0,
+                    8 => 1,
+                    _ => WINDOW_UPDATES,
+                };
+            }
+        }
+        cost
+    }
+}
+
+impl<S> Metered<S> {
+    /// Counts the control frames of a connection from its start on.
+    pub fn new(stream: S) -> Self {
+        Self {
+            stream,
+            position: Position::Preface(0),
+            full_at: None,
+            pause: None,
+        }
+    }
+
+    fn charge(&mut self, cost: u32) {
+        let unit = Duration::from_secs(1) / (PER_SECOND * WINDOW_UPDATES);
+        let now = Instant::now();
+        let full_at = self.full_at.map_or(now, |at| at.max(now)) + unit * cost;
+        self.full_at = Some(full_at);
+        let most = unit * (BURST * WINDOW_UPDATES);
+        let wait = full_at.duration_since(now).saturating_sub(most);
+        if !wait.is_zero() {
+            self.pause = Some(Box::pin(tokio::time::sleep(wait)));
+        }
+    }
+}
+
+impl<S: Connected> Connected for Metered<S> {
+    type ConnectInfo = S::ConnectInfo;
+
+    fn connect_info(&self) -> Self::ConnectInfo {
+        self.stream.connect_info()
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Metered<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if let Some(pause) = &mut self.pause {
+            ready!(pause.as_mut().poll(context));
+            self.pause = None;
+        }
+        let before = buffer.filled().len();
+        let this = &mut *self;
+        let read = Pin::new(&mut this.stream).poll_read(context, buffer);
+        let cost = this.position.advance(&buffer.filled()[before..]);
+        if cost > 0 {
+            this.charge(cost);
+        }
+        read
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Metered<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write_vectored(context, bytes)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
+    use super::*;
+
+    fn frame(kind: u8, length: u8) -> Vec<u8> {
+        let mut bytes = vec![0, 0, length, kind, 0, 0, 0, 0, 0];
+        bytes.extend(vec![6; length.into()]);
+        bytes
+    }
+
+    #[test]
+    fn frames_are_counted_however_they_are_cut() {
+        let mut bytes = PREFACE.to_vec();
+        for (kind, length) in [(4, 0), (1, 40), (0, 200), (8, 4), (6, 8), (9, 3), (200, 0)] {
+            bytes.extend(frame(kind, length));
+        }
+        let expected = 3 * WINDOW_UPDATES + 1;
+        for size in [1, 2, 7, 64, 1_000] {
+            let mut position = Position::Preface(0);
+            let cost: u32 = bytes.chunks(size).map(|part| position.advance(part)).sum();
+            assert_eq!(cost, expected, "in parts of {size} bytes");
+        }
+        let mut other = Position::Preface(0);
+        assert_eq!(other.advance(b"POST / HTTP/1.1\r\n"), 0);
+        assert_eq!(other.advance(&frame(6, 8)), 0, "not HTTP/2");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_flood_is_slowed_down_and_requests_are_not() {
+        let (mut client, server) = tokio::io::duplex(1 << 20);
+        let mut server = Metered::new(server);
+        let seconds = 3;
+        let mut flood = PREFACE.to_vec();
+        for _ in 0..BURST + seconds * PER_SECOND {
+            flood.extend(frame(6, 8));
+        }
+        flood.extend(frame(1, 10));
+        let begun = Instant::now();
+        client.write_all(&flood).await.expect("space");
+        // Small reads: a connection is slowed down between two of them.
+        let mut part = [0; 1_024];
+        let mut left = flood.len();
+        while left > 0 {
+            left -= server.read(&mut part).await.expect("open");
+        }
+        let took = begun.elapsed().as_secs_f64();
+        assert!((took - f64::from(seconds)).abs() < 0.2, "{took}");
+        let (mut client, server) = tokio::io::duplex(1 << 20);
+        let mut server = Metered::new(server);
+        let begun = Instant::now();
+        client.write_all(PREFACE).await.expect("space");
+        for _ in 0..20_000 {
+            client.write_all(&frame(1, 20)).await.expect("space");
+            let mut bytes = [0; 29];
+            server.read_exact(&mut bytes).await.expect("open");
+        }
+        assert_eq!(begun.elapsed(), Duration::ZERO);
+    }
+}

@@ -1,0 +1,100 @@
+//! Who is charged for what a request takes, and how much of a limit one of them may use.
+
+use std::net::{IpAddr, Ipv6Addr};
+
+use chefshat_room::ids::Id;
+
+use crate::access::TokenId;
+
+/// Who is charged. Addresses of one IPv6 network count as one: a client has many of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Key {
+    /// The callers at an address.
+    Address(IpAddr),
+    /// The callers with a token, wherever they are.
+    Token(TokenId),
+    /// Callers without an address, such as those of a unix socket.
+    Local,
+    /// A tournament that was resumed: who created it is unknown.
+    Tournament(Id),
+    /// Rooms that were resumed: who created them is unknown.
+    Resumed,
+}
+
+impl Key {
+    /// The key of an address.
+    pub fn of_address(address: Option<IpAddr>) -> Self {
+        match address.map(|address| address.to_canonical()) {
+            None => Self::Local,
+            Some(IpAddr::V6(address)) if !address.is_loopback() => {
+                let network = address.to_bits() & !u128::from(u64::MAX);
+                Self::Address(Ipv6Addr::from_bits(network).into())
+            }
+            Some(address) => Self::Address(address),
+        }
+    }
+
+    /// Whether these callers run on the server's machine, or their work is the server's own.
+    fn is_local(self) -> bool {
+        match self {
+            Self::Address(address) => address.is_loopback(),
+            Self::Token(_) => false,
+            Self::Local | Self::Tournament(_) | Self::Resumed => true,
+        }
+    }
+}
+
+/// How much of each limit one caller may use, percent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shares {
+    /// Callers on the server's machine.
+    pub local: u8,
+    /// All others.
+    pub remote: u8,
+}
+
+impl Default for Shares {
+    fn default() -> Self {
+        Self {
+            local: 50,
+            remote: 10,
+        }
+    }
+}
+
+impl Shares {
+    /// How much of `total` a caller may use: at least one.
+    pub fn of(self, key: Key, total: usize) -> usize {
+        let percent = match key.is_local() {
+            true => self.local,
+            false => self.remote,
+        };
+        (total.saturating_mul(percent.into()) / 100).max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(address: &str) -> Key {
+        Key::of_address(Some(address.parse().expect("an address")))
+    }
+
+    #[test]
+    fn an_ipv6_network_is_one_caller_and_mapped_addresses_are_those_of_ipv4() {
+        assert_eq!(key("2001:db8::1"), key("2001:db8::ffff:2"));
+        assert_ne!(key("2001:db8::1"), key("2001:db8:0:1::1"));
+        assert_eq!(key("::ffff:192.0.2.1"), key("192.0.2.1"));
+        assert_ne!(key("192.0.2.1"), key("192.0.2.2"));
+    }
+
+    #[test]
+    fn a_share_is_never_nothing() {
+        let shares = Shares::default();
+        assert_eq!(shares.of(key("192.0.2.1"), 2), 1);
+        assert_eq!(shares.of(key("192.0.2.1"), 10_000), 1_000);
+        assert_eq!(shares.of(key("::1"), 10_000), 5_000);
+        assert_eq!(shares.of(Key::Local, 8), 4);
+    }
+}

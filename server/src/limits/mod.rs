@@ -1,0 +1,33 @@
+//! What one caller may take of the server, so that its load neither refuses nor delays others: who
+//! is charged ([`Key`]), places that are shared fairly ([`Places`]), rates ([`Rate`]), and the
+//! games of built-in agents, which are played in the background ([`Background`]).
+
+mod background;
+mod calls;
+mod frames;
+mod key;
+mod places;
+mod rate;
+
+use std::time::Duration;
+
+pub use background::{Background, Turn};
+pub use calls::{Admitted, BYTES_PER_CALL, CallLimits};
+pub use frames::Metered;
+pub use key::{Key, Shares};
+pub use places::{Held, Places};
+pub use rate::Rate;
+
+/// Why something is refused although the caller may do it: it or others use too much of it now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: at most {limit}; try again in {} s", retry_after.as_secs())]
+pub struct Refused {
+    /// In UPPER_SNAKE, such as `TOO_MANY_ROOMS`.
+    pub reason: &'static str,
+    /// What there is too much of, and what to do, for people.
+    pub what: &'static str,
+    /// The limit of this caller.
+    pub limit: u64,
+    /// When it is worth trying again.
+    pub retry_after: Duration,
+}

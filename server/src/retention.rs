@@ -1,0 +1,169 @@
+//! How long finished games are kept: deletes the oldest with the files of their records, at an
+//! operator's request or on a schedule, and gives their disk space back. A crash in between leaves
+//! nothing behind that the next run does not delete.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_record::jsonl;
+use chefshat_room::ids::Id;
+use tracing::{error, info};
+
+use crate::clock::since_epoch_ms;
+use crate::config::KeepGames;
+use crate::rooms::Rooms;
+use crate::store::{Keep, StoreError, StoreUsage};
+use crate::tournaments::Tournaments;
+
+/// Games that are deleted in one commit: rooms wait for it.
+const GAMES_PER_COMMIT: usize = 16;
+/// Pause between two commits, in which rooms commit.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Time between two runs of the schedule.
+const INTERVAL: Duration = Duration::from_secs(600);
+
+/// Which games a setting keeps now.
+fn kept_now(setting: KeepGames) -> Keep {
+    match setting {
+        KeepGames::Newest(count) => Keep {
+            newest: Some(count),
+            ..Keep::default()
+        },
+        KeepGames::For(time) => {
+            let ms = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
+            Keep {
+                ended_since_ms: Some(since_epoch_ms().saturating_sub(ms)),
+                ..Keep::default()
+            }
+        }
+    }
+}
+
+/// What was deleted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pruned {
+    /// Number of games.
+    pub games: u64,
+    /// Bytes that the database and the files take less.
+    pub freed_bytes: u64,
+}
+
+/// How much is stored.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Usage {
+    /// In the store.
+    pub store: StoreUsage,
+    /// Bytes of the files of records.
+    pub record_bytes: u64,
+    /// Number of these files.
+    pub record_files: u64,
+}
+
+/// Deletes finished games of a server.
+#[derive(Debug, Clone)]
+pub struct Retention {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+}
+
+impl Retention {
+    /// For the games of these rooms, except for those of tournaments that are not over.
+    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>) -> Self {
+        Self { rooms, tournaments }
+    }
+
+    /// How much is stored.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub async fn usage(&self) -> Result<Usage, StoreError> {
+        let store = self.rooms.store().usage().await?;
+        let folder = self.rooms.record_writer().data_dir().map(jsonl::folder_of);
+        let looking = tokio::task::spawn_blocking(move || folder.map(|it| size_of(&it)));
+        let (record_bytes, record_files) = looking.await.ok().flatten().unwrap_or_default();
+        Ok(Usage {
+            store,
+            record_bytes,
+            record_files,
+        })
+    }
+
+    /// Deletes all finished games but those to keep, oldest first.
+    ///
+    /// # Errors
+    /// The store failed. What was deleted until then stays deleted.
+    pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
+        let before = self.usage().await?;
+        let mut pruned = Pruned::default();
+        let mut after = 0;
+        loop {
+            let store = self.rooms.store();
+            let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
+            let Some((last, _)) = found.last() else { break };
+            after = *last;
+            let games: Vec<_> = (found.into_iter())
+                .filter(|(_, game)| !self.tournaments.needs(*game))
+                .collect();
+            if games.is_empty() {
+                continue;
+            }
+            if let Some(data_dir) = self.rooms.record_writer().data_dir() {
+                let paths: Vec<_> = (games.iter())
+                    .map(|(_, game)| jsonl::path_of(data_dir, &game.to_string()))
+                    .collect();
+                // Before the games: after a crash in between, the next run deletes them.
+                let deleting = move || paths.iter().try_for_each(|path| remove(path));
+                (tokio::task::spawn_blocking(deleting).await)
+                    .map_err(|error| StoreError::Failed(error.to_string()))?
+                    .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
+            }
+            pruned.games += games.len() as u64;
+            let ids: Vec<Id> = games.into_iter().map(|(_, game)| game).collect();
+            store.delete(ids).await?;
+            tokio::time::sleep(PAUSE).await;
+        }
+        let after = self.usage().await?;
+        let bytes = |usage: &Usage| usage.store.bytes + usage.record_bytes;
+        pruned.freed_bytes = bytes(&before).saturating_sub(bytes(&after));
+        if pruned.games > 0 {
+            info!(
+                games = pruned.games,
+                freed_bytes = pruned.freed_bytes,
+                "old games deleted"
+            );
+        }
+        Ok(pruned)
+    }
+
+    /// Deletes games on a schedule, until the future is dropped.
+    pub async fn follow(self, keep: KeepGames) {
+        let mut interval = tokio::time::interval(INTERVAL);
+        loop {
+            interval.tick().await;
+            if let Err(error) = self.prune(kept_now(keep)).await {
+                error!(%error, "deleting old games failed");
+            }
+        }
+    }
+}
+
+/// Bytes and number of the files of a folder.
+fn size_of(folder: &Path) -> (u64, u64) {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    files
+        .filter_map(|file| file.metadata().ok())
+        .filter(|about| about.is_file())
+        .fold((0, 0), |(bytes, files), about| {
+            (bytes + about.len(), files + 1)
+        })
+}
+
+/// Deletes a file that may be missing.
+fn remove(path: &Path) -> io::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
