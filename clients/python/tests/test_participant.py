@@ -121,6 +121,21 @@ def test_a_seat_attached_twice_is_one_seat() -> None:
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
 
 
+def test_a_game_that_ended_is_not_played_again() -> None:
+    cup = Cup()
+    cup.receive(seated(FIRST_HANDLE, "a"), ended(1, handle=FIRST_HANDLE))
+    cup.session.lost()
+    cup.connect()
+    # The server has not counted the game yet, and attaches its seat again.
+    cup.receive(entered(0), seated(FIRST_HANDLE, "a"), ended(1, handle=FIRST_HANDLE), detached("GAME_OVER", handle=FIRST_HANDLE))
+    (request,) = cup.session.take_requests()
+    (command,) = request.commands
+    assert (command.handle, command.WhichOneof("command")) == (FIRST_HANDLE, "detach")
+    cup.receive(detached("TOURNAMENT_OVER", handle=0))
+    (played,) = cup.session.played()
+    assert played.game_id == "a"
+
+
 def test_a_participant_enters_again_after_the_server_has_stopped() -> None:
     cup = Cup()
     cup.receive(detached("SERVER_STOPPING"))

@@ -266,6 +266,10 @@ class PlaySession:
                 return seat
         return self._add_seat(participant, attached, attached.ticket)
 
+    def _has_played(self, game_id: str) -> bool:
+        """Whether a game has its result."""
+        return any(result.game_id == game_id and result.error is None for _, result in self._results.values())
+
     def _add_seat(self, participant: Participant, attached: pb.Attached, ticket: str) -> SeatSession:
         agent = participant.make_agent(SeatInfo(attached.room_id, attached.game_id, attached.seat))
         return self._add(ticket, agent, participant.entropy)
@@ -274,6 +278,10 @@ class PlaySession:
         seat = self._seats.get(attached.request_id)
         participant = self._participant
         if participant is not None and attached.request_id == 0:
+            if self._has_played(attached.game_id):
+                # It ended on a connection that was lost before the server could count it.
+                self._outbox.append(pb.SeatCommand(handle=handle, detach=pb.Detach()))
+                return
             seat = self._seated(participant, attached)
         elif participant is not None and attached.request_id == REQUEST_ID:
             # The ticket is a seat's, not a participant's.
