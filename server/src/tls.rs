@@ -17,7 +17,7 @@ use rustls::server::WebPkiClientVerifier;
 use rustls::{RootCertStore, ServerConfig};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::JoinSet;
-use tokio::time::timeout;
+use tokio::time::{Sleep, sleep, timeout};
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 use tonic::transport::server::Connected;
@@ -25,7 +25,7 @@ use tracing::{debug, error, info};
 
 use crate::file_watch::FileWatch;
 
-/// How long a client may take for the handshake.
+/// How long a client may take for the handshake, and then for its first bytes.
 const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How often the files are looked at.
 const INTERVAL: Duration = Duration::from_secs(1);
@@ -150,7 +150,7 @@ impl Tls {
         // They may have changed since the server read them.
         let mut changed = true;
         loop {
-            tokio::time::sleep(INTERVAL).await;
+            sleep(INTERVAL).await;
             changed |= watch.has_changed();
             if std::mem::take(&mut changed) {
                 match self.files.read() {
@@ -202,7 +202,10 @@ impl Tls {
             let shaken = timeout(HANDSHAKE_TIMEOUT, acceptor.accept(connection)).await;
             let stream = shaken.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
             stream
-                .map(|stream| Secured::Tls(Box::new(stream)))
+                .map(|stream| {
+                    let silence = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
+                    Secured::Tls(Box::new(Encrypted { stream, silence }))
+                })
                 .inspect_err(|error| debug!(%error, "a TLS handshake failed"))
                 .ok()
         }
@@ -215,7 +218,33 @@ pub enum Secured<C> {
     /// Not encrypted.
     Plain(C),
     /// Encrypted.
-    Tls(Box<TlsStream<C>>),
+    Tls(Box<Encrypted<C>>),
+}
+
+/// An encrypted connection that is dropped unless it sends something.
+#[derive(Debug)]
+pub struct Encrypted<C> {
+    stream: TlsStream<C>,
+    /// Fires unless something has been read.
+    silence: Option<Pin<Box<Sleep>>>,
+}
+
+impl<C: AsyncRead + AsyncWrite + Unpin> Encrypted<C> {
+    fn poll_read(
+        &mut self,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        if read.is_ready() {
+            self.silence = None;
+        } else if let Some(silence) = &mut self.silence
+            && silence.as_mut().poll(context).is_ready()
+        {
+            return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+        }
+        read
+    }
 }
 
 impl<C: Connected> Connected for Secured<C> {
@@ -224,7 +253,7 @@ impl<C: Connected> Connected for Secured<C> {
     fn connect_info(&self) -> Self::ConnectInfo {
         match self {
             Self::Plain(connection) => connection.connect_info(),
-            Self::Tls(stream) => stream.get_ref().0.connect_info(),
+            Self::Tls(encrypted) => encrypted.stream.get_ref().0.connect_info(),
         }
     }
 }
@@ -237,7 +266,7 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncRead for Secured<C> {
     ) -> Poll<io::Result<()>> {
         match self.get_mut() {
             Self::Plain(connection) => Pin::new(connection).poll_read(context, buffer),
-            Self::Tls(stream) => Pin::new(stream).poll_read(context, buffer),
+            Self::Tls(encrypted) => encrypted.poll_read(context, buffer),
         }
     }
 }
@@ -250,21 +279,21 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Secured<C> {
     ) -> Poll<io::Result<usize>> {
         match self.get_mut() {
             Self::Plain(connection) => Pin::new(connection).poll_write(context, bytes),
-            Self::Tls(stream) => Pin::new(stream).poll_write(context, bytes),
+            Self::Tls(encrypted) => Pin::new(&mut encrypted.stream).poll_write(context, bytes),
         }
     }
 
     fn poll_flush(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self.get_mut() {
             Self::Plain(connection) => Pin::new(connection).poll_flush(context),
-            Self::Tls(stream) => Pin::new(stream).poll_flush(context),
+            Self::Tls(encrypted) => Pin::new(&mut encrypted.stream).poll_flush(context),
         }
     }
 
     fn poll_shutdown(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         match self.get_mut() {
             Self::Plain(connection) => Pin::new(connection).poll_shutdown(context),
-            Self::Tls(stream) => Pin::new(stream).poll_shutdown(context),
+            Self::Tls(encrypted) => Pin::new(&mut encrypted.stream).poll_shutdown(context),
         }
     }
 
@@ -275,14 +304,87 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Secured<C> {
     ) -> Poll<io::Result<usize>> {
         match self.get_mut() {
             Self::Plain(connection) => Pin::new(connection).poll_write_vectored(context, bytes),
-            Self::Tls(stream) => Pin::new(stream).poll_write_vectored(context, bytes),
+            Self::Tls(encrypted) => {
+                Pin::new(&mut encrypted.stream).poll_write_vectored(context, bytes)
+            }
         }
     }
 
     fn is_write_vectored(&self) -> bool {
         match self {
             Self::Plain(connection) => connection.is_write_vectored(),
-            Self::Tls(stream) => stream.is_write_vectored(),
+            Self::Tls(encrypted) => encrypted.stream.is_write_vectored(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rustls::ClientConfig;
+    use rustls::pki_types::ServerName;
+    use tokio::io::{AsyncReadExt as _, DuplexStream, duplex};
+    use tokio_rustls::TlsConnector;
+
+    use super::*;
+
+    /// A server's side of the connections of these clients, and what clients trust.
+    fn server() -> (tempfile::TempDir, Arc<Tls>, RootCertStore) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).expect("a name");
+        let files = TlsFiles {
+            certificate: folder.path().join("cert.pem"),
+            key: folder.path().join("key.pem"),
+            client_authority: None,
+        };
+        std::fs::write(&files.certificate, made.cert.pem()).expect("written");
+        std::fs::write(&files.key, made.signing_key.serialize_pem()).expect("written");
+        let mut roots = RootCertStore::empty();
+        roots.add(made.cert.der().clone()).expect("a certificate");
+        (folder, Tls::open(files).expect("usable"), roots)
+    }
+
+    async fn connect(
+        roots: RootCertStore,
+        connection: DuplexStream,
+    ) -> tokio_rustls::client::TlsStream<DuplexStream> {
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let config = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .expect("ring supports the default versions")
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        let name = ServerName::try_from("localhost").expect("a name");
+        let connector = TlsConnector::from(Arc::new(config));
+        connector.connect(name, connection).await.expect("trusted")
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_client_that_says_nothing_after_the_handshake_is_dropped() {
+        let (_folder, tls, roots) = server();
+        let (near, far) = duplex(16 * 1024);
+        let incoming = stream::iter([Ok(far)]).chain(stream::pending());
+        let mut secured = std::pin::pin!(tls.secure(incoming));
+        let (client, accepted) = tokio::join!(connect(roots, near), secured.next());
+        let mut accepted = accepted.expect("one").expect("no error");
+        let error = accepted.read_u8().await.expect_err("it says nothing");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        drop(client);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_handshake_that_stalls_is_given_up_and_delays_nobody() {
+        let (_folder, tls, roots) = server();
+        let ((stalled, first), (near, second)) = (duplex(16 * 1024), duplex(16 * 1024));
+        let incoming = stream::iter([Ok(first), Ok(second)]).chain(stream::pending());
+        let mut secured = std::pin::pin!(tls.secure(incoming));
+        let (_client, accepted) = tokio::join!(connect(roots, near), secured.next());
+        accepted.expect("one").expect("no error");
+        // The stalled handshake ends with its connection, and is not handed on.
+        let mut stalled = stalled;
+        let ended = async { stalled.read_u8().await.is_err() };
+        tokio::select! {
+            next = secured.next() => panic!("{}", next.is_some()),
+            ended = ended => assert!(ended),
         }
     }
 }

@@ -65,12 +65,19 @@ impl Origins {
         if self.origins.iter().any(listed) {
             return true;
         }
-        // A proxy may have taken TLS off, so that the scheme is not compared.
-        let own = origin
-            .strip_prefix("https://")
-            .or(origin.strip_prefix("http://"));
-        own.zip(host)
-            .is_some_and(|(own, host)| own.eq_ignore_ascii_case(host.as_str()))
+        // A proxy may have taken TLS off, so the scheme is not compared, but it decides which port
+        // is the default, which browsers leave out and proxies may not.
+        let (own, port) = match (
+            origin.strip_prefix("https://"),
+            origin.strip_prefix("http://"),
+        ) {
+            (Some(own), _) => (own, ":443"),
+            (_, Some(own)) => (own, ":80"),
+            _ => return false,
+        };
+        let host = host.map_or("", |host| host.as_str());
+        let host = host.strip_suffix(port).unwrap_or(host);
+        !own.is_empty() && own.eq_ignore_ascii_case(host)
     }
 }
 
@@ -209,6 +216,22 @@ mod tests {
             let request = request("127.0.0.1:50051", origin);
             assert_eq!(some.check(&request).is_ok(), allowed, "{origin:?}");
             assert_eq!(all.check(&request), Ok(()), "{origin:?}");
+        }
+    }
+
+    #[test]
+    fn a_default_port_is_none() {
+        let own = Origins::new(Vec::new(), None);
+        for (host, origin, allowed) in [
+            ("chef.example.org:443", "https://chef.example.org", true),
+            ("chef.example.org:80", "http://chef.example.org", true),
+            ("chef.example.org", "https://chef.example.org", true),
+            ("chef.example.org:80", "https://chef.example.org", false),
+            ("chef.example.org", "https://chef.example.org:8443", false),
+            ("", "https://", false),
+        ] {
+            let request = request(host, Some(origin));
+            assert_eq!(own.check(&request).is_ok(), allowed, "{host} {origin}");
         }
     }
 
