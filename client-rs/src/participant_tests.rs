@@ -221,6 +221,38 @@ fn a_seat_attached_twice_is_one_seat() {
 }
 
 #[test]
+fn a_game_that_ended_on_a_lost_connection_is_not_played_again() {
+    let mut cup = Cup::entered();
+    cup.receive(vec![
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE, events(&[(1, ended())])),
+    ]);
+    cup.session.disconnected();
+    cup.told();
+    assert_eq!(cup.attach(), ["cup from 0"]);
+    let sent = cup.receive(vec![
+        (0, entered()),
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (FIRST_HANDLE, events(&[(1, ended())])),
+        (FIRST_HANDLE + 1, seated(0, "b", 1, 1)),
+        (FIRST_HANDLE + 1, decision(2)),
+    ]);
+    let other = FIRST_HANDLE + 1;
+    assert_eq!(sent, [format!("{FIRST_HANDLE}:detach {other}:2=20")]);
+    assert_eq!(cup.told().len(), 1, "only the new game has an agent");
+    cup.receive(vec![
+        (FIRST_HANDLE, detached(v1::DetachReason::Requested)),
+        (other, events(&[(1, ended())])),
+        (other, detached(v1::DetachReason::GameOver)),
+        (0, over()),
+    ]);
+    assert_eq!(
+        played(cup),
+        Ok(vec!["a Some(2)".to_owned(), "b Some(1)".to_owned()])
+    );
+}
+
+#[test]
 fn the_end_of_the_tournament_waits_for_open_games() {
     let mut cup = Cup::entered();
     let aborted = Kind::GameAborted(Box::new(v1::GameAborted {

@@ -35,6 +35,9 @@ pub(crate) struct Session<'a, A> {
     by_handle: BTreeMap<u32, u32>,
     /// Handles of seats that may have to send something, in order.
     asked: Vec<u32>,
+    /// Handles of seats whose games have already been played, and whether they still have to be
+    /// detached. Their updates are ignored.
+    played: BTreeMap<u32, bool>,
     progress: bool,
 }
 
@@ -49,6 +52,7 @@ impl<'a, A: Agent> Session<'a, A> {
             options: options.clone(),
             by_handle: BTreeMap::new(),
             asked: Vec::new(),
+            played: BTreeMap::new(),
             progress: false,
         };
         for (ticket, agent) in seats {
@@ -71,6 +75,7 @@ impl<'a, A: Agent> Session<'a, A> {
     pub(crate) fn attach(&mut self) -> Vec<v1::PlayRequest> {
         self.by_handle.clear();
         self.asked.clear();
+        self.played.clear();
         let seats = self.seats.iter_mut();
         let mut commands: Vec<_> = seats
             .map(|(&number, seat)| seat.attach(number, &self.options))
@@ -91,6 +96,11 @@ impl<'a, A: Agent> Session<'a, A> {
             }
         }
         let mut commands = Vec::with_capacity(self.asked.len());
+        for (handle, attached) in &mut self.played {
+            if std::mem::take(attached) {
+                commands.push(detach(*handle));
+            }
+        }
         for handle in self.asked.drain(..) {
             let number = self.by_handle.get(&handle);
             if let Some(seat) = number.and_then(|number| self.seats.get_mut(number)) {
@@ -157,6 +167,8 @@ impl<'a, A: Agent> Session<'a, A> {
                     if let Some(seat) = self.seats.get_mut(&number) {
                         seat.attached(attached);
                     }
+                } else if self.has_played(&attached.game_id) {
+                    self.played.insert(handle, true);
                 }
             }
             Update::Entered(_) => {
@@ -186,6 +198,10 @@ impl<'a, A: Agent> Session<'a, A> {
             let number = attached.request_id;
             return self.seats.contains_key(&number).then_some(number);
         }
+        // It ended on a connection that was lost before the server could count it.
+        if self.has_played(&attached.game_id) {
+            return None;
+        }
         let participant = self.participant.as_mut()?;
         let mut seats = self.seats.iter();
         let known = seats.find(|(_, seat)| seat.game_id() == attached.game_id);
@@ -198,8 +214,17 @@ impl<'a, A: Agent> Session<'a, A> {
         Some(self.add(seat))
     }
 
+    /// Whether the result of a game is known.
+    fn has_played(&self, game_id: &str) -> bool {
+        let mut outcomes = self.outcomes.values().flatten();
+        outcomes.any(|outcome| outcome.game_id == game_id)
+    }
+
     /// Handles updates of attached seats. Ignores unknown handles.
     fn seat_update(&mut self, handle: u32, update: Update) {
+        if self.played.contains_key(&handle) {
+            return;
+        }
         // The end of the stream follows; the seats are attached again on the next one.
         if matches!(&update, Update::Detached(it) if it.reason() == v1::DetachReason::ServerStopping)
         {
@@ -256,6 +281,14 @@ impl<'a, A: Agent> Session<'a, A> {
             self.seats.remove(&number);
             self.outcomes.insert(number, outcome);
         }
+    }
+}
+
+/// Detaches a seat from the stream.
+fn detach(handle: u32) -> v1::SeatCommand {
+    v1::SeatCommand {
+        handle,
+        command: Some(v1::seat_command::Command::Detach(v1::Detach {})),
     }
 }
 

@@ -155,6 +155,7 @@ fn in_short(request: &v1::PlayRequest) -> String {
                 )
             }
             Some(Command::Resume(_)) => format!("{}:resume", command.handle),
+            Some(Command::Detach(_)) => format!("{}:detach", command.handle),
             other => panic!("not to be expected: {other:?}"),
         });
     words.collect::<Vec<_>>().join(" ")
