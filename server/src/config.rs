@@ -7,8 +7,8 @@ use std::time::Duration;
 use chefshat_record::signature::SigningKey;
 
 use crate::access::AccessSettings;
-use crate::forwarded::TrustedProxies;
 use crate::limits::Shares;
+use crate::proxies::TrustedProxies;
 use crate::tls::TlsFiles;
 
 /// Largest message a client may send, bytes.

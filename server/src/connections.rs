@@ -26,6 +26,7 @@ use tracing::{debug, warn};
 use crate::access::TokenId;
 use crate::limits::{Held, Key, Places, Shares};
 use crate::metrics::{Counted, Metrics};
+use crate::proxies::TrustedProxies;
 
 /// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -93,12 +94,14 @@ impl Listener {
 type Socket = Either<TcpStream, UnixStream>;
 
 /// Limits of connections.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Limits {
     /// Most connections at a time. Each caller has its share of them.
     pub max_connections: usize,
     /// How much of them one caller may have.
     pub shares: Shares,
+    /// Proxies, whose connections carry many callers: they may have all.
+    pub trusted_proxies: TrustedProxies,
     /// How long a new connection may take until its protocol is known.
     pub first_bytes_timeout: Duration,
 }
@@ -107,6 +110,7 @@ pub struct Limits {
 #[derive(Debug)]
 pub struct Connections {
     places: Arc<Places>,
+    trusted_proxies: TrustedProxies,
     clients: Mutex<BTreeMap<u64, Weak<Client>>>,
     next: AtomicU64,
     metrics: Arc<Metrics>,
@@ -129,6 +133,7 @@ impl Connections {
         }
         Arc::new(Self {
             places: Places::new(max_connections, limits.shares),
+            trusted_proxies: limits.trusted_proxies,
             clients: Mutex::default(),
             next: AtomicU64::new(1),
             metrics,
@@ -169,7 +174,10 @@ impl Connections {
 
     /// Admits a new connection, unless there are too many.
     fn admit(self: &Arc<Self>, address: Option<SocketAddr>) -> Option<Arc<Client>> {
-        let key = Key::of_address(address.map(|address| address.ip()));
+        let key = match address.map(|address| address.ip()) {
+            Some(address) if self.trusted_proxies.contains(address) => Key::Proxies,
+            address => Key::of_address(address),
+        };
         let Some(place) = self.places.try_take(key) else {
             self.refuse("TOO_MANY_CONNECTIONS", &format_args!("{address:?}"));
             return None;
@@ -507,6 +515,7 @@ mod tests {
         Limits {
             max_connections,
             shares: Shares::default(),
+            trusted_proxies: TrustedProxies::default(),
             first_bytes_timeout,
         }
     }
@@ -520,11 +529,12 @@ mod tests {
     ) {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
+        let first_bytes_timeout = limits.first_bytes_timeout;
         let connections = Connections::new(limits, Arc::default());
         let accepted = accept(
             listener.into(),
             Arc::clone(&connections),
-            limits.first_bytes_timeout,
+            first_bytes_timeout,
         );
         (address, connections, Box::pin(accepted))
     }
@@ -568,6 +578,23 @@ mod tests {
         let _fifth = TcpStream::connect(address).await.expect("it listens");
         assert!(accepted.next().await.is_some());
         assert_eq!(connections.clients().len(), 1);
+    }
+
+    #[tokio::test]
+    async fn a_trusted_proxy_may_have_all_connections() {
+        let network = crate::proxies::network("127.0.0.0/8").expect("a network");
+        let limits = Limits {
+            trusted_proxies: TrustedProxies::new([network]),
+            ..limits(4, Duration::from_secs(60))
+        };
+        let (address, connections, accepted) = listening(limits).await;
+        let mut clients = Vec::new();
+        for _ in 0..4 {
+            clients.push(TcpStream::connect(address).await.expect("it listens"));
+        }
+        let accepted: Vec<_> = accepted.take(4).collect().await;
+        assert_eq!(accepted.len(), 4);
+        assert_eq!(connections.clients().len(), 4);
     }
 
     #[tokio::test]

@@ -14,6 +14,7 @@ pub mod host;
 pub mod limits;
 pub mod metrics;
 pub mod outbox;
+pub mod proxies;
 pub mod record_writer;
 pub mod retention;
 pub mod room;

@@ -114,6 +114,7 @@ impl Server {
         let limits = Limits {
             max_connections: config.max_connections,
             shares: config.shares,
+            trusted_proxies: config.trusted_proxies.clone(),
             first_bytes_timeout: config.first_bytes_timeout,
         };
         Ok(Self {

@@ -15,6 +15,9 @@ pub enum Key {
     Token(TokenId),
     /// Callers without an address, such as those of a unix socket.
     Local,
+    /// The trusted proxies, which are charged for connections alone: the callers behind them have
+    /// addresses of their own.
+    Proxies,
     /// A tournament that was resumed: who created it is unknown.
     Tournament(Id),
     /// Rooms that were resumed: who created them is unknown.
@@ -38,7 +41,7 @@ impl Key {
     fn is_local(self) -> bool {
         match self {
             Self::Address(address) => address.is_loopback(),
-            Self::Token(_) => false,
+            Self::Token(_) | Self::Proxies => false,
             Self::Local | Self::Tournament(_) | Self::Resumed => true,
         }
     }
@@ -65,9 +68,10 @@ impl Default for Shares {
 impl Shares {
     /// How much of `total` a caller may use: at least one.
     pub fn of(self, key: Key, total: usize) -> usize {
-        let percent = match key.is_local() {
-            true => self.local,
-            false => self.remote,
+        let percent = match key {
+            Key::Proxies => 100,
+            key if key.is_local() => self.local,
+            _ => self.remote,
         };
         (total.saturating_mul(percent.into()) / 100).max(1)
     }
