@@ -88,7 +88,14 @@ async fn run(
         "uses-act" => return agent.act(channel).await,
         _ => {}
     }
-    while let End::Lost = agent.play(channel.clone()).await? {
+    loop {
+        match agent.play(channel.clone()).await {
+            Ok(End::GameOver) => break,
+            Ok(End::Lost) => {}
+            // The server's port is closed while it restarts.
+            Err(error) if is_unavailable(&*error) => {}
+            Err(error) => return Err(error),
+        }
         match fault {
             "no-reconnect" => return Ok(ExitCode::FAILURE),
             "joins-again" => agent.ticket = join(&channel, code).await?.ticket,
@@ -101,6 +108,12 @@ async fn run(
         _ => {}
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether no server answered.
+fn is_unavailable(error: &(dyn std::error::Error + 'static)) -> bool {
+    let status = error.downcast_ref::<tonic::Status>();
+    status.is_some_and(|status| status.code() == tonic::Code::Unavailable)
 }
 
 async fn join(channel: &Channel, code: &str) -> Result<v1::JoinRoomResponse, Failure> {
@@ -271,7 +284,7 @@ impl Agent {
                 voice.answer(handle, id, legal).await;
             }
             "too-slow" => {
-                tokio::time::sleep(Duration::from_secs(30)).await;
+                tokio::time::sleep(Duration::from_secs(1)).await;
                 voice.answer(handle, id, legal).await;
             }
             "large-annotations" | "large-message" => {
