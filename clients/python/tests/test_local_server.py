@@ -26,9 +26,9 @@ from chefshat import local_server
 address = local_server.shared_address()
 assert local_server.shared_address() == address
 with chefshat.VectorEnv() as env:
-    assert env.address == address
+    assert env.server.address == address
 env = chefshat.make()
-assert env.unwrapped.vector.address == address
+assert env.unwrapped.vector.server.address == address
 env.reset()
 print(address, local_server._shared._process.pid, flush=True)
 if sys.argv[1] == "kill":
