@@ -19,7 +19,8 @@ const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, plac
 const servers = [];
 after(() => servers.forEach((server) => server.forceShutdown()));
 
-const TLS = fileURLToPath(new URL("../../../tests/fixtures/tls/", import.meta.url));
+const PROTO = process.env.CHEFSHAT_PROTO || fileURLToPath(new URL("../../../proto", import.meta.url));
+const TLS = join(PROTO, "../tests/fixtures/tls");
 const CA = join(TLS, "localhost.pem"); // A certificate for this machine, which is its own authority.
 
 /** A server. Its n-th connection is served by the n-th of `connections`, a function of the stream and of a reader of its commands. */
