@@ -2,7 +2,7 @@
 
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { byClicks, nextDecision } from "./play";
-import { browser, person, Server, until, useStage } from "./stage";
+import { browser, person, Server, useStage } from "./stage";
 
 useStage();
 
@@ -13,7 +13,8 @@ beforeAll(async () => {
 afterAll(() => closed?.stop());
 
 test("a host and a guest play with tokens of their own, which no address or invitation shows", async () => {
-  const [token, guestToken] = [closed.tokenFor("host"), closed.tokenFor("player")];
+  const token = await closed.tokenFor("host");
+  const guestToken = await closed.tokenFor("player");
   const host = await person(browser);
   await host.page.goto(`${closed.url}/new#token=${token}`);
   expect(host.page.url()).toBe(`${closed.url}/new`);
@@ -45,10 +46,7 @@ test("a token that is not enough is explained, in the language of the person", a
   await page.goto(`${closed.url}/new#token=chefshat_00000000_${"A".repeat(43)}`);
   await page.getByRole("button", { name: "Crea la stanza" }).click();
   await page.getByText("Il server non riconosce il token del tuo link.").waitFor();
-  const token = closed.tokenFor("player");
-  await page.goto(`${closed.url}/new#token=${token}`);
-  await until(async () => {
-    await page.getByRole("button", { name: "Crea la stanza" }).click();
-    return (await page.getByText("Il tuo link non lo permette.").count()) > 0;
-  });
+  await page.goto(`${closed.url}/new#token=${await closed.tokenFor("player")}`);
+  await page.getByRole("button", { name: "Crea la stanza" }).click();
+  await page.getByText("Il tuo link non lo permette.").waitFor();
 });
