@@ -1,12 +1,13 @@
 //! The key that signs the records of a server, in its data directory, and signing a game when it
 //! ends.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
-use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
+use std::fs;
+use std::io;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use chefshat_record::signature::{PublicKey, SigningKey};
 use tokio::sync::Semaphore;
 use tracing::error;
@@ -72,31 +73,15 @@ pub fn key_or_new(data_dir: &Path) -> Result<SigningKey, KeyError> {
         return Ok(key);
     }
     let seed: [u8; 32] = rand::random();
-    create(&data_dir.join(FILE), &seed)
-        .map_err(|error| KeyError::Io(data_dir.join(FILE), error))?;
+    create(&data_dir.join(FILE), &seed).map_err(|error| KeyError::Io(error.path, error.source))?;
     Ok(SigningKey::from_seed(&seed))
 }
 
-/// Writes a new key file atomically.
-fn create(path: &Path, seed: &[u8; 32]) -> io::Result<()> {
-    let part = path.with_extension("part");
-    match fs::remove_file(&part) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
-    let mut options = File::options();
-    let mut file = options
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(&part)?;
-    writeln!(file, "{PREFIX}{}", hex::encode(seed))?;
-    file.sync_all()?;
-    fs::rename(&part, path)?;
-    match path.parent() {
-        Some(folder) => File::open(folder)?.sync_all(),
-        None => Ok(()),
-    }
+/// Writes a new key file.
+fn create(path: &Path, seed: &[u8; 32]) -> Result<(), WriteError> {
+    let mut file = AtomicFile::create_private(path)?;
+    file.write_all(format!("{PREFIX}{}\n", hex::encode(seed)).as_bytes())?;
+    file.finish()
 }
 
 /// Signs games that end, a few at a time.

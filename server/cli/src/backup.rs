@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_record::atomic_file::sync_folder_of;
-use chefshat_server::store::{check_copy, copy_database};
+use chefshat_server::store::{DatabaseCopy, check_copy, copy_database};
 use clap::Args;
 use serde_json::json;
 
@@ -84,23 +84,7 @@ impl Backup {
         rustix::fs::sync();
         fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
         sync_folder_of(&target).map_err(|error| at(&target, &error))?;
-        if self.json {
-            say(json!({
-                "backup": target.display().to_string(),
-                "finished_games": copied.finished,
-                "unfinished_games": copied.unfinished,
-                "records": records,
-            }))?;
-        } else {
-            say(format_args!(
-                "{}: {}, {} unfinished, {}",
-                target.display(),
-                counted(copied.finished, "finished game"),
-                copied.unfinished,
-                counted(records, "record"),
-            ))?;
-        }
-        Ok(ExitCode::SUCCESS)
+        report(self.json, "backup", &target, &copied, records, "")
     }
 }
 
@@ -146,25 +130,41 @@ impl Restore {
         let database = target.join(DATABASE);
         fs::rename(&part, &database).map_err(|error| at(&database, &error))?;
         sync_folder_of(&database).map_err(|error| at(&database, &error))?;
-        if self.json {
-            say(json!({
-                "data_dir": target.display().to_string(),
-                "finished_games": copied.finished,
-                "unfinished_games": copied.unfinished,
-                "records": records,
-            }))?;
-        } else {
-            say(format_args!(
-                "{}: {}, {} unfinished, {}; `chefshat verify {}` checks the records",
-                target.display(),
-                counted(copied.finished, "finished game"),
-                copied.unfinished,
-                counted(records, "record"),
-                target.join(RECORDS).display(),
-            ))?;
-        }
-        Ok(ExitCode::SUCCESS)
+        let folder = target.join(RECORDS);
+        let advice = format!(
+            "; `chefshat verify {}` checks the records",
+            folder.display()
+        );
+        report(self.json, "data_dir", &target, &copied, records, &advice)
     }
+}
+
+/// Says what was copied to a folder, which JSON calls `name`.
+fn report(
+    json: bool,
+    name: &str,
+    folder: &Path,
+    copied: &DatabaseCopy,
+    records: u64,
+    advice: &str,
+) -> Result<ExitCode, CommandError> {
+    let folder = folder.display();
+    if json {
+        say(json!({
+            name: folder.to_string(),
+            "finished_games": copied.finished,
+            "unfinished_games": copied.unfinished,
+            "records": records,
+        }))?;
+    } else {
+        say(format_args!(
+            "{folder}: {}, {} unfinished, {}{advice}",
+            counted(copied.finished, "finished game"),
+            copied.unfinished,
+            counted(records, "record"),
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The files of a folder to copy one by one; none if it does not exist.

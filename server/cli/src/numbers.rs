@@ -19,6 +19,14 @@ pub(super) fn counted(count: u64, what: &str) -> String {
     format!("{} {what}{plural}", grouped(count))
 }
 
+/// A number followed by its unit, such as `90d`, and the value of the unit; `None` for other texts.
+pub(super) fn with_unit(text: &str, units: &[(char, u64)]) -> Option<(u64, u64)> {
+    let letter = text.chars().next_back()?;
+    let (_, unit) = units.iter().find(|(known, _)| *known == letter)?;
+    let number = text.strip_suffix(letter)?.parse().ok()?;
+    Some((number, *unit))
+}
+
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
 pub(super) fn ordinal(place: u32) -> String {
     let ending = match (place % 100, place % 10) {

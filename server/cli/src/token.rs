@@ -12,7 +12,7 @@ use chefshat_server::access::{
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
-use super::numbers::counted;
+use super::numbers::{counted, with_unit};
 use super::output::table;
 use super::{CommandError, data_dir, say};
 
@@ -242,18 +242,12 @@ fn link(page: &str, token: &AccessToken) -> String {
 /// Parses a time such as 30d.
 fn lifetime(text: &str) -> Result<Duration, String> {
     let wrong = || "use a number with s, m, h or d, such as 90m, 12h or 30d".to_owned();
-    let unit = text.chars().next_back().ok_or_else(wrong)?;
-    let seconds = match unit {
-        's' => 1,
-        'm' => 60,
-        'h' => 3_600,
-        'd' => 86_400,
-        _ => return Err(wrong()),
-    };
-    let number: u32 = text[..text.len() - 1].parse().map_err(|_| wrong())?;
-    match number {
-        0 => Err(wrong()),
-        number => Ok(Duration::from_secs(u64::from(number) * seconds)),
+    let units = [('s', 1), ('m', 60), ('h', 3_600), ('d', 86_400)];
+    match with_unit(text, &units) {
+        Some((number @ 1.., seconds)) if u32::try_from(number).is_ok() => {
+            Ok(Duration::from_secs(number * seconds))
+        }
+        _ => Err(wrong()),
     }
 }
 

@@ -26,12 +26,21 @@ pub struct Call {
     pub scoped: Scoped,
     /// Whether it reads records, for which the server may require a higher role.
     pub reads_records: bool,
+    /// Whether its requests or answers are a stream.
+    pub streams: bool,
 }
 
 impl Call {
     /// The requirements of the call with this path.
     pub fn find(path: &str) -> Option<&'static Self> {
         CALLS.iter().find(|call| call.path == path)
+    }
+
+    const fn streaming(self) -> Self {
+        Self {
+            streams: true,
+            ..self
+        }
     }
 }
 
@@ -41,6 +50,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         role,
         scoped,
         reads_records: false,
+        streams: false,
     }
 }
 
@@ -50,17 +60,18 @@ const fn records(path: &'static str) -> Call {
         role: Role::Spectator,
         scoped: Scoped::Compared,
         reads_records: true,
+        streams: false,
     }
 }
 
 /// Every call of the server. Those played most often come first.
 pub const CALLS: &[Call] = &[
     call("/chefshat.v1.PlayService/Act", Player, Compared),
-    call("/chefshat.v1.PlayService/Play", Player, Compared),
-    call("/chefshat.v1.PlayService/Watch", Player, Compared),
-    call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared),
+    call("/chefshat.v1.PlayService/Play", Player, Compared).streaming(),
+    call("/chefshat.v1.PlayService/Watch", Player, Compared).streaming(),
+    call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared).streaming(),
     call("/chefshat.v1.TableService/Report", Player, Compared),
-    call("/chefshat.v1.TableService/Watch", Player, Compared),
+    call("/chefshat.v1.TableService/Watch", Player, Compared).streaming(),
     call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared),
     call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
     call("/chefshat.v1.RoomService/JoinRoom", Player, Compared),
@@ -81,7 +92,8 @@ pub const CALLS: &[Call] = &[
         "/chefshat.v1.TournamentService/FollowTournament",
         Spectator,
         Compared,
-    ),
+    )
+    .streaming(),
     call(
         "/chefshat.v1.TournamentService/GetTournamentResults",
         Spectator,
@@ -128,10 +140,10 @@ pub const CALLS: &[Call] = &[
         Compared,
     ),
     records("/chefshat.v1.RecordService/ListRecords"),
-    records("/chefshat.v1.RecordService/GetRecord"),
-    records("/chefshat.v1.RecordService/StreamRecords"),
-    call("/chefshat.v1.RecordService/ImportRecord", Host, Refused),
-    call("/chefshat.v1.VectorService/Run", Player, Refused),
+    records("/chefshat.v1.RecordService/GetRecord").streaming(),
+    records("/chefshat.v1.RecordService/StreamRecords").streaming(),
+    call("/chefshat.v1.RecordService/ImportRecord", Host, Refused).streaming(),
+    call("/chefshat.v1.VectorService/Run", Player, Refused).streaming(),
     call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
     call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
     call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused),
@@ -149,12 +161,13 @@ pub const CALLS: &[Call] = &[
         Unlimited,
     ),
     call("/grpc.health.v1.Health/Check", Anyone, Unlimited),
-    call("/grpc.health.v1.Health/Watch", Anyone, Unlimited),
+    call("/grpc.health.v1.Health/Watch", Anyone, Unlimited).streaming(),
     call(
         "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
         Anyone,
         Unlimited,
-    ),
+    )
+    .streaming(),
 ];
 
 #[cfg(test)]
@@ -165,29 +178,36 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn every_call_of_the_protocol_is_listed_once() {
-        let files = [
+    /// The calls of all services, and whether their requests or answers are streams.
+    fn served() -> BTreeSet<(String, bool)> {
+        let descriptors = [
             chefshat_proto::DESCRIPTORS,
             tonic_health::pb::FILE_DESCRIPTOR_SET,
             tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
-        ]
-        .into_iter()
-        .flat_map(|bytes| {
+        ];
+        let mut served = BTreeSet::new();
+        for bytes in descriptors {
             let set = prost_types::FileDescriptorSet::decode(bytes).expect("descriptors");
-            set.file
-        });
-        let mut expected = BTreeSet::new();
-        for file in files {
-            for service in &file.service {
-                for method in &service.method {
-                    let (package, service) = (file.package(), service.name());
-                    expected.insert(format!("/{package}.{service}/{}", method.name()));
+            for file in &set.file {
+                for service in &file.service {
+                    for method in &service.method {
+                        let (package, service) = (file.package(), service.name());
+                        let path = format!("/{package}.{service}/{}", method.name());
+                        let streams = method.client_streaming() || method.server_streaming();
+                        served.insert((path, streams));
+                    }
                 }
             }
         }
-        let listed: BTreeSet<String> = CALLS.iter().map(|it| it.path.to_owned()).collect();
-        assert_eq!(listed, expected);
-        assert_eq!(listed.len(), CALLS.len());
+        served
+    }
+
+    #[test]
+    fn every_call_of_the_protocol_is_listed_once_with_its_streams() {
+        let calls = CALLS
+            .iter()
+            .map(|call| (call.path.to_owned(), call.streams));
+        assert_eq!(calls.collect::<BTreeSet<_>>(), served());
+        assert_eq!(served().len(), CALLS.len());
     }
 }

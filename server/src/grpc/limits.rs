@@ -16,24 +16,9 @@ use tonic::{Code, Status};
 use tower::{Layer, Service};
 
 use super::status::{Refusal, status};
-use crate::access::Caller;
+use crate::access::{Call, Caller};
 use crate::connections::{Client, peer_address};
 use crate::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
-
-/// Calls whose requests or answers are streams.
-const STREAMS: &[&str] = &[
-    "/chefshat.v1.PlayService/Play",
-    "/chefshat.v1.PlayService/Watch",
-    "/chefshat.v1.SpectatorService/Watch",
-    "/chefshat.v1.TableService/Watch",
-    "/chefshat.v1.TournamentService/FollowTournament",
-    "/chefshat.v1.VectorService/Run",
-    "/chefshat.v1.RecordService/GetRecord",
-    "/chefshat.v1.RecordService/StreamRecords",
-    "/chefshat.v1.RecordService/ImportRecord",
-    "/grpc.health.v1.Health/Watch",
-    "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
-];
 
 /// Who is charged for a request.
 pub(super) fn charged(extensions: &http::Extensions) -> Key {
@@ -99,7 +84,7 @@ where
         let client = Client::of(request.extensions()).filter(is_own).cloned();
         let token = Caller::of(request.extensions()).token;
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
-        let is_stream = STREAMS.contains(&request.uri().path());
+        let is_stream = Call::find(request.uri().path()).is_some_and(|call| call.streams);
         let mut place = Place {
             limits: Arc::clone(&self.limits),
             key,
@@ -228,34 +213,5 @@ impl HttpBody for KeptBody {
 
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use prost::Message as _;
-
-    use super::*;
-
-    #[test]
-    fn every_call_with_a_stream_is_known_as_one() {
-        let descriptors = prost_types::FileDescriptorSet::decode(chefshat_proto::DESCRIPTORS);
-        let mut streams = Vec::new();
-        for file in descriptors.expect("descriptors").file {
-            for service in &file.service {
-                for method in &service.method {
-                    if method.client_streaming() || method.server_streaming() {
-                        let (package, service) = (file.package(), service.name());
-                        streams.push(format!("/{package}.{service}/{}", method.name()));
-                    }
-                }
-            }
-        }
-        let mut known: Vec<_> = (STREAMS.iter().copied())
-            .filter(|path| path.starts_with("/chefshat."))
-            .collect();
-        streams.sort();
-        known.sort_unstable();
-        assert_eq!(known, streams);
     }
 }

@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::super::connect::ServerArg;
-use super::super::numbers::counted;
+use super::super::numbers::{counted, with_unit};
 use super::super::{CommandError, admin, say};
 
 /// Seconds of a day.
@@ -64,18 +64,9 @@ impl Prune {
 pub(crate) fn age(text: &str) -> Result<Duration, String> {
     let wrong =
         || format!("{text:?} is not a time; use days, hours or minutes, such as 90d, 12h or 30m");
-    let (number, unit) = text
-        .split_at_checked(text.len().saturating_sub(1))
-        .ok_or_else(wrong)?;
-    let seconds = match unit {
-        "d" => DAY,
-        "h" => 60 * 60,
-        "m" => 60,
-        _ => return Err(wrong()),
-    };
-    let number: u64 = number.parse().map_err(|_| wrong())?;
-    number
-        .checked_mul(seconds)
+    let units = [('d', DAY), ('h', 60 * 60), ('m', 60)];
+    with_unit(text, &units)
+        .and_then(|(number, seconds)| number.checked_mul(seconds))
         .map(Duration::from_secs)
         .ok_or_else(wrong)
 }
