@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::path::PathBuf;
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
 use tokio_util::sync::CancellationToken;
@@ -116,13 +116,27 @@ struct Known {
     ended: CancellationToken,
 }
 
+/// The tokens file, and what it was like when it was last read.
+#[derive(Debug)]
+struct Followed {
+    file: TokenFile,
+    watch: Mutex<FileWatch>,
+}
+
+impl Followed {
+    fn new(file: TokenFile) -> Self {
+        let watch = Mutex::new(FileWatch::of([file.path()]));
+        Self { file, watch }
+    }
+}
+
 /// Decides who may do what.
 #[derive(Debug)]
 pub struct Access {
     mode: Mode,
     anonymous: Role,
     records: Role,
-    file: Option<TokenFile>,
+    file: Option<Followed>,
     known: RwLock<HashMap<TokenId, Known>>,
 }
 
@@ -135,8 +149,10 @@ impl Access {
         settings: &AccessSettings,
         data_dir: Option<&PathBuf>,
     ) -> Result<Self, TokenFileError> {
-        let file = data_dir.map(|folder| TokenFile::of(folder));
-        let tokens = file.as_ref().map(TokenFile::read).transpose()?.flatten();
+        // Watched before it is read: a later change is noticed.
+        let file = data_dir.map(|folder| Followed::new(TokenFile::of(folder)));
+        let read = file.as_ref().map(|followed| followed.file.read());
+        let tokens = read.transpose()?.flatten();
         let exists = tokens.is_some();
         let access = Self {
             mode: settings.mode.unwrap_or(match exists {
@@ -216,14 +232,27 @@ impl Access {
             return Ok(self.without_token(address));
         };
         let token = bearer(value).ok_or(Refusal::TokenUnknown)?;
+        let found = self.find(&token, address).or_else(|| {
+            // It may have been created since the file was looked at.
+            self.read_if_changed();
+            self.find(&token, address)
+        });
+        found.unwrap_or(Err(Refusal::TokenUnknown))
+    }
+
+    /// What a token grants; `None` if it is unknown.
+    fn find(
+        &self,
+        token: &AccessToken,
+        address: Option<IpAddr>,
+    ) -> Option<Result<Granted, Refusal>> {
         let known = self.known();
-        let Known { token, ended } = (known.get(&token.id))
-            .filter(|known| known.token.hash.is(&token.hash()))
-            .ok_or(Refusal::TokenUnknown)?;
+        let Known { token, ended } =
+            (known.get(&token.id)).filter(|known| known.token.hash.is(&token.hash()))?;
         if token.is_expired(since_epoch_ms()) {
-            return Err(Refusal::TokenExpired);
+            return Some(Err(Refusal::TokenExpired));
         }
-        Ok(Granted {
+        Some(Ok(Granted {
             caller: Caller {
                 address,
                 token: Some(token.id),
@@ -234,7 +263,7 @@ impl Access {
                 token: ended.clone(),
                 expires_at_ms: token.expires_at_ms,
             }),
-        })
+        }))
     }
 
     fn without_token(&self, address: Option<IpAddr>) -> Granted {
@@ -251,30 +280,37 @@ impl Access {
 
     /// Follows the tokens file and the expiry of tokens, until it is dropped.
     pub async fn follow(self: Arc<Self>) {
-        let mut watch = self.file.as_ref().map(|file| FileWatch::of([file.path()]));
-        let mut open_noted = false;
-        // It may have changed since the server read it.
-        let mut changed = true;
+        let mut open_noted = self.mode == Mode::Tokens;
         loop {
             tokio::time::sleep(INTERVAL).await;
-            changed |= watch.as_mut().is_some_and(FileWatch::has_changed);
-            if let Some(file) = &self.file
-                && std::mem::take(&mut changed)
-            {
-                match file.read() {
-                    Ok(tokens) => {
-                        let tokens = tokens.unwrap_or_default();
-                        debug!(tokens = tokens.len(), "tokens read again");
-                        if self.mode == Mode::Open && !tokens.is_empty() && !open_noted {
-                            open_noted = true;
-                            warn!("the server has tokens but requires none until it is restarted");
-                        }
-                        self.replace(tokens);
-                    }
-                    Err(error) => error!(%error, "the tokens stay as they were"),
-                }
+            self.read_if_changed();
+            if !open_noted && self.tokens() > 0 {
+                open_noted = true;
+                warn!("the server has tokens but requires none until it is restarted");
             }
             self.end_expired(since_epoch_ms());
+        }
+    }
+
+    /// Reads the tokens file again if it has changed.
+    fn read_if_changed(&self) {
+        let Some(Followed { file, watch }) = &self.file else {
+            return;
+        };
+        // Held while reading: whoever waits for it finds the tokens read.
+        let mut watch = watch
+            .lock()
+            .expect("no code that holds this lock can panic");
+        if !watch.has_changed() {
+            return;
+        }
+        match file.read() {
+            Ok(tokens) => {
+                let tokens = tokens.unwrap_or_default();
+                debug!(tokens = tokens.len(), "tokens read again");
+                self.replace(tokens);
+            }
+            Err(error) => error!(%error, "the tokens stay as they were"),
         }
     }
 
@@ -360,13 +396,7 @@ mod tests {
                 lifetime,
                 scope,
             });
-            self.reload();
             token.expect("written")
-        }
-
-        fn reload(&self) {
-            let tokens = self.file.read().expect("readable").expect("a file");
-            self.access.replace(tokens);
         }
 
         fn check(&self, method: &str, token: Option<&AccessToken>) -> Result<Granted, Refusal> {
@@ -419,6 +449,7 @@ mod tests {
             .map(|_| ());
         let (required, role) = (Role::Host, Role::Player);
         assert_eq!(refused, Err(Refusal::RoleTooLow { required, role }));
+        // Tokens are known as soon as they are created, and strangers' are not.
         let stranger = AccessToken::random(host.id);
         let refused = setup
             .check("RoomService/CreateRoom", Some(&stranger))
@@ -473,7 +504,7 @@ mod tests {
         };
         let (first, second, third) = (ended(&revoked), ended(&expiring), ended(&other));
         setup.file.revoke(revoked.id).expect("written");
-        setup.reload();
+        setup.access.read_if_changed();
         assert!(first.signal().is_cancelled());
         assert_eq!(first.refusal(), Refusal::TokenUnknown);
         setup.access.end_expired(since_epoch_ms());

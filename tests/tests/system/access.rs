@@ -69,20 +69,6 @@ impl Guarded {
         (created.id, created.to_text())
     }
 
-    /// Waits until the server knows a token.
-    async fn knows(&self, token: &str) {
-        let known = async {
-            while self
-                .refusal("/chefshat.v1.PlayService/Act", Some(token))
-                .await
-                == Some("TOKEN_UNKNOWN".to_owned())
-            {
-                tokio::time::sleep(Duration::from_millis(50)).await;
-            }
-        };
-        patiently("the server to read the token", known).await;
-    }
-
     async fn client(&self, token: &str) -> Client {
         let options = ConnectOptions {
             token: Some(token.to_owned()),
@@ -95,7 +81,6 @@ impl Guarded {
     /// A token with its client.
     async fn caller(&self, role: Role, scope: Option<Scope>) -> (TokenId, Client) {
         let (id, token) = self.token(role, scope, None);
-        self.knows(&token).await;
         (id, self.client(&token).await)
     }
 
@@ -160,8 +145,6 @@ async fn every_call_has_the_role_that_the_documentation_says() {
             Some(guarded.token(Role::Host, elsewhere, minute).1),
         ),
     ];
-    let newest = callers.last().and_then(|(_, token)| token.as_deref());
-    guarded.knows(newest.expect("a token")).await;
 
     let mut calls: Vec<&Call> = CALLS
         .iter()

@@ -13,8 +13,8 @@ beforeAll(async () => {
 afterAll(() => closed?.stop());
 
 test("a host and a guest play with tokens of their own, which no address or invitation shows", async () => {
-  const token = await closed.tokenFor("host");
-  const guestToken = await closed.tokenFor("player");
+  const token = closed.tokenFor("host");
+  const guestToken = closed.tokenFor("player");
   const host = await person(browser);
   await host.page.goto(`${closed.url}/new#token=${token}`);
   expect(host.page.url()).toBe(`${closed.url}/new`);
@@ -46,7 +46,7 @@ test("a token that is not enough is explained, in the language of the person", a
   await page.goto(`${closed.url}/new#token=chefshat_00000000_${"A".repeat(43)}`);
   await page.getByRole("button", { name: "Crea la stanza" }).click();
   await page.getByText("Il server non riconosce il token del tuo link.").waitFor();
-  await page.goto(`${closed.url}/new#token=${await closed.tokenFor("player")}`);
+  await page.goto(`${closed.url}/new#token=${closed.tokenFor("player")}`);
   await page.getByRole("button", { name: "Crea la stanza" }).click();
   await page.getByText("Il tuo link non lo permette.").waitFor();
 });
