@@ -46,7 +46,8 @@ test("an unreachable server is retried, a refusal is not", () => {
 
 test("a limit is explained with the time to wait, in whole seconds", () => {
   const error = refusal("TOO_MANY_CALLS", "calls: at most 20", {}, Code.ResourceExhausted);
-  expect(inWords(error)).toBe("calls: at most 20");
+  expect(inWords(error)).toBe(en.faults.byReason.TOO_MANY_CALLS);
+  expect(isPassing(faultOf(error))).toBe(false);
   const delays: [number, string][] = [
     [0, "1 second"],
     [2100, "3 seconds"],
@@ -57,8 +58,12 @@ test("a limit is explained with the time to wait, in whole seconds", () => {
       desc: RetryInfoSchema,
       value: create(RetryInfoSchema, { retryDelay: durationFromMs(ms) }),
     };
-    expect(inWords(error)).toBe(`This was too much at once. Try again in ${words}.`);
+    expect(inWords(error)).toBe(`${en.faults.byReason.TOO_MANY_CALLS} Try again in ${words}.`);
   }
+  expect(isPassing(faultOf(error))).toBe(true);
+  const unknown = refusal("TOO_MANY_SOMETHING", "", {}, Code.ResourceExhausted);
+  unknown.details.push(...error.details.slice(1));
+  expect(inWords(unknown)).toBe("This was too much at once. Try again in 4 minutes.");
 });
 
 test("refused tokens are explained and not retried", () => {

@@ -1,9 +1,12 @@
 // Following a stream: it is reopened when lost or silent, and closed when it ends or fails for
 // good.
 
+import { create } from "@bufbuild/protobuf";
+import { durationFromMs } from "@bufbuild/protobuf/wkt";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { follow } from "../src/api/follow";
+import { RetryInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -51,6 +54,24 @@ test("an error that a retry does not fix ends the stream", async () => {
   expect(following.link.value).toBe("failed");
   expect(following.fault.value?.code).toBe(Code.NotFound);
   expect(opened).toBe(1);
+});
+
+test("a stream that a limit refuses is opened again when the server says so", async () => {
+  let opened = 0;
+  const following = follow(
+    () => {
+      opened += 1;
+      const refused = new ConnectError("too many streams", Code.ResourceExhausted);
+      const value = create(RetryInfoSchema, { retryDelay: durationFromMs(20_000) });
+      refused.details.push({ desc: RetryInfoSchema, value });
+      return opened === 1 ? stream([], refused) : stream(["end"]);
+    },
+    () => false,
+  );
+  await vi.advanceTimersByTimeAsync(19_000);
+  expect([following.link.value, opened]).toEqual(["lost", 1]);
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect([following.link.value, opened]).toEqual(["ended", 2]);
 });
 
 test("a silent stream is reopened", async () => {

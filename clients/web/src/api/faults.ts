@@ -35,9 +35,15 @@ export function faultOf(thrown: unknown): Fault {
   };
 }
 
-/** Whether a retry may succeed soon: the server is unreachable, restarting or shutting down. */
+/** Reasons that end a stream or a call, which may be repeated. */
+const PASSING_REASONS = ["SHUTTING_DOWN", "STORE_FAILED", "ROOM_GONE", "SPECTATOR_TOO_SLOW", "FOLLOWER_TOO_SLOW"];
+
+/**
+ * Whether a retry may succeed soon: the server is unreachable, restarting or shutting down, the
+ * connection was slow, or a limit was reached that says when to try again.
+ */
 export function isPassing(fault: Fault): boolean {
-  if (["SHUTTING_DOWN", "STORE_FAILED", "ROOM_GONE"].includes(fault.reason)) return true;
+  if (PASSING_REASONS.includes(fault.reason) || fault.retryMs !== undefined) return true;
   return (
     fault.reason === "" && [Code.Unavailable, Code.Unknown, Code.DeadlineExceeded, Code.Internal].includes(fault.code)
   );
@@ -53,14 +59,16 @@ export function needsToken(fault: Fault): boolean {
 
 /** A fault in words: the translated sentence for its reason if there is one, else the server's. */
 export function wordsOf(fault: Fault): string {
-  const known: Record<string, string> = t().faults.byReason;
+  const words = t().faults;
+  const known: Record<string, string> = words.byReason;
   const own = known[fault.reason];
-  if (own !== undefined) return own;
-  if (fault.code === Code.ResourceExhausted && fault.retryMs !== undefined) {
-    return t().faults.tooMuch(Math.max(1, Math.ceil(fault.retryMs / 1000)) * 1000);
+  if (fault.retryMs !== undefined) {
+    const waitMs = Math.max(1, Math.ceil(fault.retryMs / 1000)) * 1000;
+    return `${own ?? words.tooMuch} ${words.again(waitMs)}`;
   }
-  if (fault.reason === "" && isPassing(fault)) return t().faults.notReached;
-  return fault.message || t().faults.unknown;
+  if (own !== undefined) return own;
+  if (fault.reason === "" && isPassing(fault)) return words.notReached;
+  return fault.message || words.unknown;
 }
 
 /** Anything that a call threw, in words. */

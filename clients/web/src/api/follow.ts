@@ -67,6 +67,7 @@ export function follow<Message>(
 
   const run = async () => {
     for (let failures = 0; !stopped; failures += 1) {
+      let retryMs = 0;
       current = new AbortController();
       heardAtMs = Date.now();
       try {
@@ -84,10 +85,11 @@ export function follow<Message>(
           fault.value = found;
           return end("failed");
         }
+        retryMs = found.retryMs ?? 0;
       }
       if (stopped) return;
       link.value = "lost";
-      const waitMs = Math.min(LONGEST_WAIT_MS, SHORTEST_WAIT_MS * 2 ** failures);
+      const waitMs = Math.max(retryMs, Math.min(LONGEST_WAIT_MS, SHORTEST_WAIT_MS * 2 ** failures));
       await new Promise<void>((resolve) => {
         const timer = setTimeout(resolve, waitMs);
         wake = () => {

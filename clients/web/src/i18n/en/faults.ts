@@ -6,7 +6,8 @@ import { time } from "./time";
 export const faults = {
   notReached: "The server does not answer. It may be restarting; try again in a moment.",
   unknown: "Something went wrong.",
-  tooMuch: (ms: number) => `This was too much at once. Try again in ${time(ms)}.`,
+  tooMuch: "This was too much at once.",
+  again: (ms: number) => `Try again in ${time(ms)}.`,
   byReason: {
     TOKEN_MISSING:
       "This server is open to invited people only. Ask its host for a link with a token, and open it here.",
@@ -24,6 +25,11 @@ export const faults = {
     GAME_STARTED: "The game has already started. You can watch it.",
     GAME_OVER: "The game is over.",
     GAME_NOT_STARTED: "The game has not started yet.",
+    GAME_NOT_PHYSICAL: "This game is not played with real cards.",
+    NO_PHYSICAL_TABLES: "This tournament has no games with real cards, so nobody can be added at a table.",
+    NO_SUCH_OPTION: "This question has no such answer, or it was answered already.",
+    TOO_MANY_QUESTIONS: "Too many questions are open. Answer them first.",
+    TOO_MANY_SEATINGS: "Seats of this room were taken and given up too often. Ask for a new room.",
     TOO_MANY_HELD_REPORTS: "Wait: a question must be answered first. Its answer decides about the reports that wait.",
     NOT_CORRECTABLE: "This report can no longer be corrected.",
     JOIN_CODE_WRONG:
@@ -32,7 +38,25 @@ export const faults = {
     SPECTATORS_NOT_ADMITTED: "This room does not allow spectators.",
     TOO_MANY_SPECTATORS: "This room already has as many spectators as it allows.",
     TOO_MANY_EXPRESSIONS: "Too many expressions at once. Wait a moment.",
-    TOO_MANY_ROOMS: "The server cannot hold more rooms at the moment. Try again later.",
+    TOO_MANY_ROOMS:
+      "No more rooms can be created now. Close a room that you no longer need, or wait until one is over.",
+    TOO_MANY_CALLS: "The server gets too many requests from your network, or with your link.",
+    TOO_MANY_CALLS_AT_ONCE: "The server gets too many requests from your network, or with your link.",
+    TOO_MANY_UNREAD_ANSWERS: "The server gets too many requests from your network, or with your link.",
+    TOO_MANY_WAITING_CALLS:
+      "The server gets too many requests from your network, or with your link. Load the page again.",
+    TOO_MANY_STREAMS:
+      "Too many pages and agents are connected from your network, or with your link. Close some of them.",
+    TOO_MANY_FOLLOWERS: "Too many people follow tournaments at the moment.",
+    TOO_MANY_WRONG_CODES: "Too many wrong codes were entered. Check the code.",
+    READER_TOO_SLOW: "Your connection is too slow to load this game. Try again with a better one.",
+    EVENTS_GONE: "The beginning of this game is no longer shown. Its replay is available when it ends.",
+    DISK_NEARLY_FULL:
+      "The server’s disk is nearly full: no new games can start. Ask its host to free some space. Running games continue.",
+    STORE_FAILED:
+      "The server cannot store games and is stopping. Your decisions so far are stored; games resume when it is back.",
+    ROOM_GONE: "This room has just ended, or the server is stopping. Try again in a moment.",
+    INTERNAL: "The server failed to do this. Try again; if it fails again, tell the server’s host.",
     SHUTTING_DOWN: "The server is shutting down. Games resume when it is back.",
     GAME_UNKNOWN: "The server has no record of this game.",
     GAME_RUNNING: "The game is still running. Its record is available when it ends.",
@@ -40,7 +64,8 @@ export const faults = {
     TOURNAMENT_UNKNOWN: "There is no such tournament.",
     TOURNAMENT_STARTED: "The tournament has already started.",
     TOO_FEW_PARTICIPANTS: "At least two participants must join before it can start.",
-    TOO_MANY_TOURNAMENTS: "The server cannot hold more tournaments at the moment. Try again when some are over.",
+    TOO_MANY_TOURNAMENTS:
+      "No more tournaments can be created now. Close one that you no longer need, or wait until one is over.",
     OWNER_TOKEN_WRONG: "Only the device that created it can do this.",
     NOT_STATELESS: "People cannot join: the same deals are played more than once.",
     TOURNAMENT_FULL: "The tournament is full.",

@@ -6,7 +6,8 @@ import { time } from "./time";
 export const faults: Texts["faults"] = {
   notReached: "Il server non risponde. Forse si sta riavviando: riprova tra poco.",
   unknown: "Qualcosa è andato storto.",
-  tooMuch: (ms: number) => `Troppe richieste in una volta. Riprova tra ${time(ms)}.`,
+  tooMuch: "Troppe richieste in una volta.",
+  again: (ms: number) => `Riprova tra ${time(ms)}.`,
   byReason: {
     TOKEN_MISSING:
       "Questo server è aperto solo agli invitati. Chiedi a chi lo gestisce un link con un token e aprilo qui.",
@@ -24,6 +25,11 @@ export const faults: Texts["faults"] = {
     GAME_STARTED: "La partita è già iniziata. Puoi guardarla.",
     GAME_OVER: "La partita è finita.",
     GAME_NOT_STARTED: "La partita non è ancora iniziata.",
+    GAME_NOT_PHYSICAL: "Questa partita non si gioca con carte vere.",
+    NO_PHYSICAL_TABLES: "Questo torneo non ha partite con carte vere: non si può aggiungere nessuno a un tavolo.",
+    NO_SUCH_OPTION: "La domanda non prevede questa risposta, oppure ha già avuto risposta.",
+    TOO_MANY_QUESTIONS: "Ci sono troppe domande in sospeso. Prima rispondi a quelle.",
+    TOO_MANY_SEATINGS: "I posti di questa stanza sono stati presi e lasciati troppe volte. Chiedi una nuova stanza.",
     TOO_MANY_HELD_REPORTS:
       "Prima bisogna rispondere a una domanda: dalla risposta dipendono le segnalazioni in attesa.",
     NOT_CORRECTABLE: "Questa segnalazione non si può più correggere.",
@@ -33,7 +39,24 @@ export const faults: Texts["faults"] = {
     SPECTATORS_NOT_ADMITTED: "Questa stanza non ammette spettatori.",
     TOO_MANY_SPECTATORS: "Questa stanza ha già il numero massimo di spettatori.",
     TOO_MANY_EXPRESSIONS: "Troppe espressioni in poco tempo. Aspetta un momento.",
-    TOO_MANY_ROOMS: "Al momento il server non può ospitare altre stanze. Riprova più tardi.",
+    TOO_MANY_ROOMS:
+      "Ora non si possono creare altre stanze. Chiudine una che non ti serve più, o aspetta che una partita finisca.",
+    TOO_MANY_CALLS: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
+    TOO_MANY_CALLS_AT_ONCE: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
+    TOO_MANY_UNREAD_ANSWERS: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
+    TOO_MANY_WAITING_CALLS: "Il server riceve troppe richieste dalla tua rete o con il tuo link. Ricarica la pagina.",
+    TOO_MANY_STREAMS:
+      "Troppe pagine e troppi agenti sono collegati dalla tua rete o con il tuo link. Chiudine qualcuno.",
+    TOO_MANY_FOLLOWERS: "Al momento troppe persone seguono dei tornei.",
+    TOO_MANY_WRONG_CODES: "Sono stati inseriti troppi codici sbagliati. Controlla il codice.",
+    READER_TOO_SLOW: "La tua connessione è troppo lenta per caricare questa partita. Riprova con una migliore.",
+    EVENTS_GONE: "L’inizio di questa partita non è più visibile. La registrazione sarà disponibile alla fine.",
+    DISK_NEARLY_FULL:
+      "Il disco del server è quasi pieno: non possono iniziare nuove partite. Chiedi a chi gestisce il server di liberare spazio. Le partite in corso continuano.",
+    STORE_FAILED:
+      "Il server non riesce a salvare le partite e si sta fermando. Le tue decisioni finora sono salvate; le partite riprendono al suo ritorno.",
+    ROOM_GONE: "Questa stanza si è appena chiusa, o il server si sta fermando. Riprova tra poco.",
+    INTERNAL: "Il server non è riuscito a farlo. Riprova; se non basta, avvisa chi gestisce il server.",
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite riprendono al suo ritorno.",
     GAME_UNKNOWN: "Il server non ha la registrazione di questa partita.",
     GAME_RUNNING: "La partita è ancora in corso. La registrazione sarà disponibile alla fine.",
@@ -42,7 +65,8 @@ export const faults: Texts["faults"] = {
     TOURNAMENT_UNKNOWN: "Questo torneo non esiste.",
     TOURNAMENT_STARTED: "Il torneo è già iniziato.",
     TOO_FEW_PARTICIPANTS: "Prima dell’inizio devono iscriversi almeno due partecipanti.",
-    TOO_MANY_TOURNAMENTS: "Al momento il server non può ospitare altri tornei. Riprova quando qualcuno sarà concluso.",
+    TOO_MANY_TOURNAMENTS:
+      "Ora non si possono creare altri tornei. Chiudine uno che non ti serve più, o aspetta che uno finisca.",
     OWNER_TOKEN_WRONG: "Può farlo solo il dispositivo che l’ha creato.",
     NOT_STATELESS: "Le persone non possono iscriversi: le stesse carte si giocano più volte.",
     TOURNAMENT_FULL: "Il torneo è al completo.",

@@ -1,0 +1,78 @@
+// Every reason that the server's sources contain has a text on the page, or stands below with why a
+// person at the page never reads it. A new reason fails here until it is in one of the two.
+
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { expect, test } from "vitest";
+import { en } from "../src/i18n/en";
+
+const SERVER = join(import.meta.dirname, "../../../server/src");
+
+/** Reasons without a text on the page. */
+const WITHOUT_TEXT: Record<string, readonly string[]> = {
+  "forms show the server's sentence at the field": [
+    "BRANCH_REFUSED",
+    "POLICY_REFUSED",
+    "REPORT_REFUSED",
+    "RULE_SET_REFUSED",
+    "SEATS_REFUSED",
+    "SETTINGS_REFUSED",
+  ],
+  "the page repeats the request": ["FOLLOWER_TOO_SLOW", "SPECTATOR_TOO_SLOW"],
+  "the page sends no such value": [
+    "COMMAND_MISSING",
+    "ENTROPY_REFUSED",
+    "EXPRESSION_REFUSED",
+    "FILTER_REFUSED",
+    "KIND_REFUSED",
+    "MAX_GAMES_REFUSED",
+    "PAGE_TOKEN_REFUSED",
+    "REPORT_ID_USED",
+    "REQUEST_ID_REFUSED",
+    "REQUEST_ID_USED",
+    "SCRIPT_REFUSED",
+    "SEED_REFUSED",
+    "SNAPSHOT_DELAYED",
+    "STATE_REFUSED",
+  ],
+  "only programs make these calls: Play, vectors, imports, operating": [
+    "ACTIONS_REFUSED",
+    "CALLS_NOT_TAKEN",
+    "CLIENT_IDLE",
+    "CLIENT_TOO_SLOW",
+    "CLIENT_UNKNOWN",
+    "FACES_OUT_OF_RANGE",
+    "GAME_KNOWN",
+    "HANDLE_UNKNOWN",
+    "ILLEGAL_ACTION",
+    "IMPORT_OFF",
+    "IMPORT_TOO_SLOW",
+    "PRUNE_REFUSED",
+    "RECORDS_TOO_LONG",
+    "RECORD_REFUSED",
+    "RECORD_TOO_LARGE",
+    "RESET_REFUSED",
+    "SETUP_MISSING",
+    "SETUP_REFUSED",
+    "SETUP_TOO_LATE",
+    "STREAM_SILENT",
+    "TOO_MANY_COMMANDS",
+    "TOO_MANY_SEATS",
+    "TOO_MANY_VECTOR_GAMES",
+    "TOO_MANY_VECTOR_STREAMS",
+  ],
+  "the connection is closed; the reason is only counted": [
+    "ANSWERS_NOT_READ",
+    "OUT_OF_DESCRIPTORS",
+    "TOO_MANY_CONNECTIONS",
+  ],
+  "environment variables": ["CARGO_MANIFEST_DIR", "CARGO_PKG_VERSION", "CHEFSHAT_PAIRS"],
+};
+
+test("each reason of the server has a text, or a cause not to have one", () => {
+  const files = readdirSync(SERVER, { recursive: true, encoding: "utf8" }).filter((path) => path.endsWith(".rs"));
+  const sources = files.map((path) => readFileSync(join(SERVER, path), "utf8"));
+  const found = sources.flatMap((text) => [...text.matchAll(/"([A-Z]+(?:_[A-Z]+)+|INTERNAL)"/g)].map(([, it]) => it));
+  const handled = [...Object.keys(en.faults.byReason), ...Object.values(WITHOUT_TEXT).flat()];
+  expect(handled.toSorted()).toEqual([...new Set(found)].toSorted());
+});
