@@ -7,7 +7,7 @@ use clap::ValueEnum;
 
 use crate::command::{cargo, python_command, with_environment};
 use crate::failure::Failure;
-use crate::lint;
+use crate::lint::{self, OPTIONAL_FEATURES};
 use crate::places::{DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
 use crate::steps::Steps;
@@ -55,6 +55,8 @@ pub(crate) fn run(
     let build = [
         "build",
         "--workspace",
+        "--features",
+        OPTIONAL_FEATURES,
         "--lib",
         "--bins",
         "--tests",
@@ -73,18 +75,14 @@ pub(crate) fn run(
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
-        let test = ["test", "--workspace", "--no-fail-fast"];
-        steps.program("cargo test", cargo_command(places).args(test))?;
-        let traces = [
+        let test = [
             "test",
             "--workspace",
             "--features",
-            "chefshat/otlp",
-            "--bin",
-            "chefshat",
-            "traces::",
+            OPTIONAL_FEATURES,
+            "--no-fail-fast",
         ];
-        steps.program("OpenTelemetry", cargo_command(places).args(traces))?;
+        steps.program("cargo test", cargo_command(places).args(test))?;
     }
     if wants(Part::Python) {
         if has_python {

@@ -34,6 +34,9 @@ pub(super) struct SeatClock {
     pub(super) connected: Option<bool>,
     /// Timeouts in a row, as far as they certainly count.
     pub(super) timeouts: u32,
+    /// Timeouts in a row, if everything counts that may: servers differ in whether silent decisions
+    /// do.
+    pub(super) timeouts_at_most: u32,
     /// Bytes of its annotations so far.
     pub(super) annotation_bytes: usize,
 }
@@ -44,10 +47,15 @@ impl SeatClock {
         self.decisions += 1;
         self.bank_ms = record.bank_left_ms;
         self.annotation_bytes += (record.annotations.as_ref()).map_or(0, Message::encoded_len);
+        let silent = u32::from(kind == DecisionKind::SpecialAction);
         match record.source() {
-            Source::Agent => self.timeouts = 0,
-            Source::Timeout | Source::Disconnected if kind != DecisionKind::SpecialAction => {
-                self.timeouts += 1;
+            Source::Agent => {
+                self.timeouts = 0;
+                self.timeouts_at_most *= silent;
+            }
+            Source::Timeout | Source::Disconnected => {
+                self.timeouts += 1 - silent;
+                self.timeouts_at_most += 1;
             }
             _ => {}
         }

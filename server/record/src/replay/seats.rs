@@ -49,6 +49,7 @@ impl Seats {
                         substituted: false,
                         connected: None,
                         timeouts: 0,
+                        timeouts_at_most: 0,
                         annotation_bytes: 0,
                     }
                 })
@@ -136,6 +137,14 @@ impl Seats {
                         "substituted.builtInAgent",
                         substituted.built_in_agent.as_str(),
                         policy.map_or("", String::as_str),
+                    ));
+                }
+                let late = self.clocks[seat].timeouts_at_most;
+                let limit = (header.policy.as_ref()).map_or(0, v1::RoomPolicy::max_timeouts);
+                // In a physical room a correction may have voided its timeouts, or what ended them.
+                if late < limit && header.origin() != v1::GameOrigin::Physical {
+                    return Err(format!(
+                        "seat {seat} is substituted, but was late {late} times in a row of {limit}"
                     ));
                 }
                 self.clocks[seat].substituted = true;

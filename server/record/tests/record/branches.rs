@@ -9,6 +9,7 @@ use chefshat_record::import::import;
 use chefshat_record::players::{PlayerError, recorded_player};
 use chefshat_record::replay::{replay, walk};
 
+use crate::fixture;
 use chefshat_record::testing::{TestGame, aborted, taken_over};
 
 /// Lines before the game starts: the header and four seated participants.
@@ -195,24 +196,36 @@ fn an_aborted_game_can_be_branched() {
 
 #[test]
 fn a_recorded_player_has_the_observations_and_actions_of_its_seat() {
-    use v1::DecisionSource::{Agent, Disconnected, Invalid, Substitute, Timeout};
-    let sources = [Agent, Timeout, Invalid, Disconnected, Substitute];
+    use v1::DecisionSource::{Agent, Disconnected, Invalid, Timeout};
+    let sources = [Agent, Timeout, Invalid, Disconnected];
     let source = |decision: u64| sources[decision as usize % sources.len()];
-    let lines = TestGame::dealt(standard(), 7, 1).record(source);
-    let course = decisions_of(&lines);
+    check_players(&TestGame::dealt(standard(), 7, 1).record(source));
+    // A substitute plays for one of its seats.
+    check_players(&fixture("committed.jsonl"));
+}
+
+fn check_players(lines: &[v1::RecordLine]) {
+    let course = decisions_of(lines);
+    let sources: Vec<_> = lines
+        .iter()
+        .filter_map(|line| match &line.line {
+            Some(Line::Decision(decision)) => Some(decision.source()),
+            _ => None,
+        })
+        .collect();
     let mut all = 0;
     for seat in 0..4 {
-        let decisions = recorded_player(&lines, seat).unwrap();
+        let decisions = recorded_player(lines, seat).unwrap();
         let seat = Seat::new(seat as usize);
         let of_seat = course
             .iter()
-            .zip(0..)
+            .zip(&sources)
             .filter(|((game, _), _)| game.decision().unwrap().seat == seat);
-        for (decision, ((game, action), number)) in decisions.iter().zip(of_seat) {
+        for (decision, ((game, action), source)) in decisions.iter().zip(of_seat) {
             assert_eq!(decision.observation, game.observe(Viewer::Seat(seat)));
             assert_eq!(decision.legal, game.legal_actions());
             assert_eq!(decision.action, *action);
-            assert_eq!(decision.own, source(number) == Agent);
+            assert_eq!(decision.own, *source == AGENT);
         }
         all += decisions.len();
     }

@@ -1,7 +1,8 @@
 //! Records damaged in one place: the error names the first wrong line and the problem.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::fixture_path;
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::{MAX_LINE_BYTES, RecordFileError};
 use chefshat_record::replay::replay;
@@ -30,12 +31,6 @@ enum Damage {
 }
 
 use Damage::{Append, Bytes, CutBehind, CutWithin, Double, Drop, Set, Swap, Unset};
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../tests/fixtures/records")
-        .join(name)
-}
 
 /// The first wrong line and the problem; `None` if the record verifies.
 fn verdict(path: &Path) -> Option<(usize, String)> {
@@ -216,7 +211,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
 
 #[test]
 fn each_damage_is_reported_at_the_first_wrong_line() {
-    let path = fixture("committed.jsonl");
+    let path = fixture_path("committed.jsonl");
     assert_eq!(verdict(&path), None);
     let text = std::fs::read_to_string(&path).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use crate::fixture;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::pseudonym::Pseudonym;
@@ -30,7 +31,7 @@ type Forgery = (&'static str, Outcome, fn(&mut Lines));
 /// The forgeries. Numbers of lines are those of
 /// the fixture `committed.jsonl`, from 1.
 #[rustfmt::skip] // One row each.
-const FORGERIES: [Forgery; 42] = [
+const FORGERIES: [Forgery; 43] = [
     // The deal.
     ("a card of a hand", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[1].cards[0] = 4 }),
     ("the hands of two seats exchanged", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands.swap(0, 1) }),
@@ -64,6 +65,7 @@ const FORGERIES: [Forgery; 42] = [
     ("a time before an earlier one", Replay, |lines| decision(lines, 14).elapsed_ms = 3),
     // Seats and connections.
     ("a dropped substitution", Replay, |lines| without_event(lines, 51)),
+    ("a substitution added", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into() }))),
     ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3 }))),
     ("another name everywhere", Signature, rename),
     ("another name at one place", Replay, |lines| header(lines).seats[3].name = "Rosa".into()),
@@ -228,10 +230,8 @@ fn fixed_seed(lines: &mut Lines) {
     };
 }
 
-fn fixture() -> Lines {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records/committed.jsonl");
-    jsonl::read(&path).expect("a record")
+fn committed() -> Lines {
+    fixture("committed.jsonl")
 }
 
 fn key() -> SigningKey {
@@ -239,13 +239,13 @@ fn key() -> SigningKey {
 }
 
 fn signed() -> Lines {
-    let mut lines = fixture();
+    let mut lines = committed();
     footer(&mut lines).signature = Some(key().sign(&lines));
     lines
 }
 
 fn outcome(forge: fn(&mut Lines)) -> Outcome {
-    let (mut plain, mut with_signature) = (fixture(), signed());
+    let (mut plain, mut with_signature) = (committed(), signed());
     forge(&mut plain);
     forge(&mut with_signature);
     let accepted = replay(&with_signature).is_ok();
@@ -329,7 +329,7 @@ fn a_signature_survives_the_file_and_public_keys_their_text() {
     // The same signature, computed in Python.
     let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/signed.jsonl");
     assert_eq!(jsonl::read(&other).expect("read"), lines);
-    assert_eq!(signer(&fixture()), Ok(None));
+    assert_eq!(signer(&committed()), Ok(None));
     let text = key().public().to_string();
     assert_eq!(text.parse(), Ok(key().public()));
     for wrong in ["", "ed25519:", "ed25519:00", &text[8..]] {

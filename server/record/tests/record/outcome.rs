@@ -1,10 +1,8 @@
 //! Outcomes: what each seat did in a game, and which games count for ratings.
 
-use std::path::Path;
-
+use crate::fixture;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
-use chefshat_record::jsonl;
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
 
 use chefshat_record::testing::{TestGame, header};
@@ -15,11 +13,6 @@ fn rules() -> RuleSet {
         ..RuleSetSpec::default()
     };
     spec.validate().unwrap()
-}
-
-fn fixture(name: &str) -> Vec<v1::RecordLine> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
-    jsonl::read(&folder.join(name)).unwrap()
 }
 
 /// The record of a game that a server dealt, in which every participant decided itself.

@@ -1,11 +1,9 @@
 //! Verification of records with every kind of start, and refusal of altered starts.
 
-use std::path::Path;
-
+use crate::fixture;
 use chefshat_engine::{BySeat, Game, RuleSet, RuleSetSpec, Script, Seat, SeatOrder, Seed, Stop};
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::branch::branch_of;
-use chefshat_record::jsonl;
 use chefshat_record::replay::{replay, walk};
 
 use chefshat_record::testing::{TestGame, header};
@@ -61,12 +59,11 @@ fn decision(lines: &mut [v1::RecordLine], number: usize) -> &mut v1::DecisionRec
 
 #[test]
 fn recorded_games_verify() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
     for (file, decisions, events, winner) in [
         ("committed.jsonl", 207, 284, 3),
         ("fixed.jsonl", 96, 130, 2),
     ] {
-        let lines = jsonl::read(&folder.join(file)).unwrap();
+        let lines = fixture(file);
         let replayed = replay(&lines).unwrap_or_else(|error| panic!("{file}: {error}"));
         assert_eq!(replayed.state, v1::RoomState::Finished, "{file}");
         assert_eq!(
