@@ -458,6 +458,12 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         "Place of the seat in the game, from 1; null if the game was aborted.",
         |row| row.game_place.into(),
     ),
+    Column::new(
+        "signed_by",
+        Type::Text,
+        "Public key of the server that signed the record, as `chefshat key show` prints it; null if unsigned.",
+        |row| row.game.signed_by.as_deref().into(),
+    ),
 ];
 
 pub(super) fn columns() -> Vec<ColumnInfo> {

@@ -7,6 +7,7 @@ use chefshat_proto::v1::{self, record_line::Line};
 
 use chefshat_record::convert::{has_real_cards, kind_name, rules_from_proto};
 use chefshat_record::replay::{ReplayError, replay};
+use chefshat_record::signature::PublicKey;
 
 /// The origin of imported games.
 pub(super) const IMPORTED: &str = "imported";
@@ -29,6 +30,8 @@ pub(super) struct GameInfo {
     /// Size of the action space.
     pub(super) actions: u16,
     pub(super) server_version: String,
+    /// The public key of the record's signature, which the replay verifies.
+    pub(super) signed_by: Option<String>,
     /// The participants at the start of the game, by seat.
     pub(super) seats: Vec<Arc<SeatInfo>>,
 }
@@ -86,10 +89,14 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
             rule_set.players()
         )));
     }
-    let finished = matches!(
-        lines.last().and_then(|line| line.line.as_ref()),
-        Some(Line::Footer(footer)) if footer.state() == v1::RoomState::Finished
-    );
+    let footer = match lines.last().and_then(|line| line.line.as_ref()) {
+        Some(Line::Footer(footer)) => Some(footer),
+        _ => None,
+    };
+    let signed_by = footer
+        .and_then(|footer| footer.signature.as_ref())
+        .and_then(|signature| signature.public_key.as_slice().try_into().ok())
+        .map(|key| PublicKey(key).to_string());
     Ok(GameInfo {
         game_id: header.game_id.clone(),
         room_name: header.room_name.clone(),
@@ -108,11 +115,12 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
             .ok()
             .filter(|at| *at > 0)
             .and_then(|at| at.checked_mul(1000)),
-        finished,
+        finished: footer.is_some_and(|footer| footer.state() == v1::RoomState::Finished),
         players: u8::try_from(rule_set.players()).expect("at most six players"),
         actions: rule_set.actions().size(),
         rule_set,
         server_version: header.server_version.clone(),
+        signed_by,
         seats: header
             .seats
             .iter()

@@ -1,10 +1,11 @@
 //! Rows of decisions agree with the engine's metrics and with the record.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_dataset::decision_columns;
 use chefshat_engine::RewardScheme;
 use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_record::signature::SigningKey;
 use serde_json::Value;
 
 use super::{Stage, a_record, counted, number, players};
@@ -173,4 +174,20 @@ fn a_row_has_the_observation_and_action_of_its_seat() {
 fn sum(list: &Value) -> u64 {
     let values = list.as_array().unwrap().iter();
     values.map(|value| value.as_u64().unwrap()).sum()
+}
+
+#[test]
+fn rows_name_the_key_that_signed_their_record() {
+    let key = SigningKey::from_seed(&[7; 32]);
+    let mut signed = a_record(1);
+    let signature = key.sign(&signed);
+    if let Some(Line::Footer(footer)) = signed.last_mut().and_then(|line| line.line.as_mut()) {
+        footer.signature = Some(signature);
+    }
+    let stage = Stage::new(&[("signed.jsonl", signed), ("unsigned.jsonl", a_record(3))]);
+    stage.run(&stage.export()).unwrap();
+    let rows = stage.rows("decisions");
+    let keys: BTreeSet<Option<&str>> = rows.iter().map(|row| row["signed_by"].as_str()).collect();
+    let key = key.public().to_string();
+    assert_eq!(keys, [None, Some(key.as_str())].into());
 }
