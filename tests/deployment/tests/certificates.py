@@ -1,12 +1,17 @@
-"""A certificate authority of the tests, and certificates of a proxy that it replaces."""
+"""A certificate authority of the tests, and certificates of servers and proxies, which are replaced."""
 
+import contextlib
 import os
 import ssl
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import trustme
 
 AUTHORITY = trustme.CA()
+#: How long a test waits for something that must happen, seconds.
+PATIENCE_S = 300.0
 
 
 def trust(folder: Path) -> Path:
@@ -21,6 +26,7 @@ def trust(folder: Path) -> Path:
 
 def issue(address: str, folder: Path) -> str:
     """Replaces tls.crt and tls.key in a folder by a new certificate of an address. Returns it as text."""
+    folder.mkdir(exist_ok=True)
     issued = AUTHORITY.issue_cert(address)
     chain = b"".join(blob.bytes() for blob in issued.cert_chain_pems)
     for name, content in (("tls.crt", chain), ("tls.key", issued.private_key_pem.bytes())):
@@ -28,6 +34,19 @@ def issue(address: str, folder: Path) -> str:
         part.write_bytes(content)
         part.replace(folder / name)
     return issued.cert_chain_pems[0].bytes().decode()
+
+
+def until_served(certificate: str, host: str, port: int, explanation: Callable[[], str]) -> None:
+    """Waits until new connections get a certificate. The explanation says why they never will, or nothing."""
+    give_up_at = time.monotonic() + PATIENCE_S
+    while True:
+        with contextlib.suppress(OSError):
+            served = ssl.get_server_certificate((host, port), timeout=PATIENCE_S)
+            if served.split() == certificate.split():
+                return
+        assert not explanation(), explanation()
+        assert time.monotonic() < give_up_at, "the certificate is not served"
+        time.sleep(0.05)
 
 
 def client_context() -> ssl.SSLContext:

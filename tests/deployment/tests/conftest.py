@@ -1,13 +1,12 @@
 """A server with a proxy in front of it, for each proxy in turn."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from certificates import trust
-from chefshat.local_server import BINARY, LocalServer
 from proxies import Envoy, HAProxy, Nginx, Proxy
+from servers import GuardedServer
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -17,17 +16,17 @@ def authority(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[LocalServer]:
-    """A server that stores its games."""
-    binary = os.environ.get(BINARY)
-    if not binary:
-        pytest.skip(f"{BINARY} is not set: name the chefshat binary")
-    with LocalServer(binary, options=["--data-dir", str(tmp_path / "data"), "--grace", "0"]) as server:
+def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[GuardedServer]:
+    """A server that stores its games, requires tokens, and trusts the proxies. Its log contains no token."""
+    monkeypatch.setenv("CHEFSHAT_LOG", "info")
+    with GuardedServer(tmp_path / "data", "--trusted-proxy", "127.0.0.1") as server:
         yield server
+        secrets = [token.rpartition("_")[2] for token in server.tokens.values()]
+        assert not [secret for secret in secrets if secret in server.log]
 
 
 @pytest.fixture(params=[Nginx, HAProxy, Envoy], ids=lambda kind: kind.program)
-def proxy(request: pytest.FixtureRequest, server: LocalServer, tmp_path: Path) -> Iterator[Proxy]:
+def proxy(request: pytest.FixtureRequest, server: GuardedServer, tmp_path: Path) -> Iterator[Proxy]:
     """A proxy in front of the server."""
     folder = tmp_path / "proxy"
     folder.mkdir()

@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import signal
-import ssl
 import subprocess
 import sysconfig
 import time
@@ -17,28 +16,28 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import pytest
-from certificates import client_context, issue
+from certificates import PATIENCE_S, issue, until_served
 
 CONFIGURATIONS = Path(__file__).resolve().parents[3] / "docker" / "proxies"
-#: How long a test waits for something that must happen, seconds.
-PATIENCE_S = 300.0
 _PORT = 8443
 _numbers = itertools.count(1)
 
 
 class Proxy(ABC):
-    """A proxy with TLS in front of a server; a context manager."""
+    """A proxy in front of a server, which is reached with TLS; a context manager."""
 
     #: The program, which may be missing.
     program: ClassVar[str]
     #: The configurations; the first is the one to start with.
     files: ClassVar[tuple[str, ...]]
 
-    def __init__(self, server: str, folder: Path) -> None:
-        """Prepares the proxy of the server at host:port, with its files in an empty folder."""
+    def __init__(self, server: str, folder: Path, tls: Path | None = None) -> None:
+        """Prepares the proxy of the server at host:port, with its files in an empty folder.
+
+        `tls` is the folder of the certificate, if that is the server's.
+        """
         self._folder = folder
-        self._tls = folder / "tls"
-        self._tls.mkdir()
+        self._tls = tls or folder / "tls"
         # Its own loopback address, so that tests do not compete for ports.
         high, low = (os.getpid() >> 8) & 255, os.getpid() & 255
         self.host = f"127.{200 + next(_numbers) % 50}.{high}.{low}"
@@ -94,18 +93,10 @@ class Proxy(ABC):
             self._processes.append(starting.result())
 
     def _until_served(self, certificate: str) -> None:
-        context = client_context()
-        context.check_hostname = False
-        context.verify_mode = ssl.CERT_NONE
-        give_up_at = time.monotonic() + PATIENCE_S
-        while True:
-            with contextlib.suppress(OSError):
-                served = ssl.get_server_certificate((self.host, _PORT), timeout=PATIENCE_S)
-                if served.split() == certificate.split():
-                    return
-            assert self._processes[-1].poll() is None, self.log
-            assert time.monotonic() < give_up_at, self.log
-            time.sleep(0.05)
+        def ended() -> str:
+            return "" if self._processes[-1].poll() is None else self.log
+
+        until_served(certificate, self.host, _PORT, ended)
 
     @property
     def log(self) -> str:
@@ -155,6 +146,15 @@ class HAProxy(Proxy):
 
     def _reload(self) -> None:
         self._processes[0].send_signal(signal.SIGUSR2)
+
+
+class HAProxyPassingThrough(HAProxy):
+    """Passes connections on to a server that has the certificate. A new one needs no reload, but one must not hurt either."""
+
+    files = ("haproxy-passing-through.cfg",)
+
+    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+        return [("server chefshat server:50051", f"server chefshat {server}"), ("bind :443", f"bind {self.address}")]
 
 
 class Envoy(Proxy):

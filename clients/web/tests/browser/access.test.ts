@@ -1,7 +1,9 @@
 // A server that requires tokens: links with a token, invitations without one, refusals in words.
 
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { byClicks, nextDecision } from "./play";
+import { DecisionSource } from "../../src/gen/chefshat/v1/event_pb";
+import { byClicks, nextDecision, playOn, sitDown } from "./play";
+import { gameOf, newRoom, recordOf } from "./rooms";
 import { browser, person, Server, useStage } from "./stage";
 
 useStage();
@@ -39,6 +41,25 @@ test("a host and a guest play with tokens of their own, which no address or invi
   expect(await nextDecision(guest.page)).toBe(first);
   await byClicks(guest.page);
   expect(await nextDecision(guest.page, first)).not.toBe(first);
+});
+
+test("a person plays a complete Shift with a link for players, while one with a link for spectators watches", async () => {
+  const { roomId, code } = await newRoom(closed, { seats: ["person", "greedy", "random", "greedy"], faces: 9 });
+  const watcher = await person(browser);
+  await watcher.page.goto(`${closed.url}/watch/${roomId}#token=${await closed.tokenFor("spectator")}`);
+  const player = await person(browser);
+  await sitDown(player.page, closed, code, "Rosa", await closed.tokenFor("player"));
+  const taken = await playOn(player.page, byClicks, async (already) => {
+    if (already === 3) await player.page.reload();
+  });
+  const over = { name: "The game is over", level: 1 } as const;
+  await player.page.getByRole("heading", over).waitFor();
+  await watcher.page.getByRole("heading", over).waitFor();
+  const record = await recordOf(closed, await gameOf(closed, roomId));
+  const own = record.flatMap(({ line }) => (line.case === "decision" && line.value.seat === 0 ? [line.value] : []));
+  expect(own.map(({ source }) => source)).toEqual(Array<number>(taken).fill(DecisionSource.AGENT));
+  expect(taken).toBeGreaterThan(3);
+  expect([...player.faults, ...watcher.faults]).toEqual([]);
 });
 
 test("a token that is not enough is explained, in the language of the person", async () => {

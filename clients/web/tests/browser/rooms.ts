@@ -5,7 +5,7 @@ import { spawn } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { fromJson, type JsonValue } from "@bufbuild/protobuf";
-import { createClient } from "@connectrpc/connect";
+import { createClient, type Interceptor } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { type RecordLine, RecordLineSchema } from "../../src/gen/chefshat/v1/record_pb";
 import { ParticipantKind, type RoomPolicy } from "../../src/gen/chefshat/v1/room_pb";
@@ -14,9 +14,13 @@ import { TableService } from "../../src/gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../../src/gen/chefshat/v1/tournament_service_pb";
 import { type Server, until } from "./stage";
 
-/** Clients of a server's services, for Node. */
+/** Clients of a server's services, for Node, with the token of a host if the server requires tokens. */
 export function clientsOf(server: Server) {
-  const transport = createGrpcWebTransport({ baseUrl: server.url });
+  const authorize: Interceptor = (next) => (request) => {
+    if (server.token) request.header.set("Authorization", `Bearer ${server.token}`);
+    return next(request);
+  };
+  const transport = createGrpcWebTransport({ baseUrl: server.url, interceptors: [authorize] });
   return {
     rooms: createClient(RoomService, transport),
     tournaments: createClient(TournamentService, transport),

@@ -20,6 +20,8 @@ export class Server {
     readonly dataDir: string,
     readonly address: string,
     private scheme = "http",
+    /** A token of a host, if the server requires tokens. */
+    readonly token?: string,
   ) {}
 
   /**
@@ -27,22 +29,29 @@ export class Server {
    * there instead, such as one behind a proxy, whose data folder is CHEFSHAT_DATA_DIR; it cannot be restarted.
    */
   static async start(): Promise<Server> {
-    const running = process.env.CHEFSHAT_URL && new URL(process.env.CHEFSHAT_URL);
-    const { CHEFSHAT_DATA_DIR: runningData = "" } = process.env;
-    if (running) return new Server(undefined, runningData, running.host, running.protocol.replace(":", ""));
-    return Server.startIn(dataFolder());
+    return Server.running() ?? Server.startIn(dataFolder());
   }
 
-  /** Starts the server CHEFSHAT_BIN so that every call requires a token (`tokenFor`). */
+  /** As `start`, but every call requires a token (`tokenFor`). */
   static async startWithTokens(): Promise<Server> {
-    const dataDir = dataFolder();
-    createToken(dataDir, "admin");
-    return Server.startIn(dataDir);
+    const running = Server.running();
+    const dataDir = running?.dataDir ?? dataFolder();
+    const token = createToken(dataDir, "host");
+    return running
+      ? new Server(undefined, dataDir, running.address, running.scheme, token)
+      : Server.startIn(dataDir, token);
   }
 
-  private static async startIn(dataDir: string): Promise<Server> {
+  private static running(): Server | undefined {
+    const { CHEFSHAT_URL: url, CHEFSHAT_DATA_DIR: dataDir = "" } = process.env;
+    if (!url) return undefined;
+    const { host, protocol } = new URL(url);
+    return new Server(undefined, dataDir, host, protocol.replace(":", ""));
+  }
+
+  private static async startIn(dataDir: string, token?: string): Promise<Server> {
     const { child, address } = await serve(dataDir, "127.0.0.1:0");
-    return new Server(child, dataDir, address);
+    return new Server(child, dataDir, address, "http", token);
   }
 
   /** A new token with a role. */
