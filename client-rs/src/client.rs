@@ -50,6 +50,19 @@ impl Client {
         Self { connection }
     }
 
+    /// A client on the same connection that shows these owner tokens and tickets with every call, at
+    /// most 16. They show private rooms and tournaments, unlisted ones in lists, and their records.
+    ///
+    /// # Errors
+    /// `SECRET_REFUSED` for a secret with characters that no secret has.
+    pub fn with_secrets<S: AsRef<str>>(
+        &self,
+        secrets: impl IntoIterator<Item = S>,
+    ) -> Result<Self, Error> {
+        let connection = self.connection.with_secrets(secrets)?;
+        Ok(Self { connection })
+    }
+
     /// The connection, for calls of the protocol without a method here.
     pub fn channel(&self) -> Connection {
         self.connection.clone()

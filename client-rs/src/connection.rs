@@ -3,6 +3,7 @@
 use std::error::Error as _;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -29,6 +30,8 @@ const STREAM_WINDOW_BYTES: u32 = 1 << 20;
 const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
 /// Maximum size of a response: enough for the history of hundreds of seats in one message.
 pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;
+/// Name of the header that shows an owner token or a ticket.
+const SECRET_HEADER: &str = "chefshat-secret";
 /// First line of each certificate in a PEM file.
 const PEM_CERTIFICATE: &[u8] = b"-----BEGIN CERTIFICATE-----";
 
@@ -70,6 +73,8 @@ pub struct Connection {
     channel: Channel,
     /// Marked as sensitive: never printed.
     authorization: Option<http::HeaderValue>,
+    /// The same.
+    secrets: Arc<[http::HeaderValue]>,
 }
 
 impl Connection {
@@ -77,7 +82,25 @@ impl Connection {
         Self {
             channel,
             authorization: None,
+            secrets: Arc::default(),
         }
+    }
+
+    /// The same connection, which shows these secrets with every call.
+    pub(crate) fn with_secrets<S: AsRef<str>>(
+        &self,
+        secrets: impl IntoIterator<Item = S>,
+    ) -> Result<Self, Error> {
+        let secrets = secrets.into_iter().map(|secret| {
+            let mut value =
+                http::HeaderValue::try_from(secret.as_ref().trim()).map_err(|_| Error::secret())?;
+            value.set_sensitive(true);
+            Ok(value)
+        });
+        Ok(Self {
+            secrets: secrets.collect::<Result<_, Error>>()?,
+            ..self.clone()
+        })
     }
 }
 
@@ -101,6 +124,9 @@ impl Service<http::Request<Body>> for Connection {
         if let Some(value) = &self.authorization {
             let headers = request.headers_mut();
             headers.insert(http::header::AUTHORIZATION, value.clone());
+        }
+        for secret in self.secrets.iter() {
+            request.headers_mut().append(SECRET_HEADER, secret.clone());
         }
         self.channel.call(request)
     }
@@ -145,6 +171,7 @@ pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Conne
     Ok(Connection {
         channel,
         authorization,
+        secrets: Arc::default(),
     })
 }
 

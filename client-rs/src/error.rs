@@ -20,6 +20,8 @@ const CONNECT_FAILED: &str = "CONNECT_FAILED";
 const TLS_FAILED: &str = "TLS_FAILED";
 /// Reason of an unusable file of certificate authorities; set by the client.
 const CA_REFUSED: &str = "CA_REFUSED";
+/// Reason of a malformed secret; set by the client.
+const SECRET_REFUSED: &str = "SECRET_REFUSED";
 /// Reason of a malformed token; set by the client.
 const TOKEN_REFUSED: &str = "TOKEN_REFUSED";
 /// Reason of a response without a required part; set by the client.
@@ -45,7 +47,8 @@ impl Error {
 
     /// The reason in UPPER_SNAKE, for example `JOIN_CODE_WRONG`; `None` if there is none, as after
     /// a lost connection. The client itself sets `ADDRESS_REFUSED`, `CA_REFUSED`,
-    /// `CONNECT_FAILED`, `RESPONSE_INCOMPLETE`, `STEP_GIVEN_UP`, `TLS_FAILED` and `TOKEN_REFUSED`.
+    /// `CONNECT_FAILED`, `RESPONSE_INCOMPLETE`, `SECRET_REFUSED`, `STEP_GIVEN_UP`, `TLS_FAILED` and
+    /// `TOKEN_REFUSED`.
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
@@ -96,6 +99,11 @@ impl Error {
     pub(crate) fn token() -> Self {
         let message = "the token is malformed; copy it as `chefshat token create` printed it";
         Self::own(Code::InvalidArgument, TOKEN_REFUSED, message.to_owned())
+    }
+
+    pub(crate) fn secret() -> Self {
+        let message = "the secret is malformed; give an owner token or a ticket as it was printed";
+        Self::own(Code::InvalidArgument, SECRET_REFUSED, message.to_owned())
     }
 
     pub(crate) fn incomplete(part: &str) -> Self {

@@ -304,7 +304,8 @@ fn routes(
     use v1::table_service_server::TableServiceServer;
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
-    let recorded = grpc::Recorded::new(Arc::clone(rooms));
+    let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
+    let recorded = grpc::Recorded::new(reach.clone(), config.access.records);
     let retention = Retention::new(Arc::clone(rooms), Arc::clone(tournaments));
     let admin = grpc::AdminCalls::new(
         Arc::clone(rooms),
@@ -339,11 +340,11 @@ fn routes(
         .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        SpectatorServiceServer::new(grpc::Spectate::new(Arc::clone(rooms), closing.clone()))
+        SpectatorServiceServer::new(grpc::Spectate::new(reach.clone(), closing.clone()))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        TableServiceServer::new(grpc::TableCalls::new(Arc::clone(rooms)))
+        TableServiceServer::new(grpc::TableCalls::new(reach))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(

@@ -25,6 +25,18 @@ pub enum Durability {
     Ephemeral,
 }
 
+/// Who sees a room or tournament, and the records of its games.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Visibility {
+    /// Listed, and reached by its id.
+    #[default]
+    Public,
+    /// Reached by its id, but listed only for those who show a secret of it.
+    Unlisted,
+    /// Listed and reached only for those who show a secret of it.
+    Private,
+}
+
 /// Times for participants of one kind, which override the room's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KindClock {
@@ -82,6 +94,8 @@ pub struct Policy {
     pub clocks: Vec<KindClock>,
     /// Whether a client may take only one seat.
     pub one_seat_per_client: bool,
+    /// Who sees the room and its record.
+    pub visibility: Visibility,
 }
 
 impl Policy {
@@ -128,6 +142,7 @@ impl Default for Policy {
             durability: Durability::Durable,
             clocks: vec![KindClock::PEOPLE],
             one_seat_per_client: false,
+            visibility: Visibility::Public,
         }
     }
 }

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use chefshat_room::ids::Id;
 use serde::{Deserialize, Serialize};
 
+use super::secrets::{Secrets, Standing};
 use super::token::TokenId;
 
 /// What a caller may do. Each role may do everything that lower ones may.
@@ -89,7 +90,7 @@ pub enum Client {
 }
 
 /// Who sent a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Caller {
     /// The peer's address; `None` for connections without one, such as those of a unix socket.
     pub address: Option<IpAddr>,
@@ -99,13 +100,15 @@ pub struct Caller {
     pub role: Role,
     /// The only room or tournament that it may reach, if limited to one.
     pub scope: Option<Scope>,
+    /// The owner tokens and tickets that it shows.
+    pub secrets: Secrets,
 }
 
 impl Caller {
     /// The caller of a request. Without the layer of `grpc/access.rs` in front of a service, it
     /// may do nothing.
     pub fn of(extensions: &http::Extensions) -> Self {
-        extensions.get().copied().unwrap_or_default()
+        extensions.get().cloned().unwrap_or_default()
     }
 
     /// The client: its token, or else its address; `None` if it has neither.
@@ -127,6 +130,24 @@ impl Caller {
     pub fn reaches_tournament(&self, tournament: Id) -> bool {
         self.scope
             .is_none_or(|only| only == Scope::Tournament(tournament))
+    }
+
+    /// The same caller, who also shows a secret that its request contains.
+    pub fn showing(&self, secret: &str) -> Self {
+        Self {
+            secrets: self.secrets.with(secret),
+            ..self.clone()
+        }
+    }
+
+    /// What its token makes of it where its scope reaches: the operator is like the owner of
+    /// everything, and so is a host in the scope of its token.
+    pub fn standing(&self) -> Standing {
+        match (self.role, self.scope) {
+            (Role::Admin, _) | (Role::Host, Some(_)) => Standing::Owner,
+            (_, Some(_)) => Standing::Participant,
+            (_, None) => Standing::Stranger,
+        }
     }
 }
 

@@ -13,6 +13,7 @@ use tracing::{debug, error, info, warn};
 use super::caller::{Caller, Role, Scope};
 use super::calls::{Call, Scoped};
 use super::file::{StoredToken, TokenFile, TokenFileError};
+use super::secrets::Secrets;
 use super::token::{AccessToken, TokenId};
 use crate::clock::since_epoch_ms;
 use crate::file_watch::FileWatch;
@@ -76,6 +77,25 @@ pub enum Refusal {
         /// What the token is valid for.
         scope: Scope,
     },
+}
+
+impl Refusal {
+    /// Checks that a caller has at least this role.
+    ///
+    /// # Errors
+    /// Its role is too low.
+    pub fn of_role(caller: &Caller, required: Role) -> Result<(), Self> {
+        if caller.role >= required {
+            return Ok(());
+        }
+        Err(match caller.token {
+            None => Self::TokenMissing { required },
+            Some(_) => Self::RoleTooLow {
+                required,
+                role: caller.role,
+            },
+        })
+    }
 }
 
 /// A caller that may proceed.
@@ -208,15 +228,7 @@ impl Access {
             true => call.role.max(self.records),
             false => call.role,
         };
-        if caller.role < required {
-            return Err(match caller.token {
-                None => Refusal::TokenMissing { required },
-                Some(_) => Refusal::RoleTooLow {
-                    required,
-                    role: caller.role,
-                },
-            });
-        }
+        Refusal::of_role(caller, required)?;
         match caller.scope {
             Some(scope) if call.scoped == Scoped::Refused => Err(Refusal::OutOfScope { scope }),
             _ => Ok(granted),
@@ -258,6 +270,7 @@ impl Access {
                 token: Some(token.id),
                 role: token.role,
                 scope: token.scope,
+                secrets: Secrets::default(),
             },
             ended: Some(Ended {
                 token: ended.clone(),

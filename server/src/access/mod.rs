@@ -9,10 +9,12 @@ mod caller;
 mod calls;
 mod file;
 mod guard;
+mod secrets;
 mod token;
 
 pub use caller::{Caller, Client, Role, Scope};
 pub use calls::{CALLS, Call, Scoped};
 pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};
+pub use secrets::{MAX_SECRETS, SECRET_HEADER, Secrets, SecretsRefused, Standing};
 pub use token::{AccessToken, TokenId};

@@ -10,7 +10,7 @@ use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_sc
 
 use super::kind::{kind_from_proto, kind_to_proto, unknown};
 use chefshat_room::journal::ParticipantKind;
-use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy};
+use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy, Visibility};
 use chefshat_room::{Core, State};
 
 /// A day, the longest time in a policy, milliseconds.
@@ -68,6 +68,10 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         },
         clocks: clocks(message)?,
         one_seat_per_client: message.one_seat_per_client,
+        visibility: match v1::Visibility::try_from(message.visibility) {
+            Ok(visibility) => visibility_from_proto(visibility),
+            Err(_) => return Err(unknown("visibility", message.visibility)),
+        },
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -122,6 +126,26 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             })
             .collect(),
         one_seat_per_client: policy.one_seat_per_client,
+        visibility: visibility_to_proto(policy.visibility).into(),
+    }
+}
+
+/// Who sees a room, tournament or recorded game.
+fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
+    match visibility {
+        v1::Visibility::Unspecified | v1::Visibility::Public => Visibility::Public,
+        v1::Visibility::Unlisted => Visibility::Unlisted,
+        v1::Visibility::Private => Visibility::Private,
+    }
+}
+
+/// As in responses and records. What is public has the same bytes as before there was a choice, so
+/// that signatures of older records stay valid.
+pub(super) fn visibility_to_proto(visibility: Visibility) -> v1::Visibility {
+    match visibility {
+        Visibility::Public => v1::Visibility::Unspecified,
+        Visibility::Unlisted => v1::Visibility::Unlisted,
+        Visibility::Private => v1::Visibility::Private,
     }
 }
 

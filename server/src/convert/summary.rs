@@ -7,7 +7,7 @@ use chefshat_room::journal::Entry;
 use chefshat_room::{Core, PhysicalTable};
 
 use super::event::standings;
-use super::policy::policy_of;
+use super::policy::{policy_of, visibility_to_proto};
 use super::room::{
     aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
 };
@@ -65,6 +65,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         abort_reason: aborted_because(core.state()).into(),
         tournament_id: tournament_id(header),
         substituted: core.was_substituted(),
+        visibility: visibility_to_proto(header.policy.visibility).into(),
     }
 }
 

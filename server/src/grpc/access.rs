@@ -20,10 +20,10 @@ use tower::{Layer, Service};
 use tracing::info;
 
 use super::status::status;
-use crate::access::{Access, Call, Caller, Ended, Granted, Refusal};
+use crate::access::{
+    Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
+};
 use crate::connections::peer_address;
-use crate::rooms::Rooms;
-use chefshat_room::ids::Id;
 
 /// Where the services of this project are.
 const OWN_PACKAGE: &str = "/chefshat.";
@@ -77,10 +77,14 @@ impl<S> WithAccess<S> {
         let authorization = request.headers().get(header::AUTHORIZATION);
         let authorization = authorization.map(|value| value.as_bytes());
         let checked = self.access.check(call, authorization, address);
-        checked.map_err(|refusal| {
+        let mut granted = checked.map_err(|refusal| {
             log(path, address, refusal);
             refused(refusal)
-        })
+        })?;
+        let secrets = request.headers().get_all(SECRET_HEADER).into_iter();
+        granted.caller.secrets =
+            Secrets::parse(secrets.map(|value| value.as_bytes())).map_err(secrets_refused)?;
+        Ok(granted)
     }
 }
 
@@ -111,8 +115,9 @@ where
             Ok(granted) => granted,
             Err(status) => return Either::Left(ready(Ok(status.into_http()))),
         };
-        // The token has served: nothing behind this layer needs it, or could log it.
+        // They have served: nothing behind this layer needs them, or could log them.
         request.headers_mut().remove(header::AUTHORIZATION);
+        request.headers_mut().remove(SECRET_HEADER);
         request.extensions_mut().insert(granted.caller);
         let answering = self.services.call(request);
         Either::Right(match granted.ended {
@@ -182,18 +187,6 @@ impl HttpBody for EndingBody {
     }
 }
 
-/// Checks that the scope of a caller includes a room.
-pub(super) fn check_room(caller: &Caller, rooms: &Rooms, room: Id) -> Result<(), Status> {
-    check(caller, |caller| {
-        caller.reaches_room(room, rooms.tournament_of(room))
-    })
-}
-
-/// Checks that the scope of a caller includes a tournament.
-pub(super) fn check_tournament(caller: &Caller, tournament: Id) -> Result<(), Status> {
-    check(caller, |caller| caller.reaches_tournament(tournament))
-}
-
 /// Checks that the scope of a caller includes something.
 pub(super) fn check(caller: &Caller, reaches: impl FnOnce(&Caller) -> bool) -> Result<(), Status> {
     match caller.scope {
@@ -202,8 +195,19 @@ pub(super) fn check(caller: &Caller, reaches: impl FnOnce(&Caller) -> bool) -> R
     }
 }
 
+/// The status for secrets that cannot be read.
+fn secrets_refused(refused: SecretsRefused) -> Status {
+    let field = [("field", SECRET_HEADER)];
+    status(
+        Code::InvalidArgument,
+        "SECRETS_REFUSED",
+        refused.to_string(),
+        field,
+    )
+}
+
 /// The status for a refused request.
-fn refused(refusal: Refusal) -> Status {
+pub(super) fn refused(refusal: Refusal) -> Status {
     match refusal {
         Refusal::TokenMissing { required } => status(
             Code::Unauthenticated,

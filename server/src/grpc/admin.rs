@@ -9,7 +9,7 @@ use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
 use super::pages;
-use super::status::{Refusal, field, status, store_failed};
+use super::status::{Refusal, field, room_unknown, status, store_failed};
 use super::tournaments;
 use crate::connections::{Client, Connections};
 use crate::retention::Retention;
@@ -95,7 +95,9 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::AdminServiceCloseRoomRequest>,
     ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
-        let handle = super::room_service::find(&self.rooms, &request.into_inner().room_id)?;
+        let handle = Id::parse(&request.into_inner().room_id)
+            .and_then(|id| self.rooms.get(id))
+            .ok_or_else(room_unknown)?;
         info!(room = %handle.id(), "an operator closes a room");
         handle.close_without_token().await;
         let room = handle.describe().await.map_err(Refusal::from)?;

@@ -22,7 +22,7 @@ use crate::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
 
 /// Who is charged for a request.
 pub(super) fn charged(extensions: &http::Extensions) -> Key {
-    match Caller::of(extensions).token {
+    match extensions.get().and_then(|caller: &Caller| caller.token) {
         Some(token) => Key::Token(token),
         None => Key::of_address(peer_address(extensions)),
     }
@@ -82,7 +82,8 @@ where
             client.address.map(|address| address.ip().to_canonical()) == address
         };
         let client = Client::of(request.extensions()).filter(is_own).cloned();
-        let token = Caller::of(request.extensions()).token;
+        let caller: Option<&Caller> = request.extensions().get();
+        let token = caller.and_then(|caller| caller.token);
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
         let is_stream = Call::find(request.uri().path()).is_some_and(|call| call.streams);
         let mut place = Place {

@@ -14,6 +14,7 @@ use tonic::{Code, Status};
 
 use super::recorded::Recorded;
 use super::status::{field, request_id, status};
+use crate::access::Caller;
 use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
 use crate::limits::Key;
@@ -32,6 +33,7 @@ struct Beginning {
 /// Checks a request for a new room.
 pub(super) async fn new_room(
     recorded: &Recorded,
+    caller: &Caller,
     mut request: v1::CreateRoomRequest,
     charged: Key,
 ) -> Result<NewRoom, Status> {
@@ -44,7 +46,7 @@ pub(super) async fn new_room(
     let game_seed = game_seed(&request.game_seed)?;
     let beginning = match &request.start {
         Some(Start::Branch(point)) => {
-            branched(recorded, point, request.rules.as_ref(), game_seed).await?
+            branched((recorded, caller), point, request.rules.as_ref(), game_seed).await?
         }
         start => {
             let rules = hosted_rules(&request.rules.clone().unwrap_or_default())?;
@@ -70,7 +72,7 @@ pub(super) async fn new_room(
     check_table(&request, &fills, &beginning.rules)?;
     Ok(NewRoom {
         name,
-        recorded: recorded_players(recorded, &fills).await?,
+        recorded: recorded_players((recorded, caller), &fills).await?,
         rules: beginning.rules,
         policy,
         fills,
@@ -186,7 +188,7 @@ fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
 
 /// A game that branches from a recorded one.
 async fn branched(
-    recorded: &Recorded,
+    (recorded, caller): (&Recorded, &Caller),
     point: &v1::BranchPoint,
     rules: Option<&v1::RuleSet>,
     game_seed: Option<[u8; 32]>,
@@ -205,7 +207,9 @@ async fn branched(
     }
     let decisions = point.decisions;
     let branch = recorded
-        .of_game(&point.game_id, move |lines| branch_of(&lines, decisions))
+        .of_game(caller, &point.game_id, move |lines, _| {
+            branch_of(&lines, decisions)
+        })
         .await?
         .map_err(|error| branch_refused(&error))?;
     check_length(&branch.rules)?;
@@ -246,7 +250,7 @@ pub(super) fn branch_refused(error: &BranchError) -> Status {
 
 /// The recorded players of seats that replay one.
 async fn recorded_players(
-    recorded: &Recorded,
+    (recorded, caller): (&Recorded, &Caller),
     fills: &[Fill],
 ) -> Result<BTreeMap<usize, Arc<RecordedPlayer>>, Status> {
     let mut players = BTreeMap::new();
@@ -254,7 +258,7 @@ async fn recorded_players(
         let Fill::Replay(seat) = fill else { continue };
         let number = seat_number(seat.seat);
         let player = recorded
-            .of_game(&seat.game.to_string(), move |lines| {
+            .of_game(caller, &seat.game.to_string(), move |lines, _| {
                 convert::recorded_player(&lines, number)
             })
             .await?

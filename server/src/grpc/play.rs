@@ -14,7 +14,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::access::check_room;
+use super::reach::Reach;
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
@@ -34,6 +34,7 @@ use reader::{Reader, express_action};
 pub struct Play {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    reach: Reach,
     /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
@@ -46,6 +47,7 @@ impl Play {
         closing: CancellationToken,
     ) -> Self {
         Self {
+            reach: Reach::new(Arc::clone(&rooms), Arc::clone(&tournaments)),
             rooms,
             tournaments,
             closing,
@@ -143,8 +145,7 @@ impl PlayService for Play {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
-        let room = self.rooms.get(token.room).ok_or_else(ticket_unknown)?;
-        check_room(&caller, &self.rooms, token.room)?;
+        let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown)?;
         let action = match request.command {
             Some(act_request::Command::Answer(answer)) => {
                 SeatAction::Answer(convert::answer_from_proto(answer))

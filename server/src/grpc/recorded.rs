@@ -7,7 +7,10 @@ use chefshat_proto::v1;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Code, Status};
 
+use super::access::refused;
+use super::reach::{Reach, Sight};
 use super::status::{self, status};
+use crate::access::{Caller, Refusal, Role};
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert::lines_of;
 use crate::rooms::Rooms;
@@ -20,31 +23,42 @@ pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 /// The recorded games of a server.
 #[derive(Debug, Clone)]
 pub struct Recorded {
-    rooms: Arc<Rooms>,
+    reach: Reach,
+    /// The role that is required to read records.
+    required: Role,
     /// Limits how many records are assembled at a time, because they are large.
     permits: Arc<Semaphore>,
 }
 
 impl Recorded {
-    /// Creates a reader of the recorded games in these rooms' store.
-    pub fn new(rooms: Arc<Rooms>) -> Self {
+    /// Creates a reader of the recorded games that callers with the role `required` reach.
+    pub fn new(reach: Reach, required: Role) -> Self {
         Self {
-            rooms,
+            reach,
+            required,
             permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
         }
     }
 
     /// The rooms.
     pub(super) fn rooms(&self) -> &Arc<Rooms> {
-        &self.rooms
+        self.reach.rooms()
     }
 
-    /// Runs `work` on the record of a finished game.
+    /// What callers reach.
+    pub(super) fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
+    /// Runs `work` on the record of a finished game that a caller may read, with how much of it the
+    /// caller sees.
     pub(super) async fn of_game<T: Send + 'static>(
         &self,
+        caller: &Caller,
         game_id: &str,
-        work: impl FnOnce(Vec<v1::RecordLine>) -> T + Send + 'static,
+        work: impl FnOnce(Vec<v1::RecordLine>, Sight) -> T + Send + 'static,
     ) -> Result<T, Status> {
+        Refusal::of_role(caller, self.required).map_err(refused)?;
         let unknown = || {
             status(
                 Code::NotFound,
@@ -54,7 +68,8 @@ impl Recorded {
             )
         };
         let game = Id::parse(game_id).ok_or_else(unknown)?;
-        if self.rooms.is_running(game) {
+        if let Some(room) = self.rooms().room_of(game) {
+            self.reach.room_or(caller, room, unknown).await?;
             return Err(status(
                 Code::FailedPrecondition,
                 "GAME_RUNNING",
@@ -63,10 +78,11 @@ impl Recorded {
             ));
         }
         let permit = permit(&self.permits).await;
-        let stored = (self.rooms.store().finished(game).await)
+        let stored = (self.rooms().store().finished(game).await)
             .map_err(read_failed)?
             .ok_or_else(unknown)?;
-        if (stored.tournament()).is_some_and(|game| self.rooms.is_withheld(game)) {
+        let sight = self.reach.recorded(caller, &stored, unknown)?;
+        if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
             return Err(status(
                 Code::FailedPrecondition,
                 SERIES_OPEN,
@@ -74,7 +90,7 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        in_background(permit, move || work(lines_of(&stored).into_owned())).await
+        in_background(permit, move || work(lines_of(&stored).into_owned(), sight)).await
     }
 
     /// Runs work that needs as much memory as a record.

@@ -19,12 +19,12 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
-use super::access::check;
 use super::limits::charged;
 use super::pages;
+use super::reach::Sight;
 use super::recorded::{Recorded, SERIES_OPEN, read_failed};
 use super::status::{disk_nearly_full, field, has_reason, status};
-use crate::access::{Caller, Role};
+use crate::access::Caller;
 use crate::config::{
     IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,
     MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
@@ -38,6 +38,8 @@ use chefshat_room::ids::Id;
 /// of gRPC clients.
 const LINES_PER_MESSAGE: usize = 512;
 const BYTES_PER_MESSAGE: usize = 1024 * 1024;
+/// Summaries examined for one page.
+const RECORDS_LOOKED_AT: usize = 500;
 /// Summaries read at a time while many records are streamed.
 const STREAM_PAGE: usize = 100;
 
@@ -95,14 +97,15 @@ impl Records {
             };
             after = *last;
             for (_, summary) in page {
-                if !reaches(caller, &summary.room_id, &summary.tournament_id) {
+                if !self.recorded.reach().lists_record(caller, &summary).await? {
                     continue;
                 }
                 let _place = self.sending.take(key).await;
-                let role = caller.role;
                 let key = self.key.clone();
-                let shown = move |lines| seen_by(role, key.as_deref(), lines);
-                let lines = self.recorded.of_game(&summary.game_id, shown).await;
+                let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
+                let lines = (self.recorded)
+                    .of_game(caller, &summary.game_id, shown)
+                    .await;
                 let lines = match lines {
                     // Withheld while games with the same deals are being played.
                     Err(status) if has_reason(&status, SERIES_OPEN) => continue,
@@ -129,26 +132,36 @@ impl RecordService for Records {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let filter = checked(request.filter)?;
-        let last = pages::last_shown(&request.page_token)?;
-        let part = match request.newest_first {
-            false => last.map_or(Part::FROM_OLDEST, Part::After),
-            true => last.map_or(Part::FROM_NEWEST, Part::Before),
-        };
+        let mut last = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
-        // One more than requested, to find out whether there is another page.
-        let mut found = self.page(&filter, part, size + 1).await?;
-        let more = found.len() > size;
-        found.truncate(size);
-        let next_page_token = match found.last() {
-            Some((last, _)) if more => last.to_string(),
-            _ => String::new(),
-        };
-        Ok(Response::new(v1::ListRecordsResponse {
-            records: (found.into_iter().map(|(_, summary)| summary))
-                .filter(|it| reaches(&caller, &it.room_id, &it.tournament_id))
-                .collect(),
-            next_page_token,
-        }))
+        let reach = self.recorded.reach();
+        let mut response = v1::ListRecordsResponse::default();
+        let (mut rest, mut looked_at) = (true, 0);
+        // Records that the caller does not see are skipped, up to a limit for one page.
+        'page: while rest && looked_at < RECORDS_LOOKED_AT {
+            let part = match request.newest_first {
+                false => last.map_or(Part::FROM_OLDEST, Part::After),
+                true => last.map_or(Part::FROM_NEWEST, Part::Before),
+            };
+            // One more than requested, to find out whether there is another page.
+            let found = self.page(&filter, part, size + 1).await?;
+            rest = found.len() > size;
+            looked_at += found.len();
+            for (number, summary) in found {
+                if response.records.len() == size {
+                    rest = true;
+                    break 'page;
+                }
+                last = Some(number);
+                if reach.lists_record(&caller, &summary).await? {
+                    response.records.push(summary);
+                }
+            }
+        }
+        if let (true, Some(last)) = (rest, last) {
+            response.next_page_token = last.to_string();
+        }
+        Ok(Response::new(response))
     }
 
     async fn get_record(
@@ -160,17 +173,8 @@ impl RecordService for Records {
         let place = self.sending.take(charged(request.extensions())).await;
         let game_id = request.into_inner().game_id;
         let key = self.key.clone();
-        let shown = move |lines: Vec<v1::RecordLine>| {
-            let header = lines.first().and_then(|line| match &line.line {
-                Some(Line::Header(header)) => Some(header),
-                _ => None,
-            });
-            check(&caller, |caller| {
-                header.is_some_and(|it| reaches(caller, &it.room_id, &it.tournament_id))
-            })?;
-            Ok::<_, Status>(seen_by(caller.role, key.as_deref(), lines))
-        };
-        let lines = self.recorded.of_game(&game_id, shown).await??;
+        let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
+        let lines = self.recorded.of_game(&caller, &game_id, shown).await?;
         let (sender, responses) = channel();
         tokio::spawn(async move {
             let response = |lines| v1::GetRecordResponse { lines };
@@ -246,22 +250,14 @@ impl RecordService for Records {
     }
 }
 
-/// Whether the scope of a caller includes the game of this room and tournament.
-fn reaches(caller: &Caller, room: &str, tournament: &str) -> bool {
-    match Id::parse(room) {
-        Some(room) => caller.reaches_room(room, Id::parse(tournament)),
-        None => caller.scope.is_none(),
-    }
-}
-
-/// A record as a role may see it: what was only for the record, and references to media, are for
-/// hosts. If anything is left out of a record that this server signed, it signs what remains.
-fn seen_by(
-    role: Role,
+/// A record as its reader sees it: players do not see what was only for the record, nor references to
+/// media. If anything is left out of a record that this server signed, it signs what remains.
+fn seen(
+    sight: Sight,
     key: Option<&SigningKey>,
     mut lines: Vec<v1::RecordLine>,
 ) -> Vec<v1::RecordLine> {
-    if role >= Role::Host {
+    if sight == Sight::Whole {
         return lines;
     }
     let count = lines.len();

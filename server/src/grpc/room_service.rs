@@ -8,12 +8,12 @@ use chefshat_record::convert::{FieldProblem, seat_number};
 use futures::{Stream, StreamExt as _};
 use tonic::{Code, Request, Response, Status};
 
-use super::access::check_room;
 use super::limits::charged;
 use super::new_room::new_room;
 use super::pages;
+use super::reach::Reach;
 use super::recorded::Recorded;
-use super::status::{self, Refusal, field, request_id, room_unknown, ticket_unknown};
+use super::status::{self, Refusal, field, request_id, ticket_unknown};
 use crate::access::Caller;
 use crate::convert;
 use crate::limits::{CallLimits, Key};
@@ -50,23 +50,34 @@ impl RoomCalls {
         }
     }
 
-    fn find(&self, room_id: &str) -> Result<Handle, Status> {
-        find(&self.rooms, room_id)
+    fn reach(&self) -> &Reach {
+        self.recorded.reach()
     }
 
-    /// The room with a join code; if an id is given too, it must match. Wrong codes are charged.
-    fn find_by_code(&self, room_id: &str, join_code: &str, key: Key) -> Result<Handle, Status> {
+    /// The room with a join code; if an id is given too, it must match. Wrong codes are charged,
+    /// those of unknown rooms too: whether a room is private or unknown makes no difference.
+    async fn find_by_code(
+        &self,
+        caller: &Caller,
+        room_id: &str,
+        join_code: &str,
+        key: Key,
+    ) -> Result<Handle, Status> {
         let refused = |refused| Status::from(Refusal::from(refused));
         self.calls.may_try_code(key).map_err(refused)?;
-        let found = match room_id {
-            "" => self.rooms.by_code(join_code),
-            room_id => Some(self.find(room_id)?)
-                .filter(|handle| self.rooms.code_is(handle.id(), join_code)),
+        let by_code = self.rooms.by_code(join_code);
+        let is_meant = |handle: &Handle| {
+            room_id.is_empty() || Id::parse(room_id).is_some_and(|id| id == handle.id())
         };
-        found.ok_or_else(|| {
+        let Some(handle) = by_code.filter(is_meant) else {
             self.calls.wrong_code(key);
-            join_code_wrong()
-        })
+            if !room_id.is_empty() {
+                self.reach().room(caller, room_id).await?;
+            }
+            return Err(join_code_wrong());
+        };
+        self.reach().check_joining(caller, handle.id())?;
+        Ok(handle)
     }
 }
 
@@ -84,21 +95,15 @@ fn described<H, R, D: Future<Output = R>>(
         .buffered(ROOMS_ASKED)
 }
 
-/// The room with an id from a message.
-pub(super) fn find(rooms: &Rooms, room_id: &str) -> Result<Handle, Status> {
-    Id::parse(room_id)
-        .and_then(|id| rooms.get(id))
-        .ok_or_else(room_unknown)
-}
-
 #[tonic::async_trait]
 impl RoomService for RoomCalls {
     async fn create_room(
         &self,
         request: Request<v1::CreateRoomRequest>,
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
-        let new = new_room(&self.recorded, request.into_inner(), key).await?;
+        let new = new_room(&self.recorded, &caller, request.into_inner(), key).await?;
         let physical = new.physical;
         let built_in = new.fills.iter().all(|fill| fill.is_built_in());
         let cost = match built_in {
@@ -127,10 +132,9 @@ impl RoomService for RoomCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
-            "" => self.find(&request.room_id)?,
-            code => self.find_by_code(&request.room_id, code, key)?,
+            "" => self.reach().room(&caller, &request.room_id).await?,
+            code => (self.find_by_code(&caller, &request.room_id, code, key)).await?,
         };
-        check_room(&caller, &self.rooms, handle.id())?;
         let room = handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
     }
@@ -159,10 +163,12 @@ impl RoomService for RoomCalls {
         let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
-        let is_listed = |id| check_room(&caller, &self.rooms, id).is_ok();
-        let describe = |handle: Handle| {
-            let listed = is_listed(handle.id());
-            async move { handle.describe().await.ok().filter(|_| listed) }
+        let (reach, caller) = (self.reach(), &caller);
+        let describe = |handle: Handle| async move {
+            match reach.lists_room(caller, &handle).await {
+                true => handle.describe().await.ok(),
+                false => None,
+            }
         };
         let mut rooms = pin!(described(looked_at, describe));
         while let Some((number, room)) = rooms.next().await {
@@ -171,7 +177,7 @@ impl RoomService for RoomCalls {
                 break;
             }
             last = Some(number);
-            // A room that has just gone, or is beyond the caller's scope, is not listed.
+            // A room that has just gone, or that the caller does not see, is not listed.
             if let Some(room) = room
                 && (request.state == 0 || request.state == room.state)
             {
@@ -194,8 +200,8 @@ impl RoomService for RoomCalls {
         if self.rooms.is_shutting_down() {
             return Err(status::shutting_down());
         }
-        let handle = self.find_by_code(&request.room_id, &request.join_code, key)?;
-        check_room(&caller, &self.rooms, handle.id())?;
+        let (id, code) = (&request.room_id, &request.join_code);
+        let handle = self.find_by_code(&caller, id, code, key).await?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
@@ -226,8 +232,8 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
-        let handle = self.rooms.get(ticket.room).ok_or_else(ticket_unknown)?;
-        check_room(&caller, &self.rooms, handle.id())?;
+        let reach = self.reach();
+        let handle = reach.room_of_ticket(&caller, ticket.room, ticket_unknown)?;
         let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
         let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))
@@ -239,8 +245,8 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find(&request.room_id)?;
-        check_room(&caller, &self.rooms, handle.id())?;
+        let caller = caller.showing(&request.owner_token);
+        let handle = self.reach().room(&caller, &request.room_id).await?;
         let wrong = || {
             status::status(
                 Code::PermissionDenied,

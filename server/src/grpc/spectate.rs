@@ -8,29 +8,27 @@ use futures::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
-use super::access::check_room;
 use super::play::with_heartbeats;
-use super::room_service::find;
+use super::reach::Reach;
 use super::status::Refusal;
 use crate::access::Caller;
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::SpectateRequest;
-use crate::rooms::Rooms;
 use crate::wire::Updates;
 use crate::wire::service::spectator_service_server::SpectatorService;
 
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Spectate {
-    rooms: Arc<Rooms>,
+    reach: Reach,
     closing: CancellationToken,
 }
 
 impl Spectate {
-    /// Creates the service for these rooms; `closing` ends its streams.
-    pub fn new(rooms: Arc<Rooms>, closing: CancellationToken) -> Self {
-        Self { rooms, closing }
+    /// Creates the service for the rooms that callers reach; `closing` ends its streams.
+    pub fn new(reach: Reach, closing: CancellationToken) -> Self {
+        Self { reach, closing }
     }
 }
 
@@ -44,8 +42,7 @@ impl SpectatorService for Spectate {
     ) -> Result<Response<Self::WatchStream>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let room = find(&self.rooms, &request.room_id)?;
-        check_room(&caller, &self.rooms, room.id())?;
+        let room = self.reach.room(&caller, &request.room_id).await?;
         let (outbox, messages) = Outbox::new();
         let from = request.from_sequence.saturating_sub(1);
         room.spectate(SpectateRequest {
@@ -57,8 +54,9 @@ impl SpectatorService for Spectate {
         .map_err(Refusal::from)?
         .map_err(Refusal::from)?;
         let closing = self.closing.clone();
-        self.rooms.metrics().add_outbox(&outbox);
-        let counted = self.rooms.metrics().stream(StreamKind::Spectate);
+        let metrics = self.reach.rooms().metrics();
+        metrics.add_outbox(&outbox);
+        let counted = metrics.stream(StreamKind::Spectate);
         tokio::spawn(async move {
             let _counted = counted;
             tokio::select! {

@@ -1,7 +1,6 @@
 //! `TableService`: reports from physical tables, and their states.
 
 use std::pin::Pin;
-use std::sync::Arc;
 
 use chefshat_proto::v1::{self, table_service_server::TableService};
 use futures::{Stream, stream};
@@ -9,31 +8,29 @@ use tokio::sync::watch;
 use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
-use super::access::check_room;
+use super::reach::Reach;
 use super::status::{Refusal, room_gone, table_unknown};
 use crate::access::Caller;
 use crate::config::HEARTBEAT;
 use crate::room::{Handle, SentState};
-use crate::rooms::Rooms;
 use chefshat_room::ids::Token;
 
 /// The service.
 #[derive(Debug, Clone)]
 pub struct TableCalls {
-    rooms: Arc<Rooms>,
+    reach: Reach,
 }
 
 impl TableCalls {
-    /// Creates the service for these rooms.
-    pub fn new(rooms: Arc<Rooms>) -> Self {
-        Self { rooms }
+    /// Creates the service for the tables of these rooms.
+    pub fn new(reach: Reach) -> Self {
+        Self { reach }
     }
 
     /// The room of a table's ticket, and the ticket's secret.
     fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
         let token = Token::parse(ticket).ok_or_else(table_unknown)?;
-        let room = self.rooms.get(token.room).ok_or_else(table_unknown)?;
-        check_room(caller, &self.rooms, token.room)?;
+        let room = (self.reach).room_of_ticket(caller, token.room, table_unknown)?;
         Ok((room, token.secret))
     }
 }

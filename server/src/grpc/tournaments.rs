@@ -13,7 +13,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::access::check_tournament;
+use super::access::check;
 use super::follow::{compute_failed, end, follow};
 use super::limits::charged;
 use super::new_room::{supported_policy, too_long};
@@ -82,14 +82,12 @@ impl TournamentCalls {
     }
 
     fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
-        let found = Id::parse(id).and_then(|id| self.tournaments.get(id));
-        let handle = found.ok_or_else(unknown)?;
-        check_tournament(caller, handle.id())?;
-        Ok(handle)
+        self.recorded.reach().tournament(caller, id)
     }
 
     /// The tournament with a join code; if an id is given too, it must match. Wrong codes are
-    /// charged.
+    /// charged, those of unknown tournaments too: whether a tournament is private or unknown makes
+    /// no difference.
     fn find_by_code(
         &self,
         caller: &Caller,
@@ -98,21 +96,23 @@ impl TournamentCalls {
         key: Key,
     ) -> Result<Arc<TournamentHandle>, Status> {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
-        let handle = match id {
-            "" => self.tournaments.by_code(join_code),
-            id => Some(self.find(caller, id)?)
-                .filter(|handle| chefshat_room::ids::normal_code(join_code) == handle.join_code()),
+        let by_code = self.tournaments.by_code(join_code);
+        let is_meant = |handle: &Arc<TournamentHandle>| {
+            id.is_empty() || Id::parse(id).is_some_and(|id| id == handle.id())
         };
-        let handle = handle.ok_or_else(|| {
+        let Some(handle) = by_code.filter(is_meant) else {
             self.calls.wrong_code(key);
-            status(
+            if !id.is_empty() {
+                self.find(caller, id)?;
+            }
+            return Err(status(
                 Code::PermissionDenied,
                 "JOIN_CODE_WRONG",
                 "no tournament has this join code; ask its owner for it",
                 [("field", "join_code")],
-            )
-        })?;
-        check_tournament(caller, handle.id())?;
+            ));
+        };
+        check(caller, |caller| caller.reaches_tournament(handle.id()))?;
         Ok(handle)
     }
 
@@ -122,7 +122,7 @@ impl TournamentCalls {
         id: &str,
         owner_token: &str,
     ) -> Result<Arc<TournamentHandle>, Status> {
-        let handle = self.find(caller, id)?;
+        let handle = self.find(&caller.showing(owner_token), id)?;
         if handle.is_owner(owner_token) {
             return Ok(handle);
         }
@@ -206,7 +206,7 @@ impl TournamentService for TournamentCalls {
             _ => String::new(),
         };
         let tournaments = (found.iter())
-            .filter(|(_, handle)| caller.reaches_tournament(handle.id()))
+            .filter(|(_, handle)| self.recorded.reach().lists_tournament(&caller, handle))
             .map(|(_, handle)| handle.describe_briefly())
             .collect();
         Ok(Response::new(v1::ListTournamentsResponse {

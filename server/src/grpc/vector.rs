@@ -30,6 +30,7 @@ use super::limits::charged;
 use super::new_room::branch_refused;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status};
+use crate::access::Caller;
 use crate::config::{
     MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
     VECTOR_SETUP_TIMEOUT,
@@ -105,6 +106,7 @@ impl VectorService for Vectors {
         let (responses, stream) = mpsc::channel(SEND_AHEAD);
         let runner = Runner {
             service: self.clone(),
+            caller: Caller::of(request.extensions()),
             responses,
             _place: place,
             _counted: self.metrics().stream(StreamKind::Vector),
@@ -117,6 +119,7 @@ impl VectorService for Vectors {
 /// One stream.
 struct Runner {
     service: Vectors,
+    caller: Caller,
     responses: mpsc::Sender<Result<v1::RunResponse, Status>>,
     _place: Held,
     _counted: Counted,
@@ -307,7 +310,7 @@ impl Runner {
         let (branch, game) = self
             .service
             .recorded
-            .of_game(&point.game_id, move |lines| {
+            .of_game(&self.caller, &point.game_id, move |lines, _| {
                 let branch = branch_of(&lines, decisions)?;
                 let game = branch.played(branch.later_deals.unwrap_or(Seed([0; 32])));
                 Ok((branch, game))

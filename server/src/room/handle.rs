@@ -192,6 +192,14 @@ impl Handle {
         self.ask(Message::Describe).await
     }
 
+    /// Whether one of these secrets is the ticket of a seat.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn has_ticket(&self, secrets: Vec<[u8; 32]>) -> Result<bool, RoomGone> {
+        self.ask(|reply| Message::HasTicket(secrets, reply)).await
+    }
+
     /// Frees a seat; `None` if the room has no such ticket.
     ///
     /// # Errors

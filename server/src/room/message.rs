@@ -143,6 +143,7 @@ pub(super) enum Message {
         oneshot::Sender<Result<(), SpectateError>>,
     ),
     Describe(oneshot::Sender<v1::Room>),
+    HasTicket(Vec<[u8; 32]>, oneshot::Sender<bool>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
     Leave(
         [u8; 32],

@@ -444,6 +444,10 @@ impl Room {
                 self.releases.push(Release::Spectate(request, reply));
             }
             Message::Describe(reply) => self.releases.push(Release::Describe(reply)),
+            Message::HasTicket(secrets, reply) => {
+                let seated = |secret: &[u8; 32]| self.core.seat_of_ticket(secret).is_some();
+                answer(reply, secrets.iter().any(seated));
+            }
             Message::Close(secret, reply) => {
                 if self.core.header().owner.matches(&secret) {
                     self.core.abort(self.now, AbortReason::Closed);

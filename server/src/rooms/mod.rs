@@ -210,11 +210,6 @@ impl Rooms {
             .map(|entry| entry.handle.clone())
     }
 
-    /// Whether `code` is the join code of a room.
-    pub fn code_is(&self, id: Id, code: &str) -> bool {
-        self.by_code(code).is_some_and(|handle| handle.id() == id)
-    }
-
     /// The newest `count` rooms, only those created before number `before` if set, with their
     /// numbers, newest first: those whose games are over, those whose are not, or all.
     pub fn newest(
@@ -233,17 +228,22 @@ impl Rooms {
             .collect()
     }
 
-    /// The tournament that a room belongs to.
-    pub fn tournament_of(&self, id: Id) -> Option<Id> {
-        self.lock().get(id)?.tournament
+    /// What was fixed about the game of a room before it started.
+    pub fn header(&self, id: Id) -> Option<Arc<GameHeader>> {
+        Some(Arc::clone(&self.lock().get(id)?.header))
+    }
+
+    /// The room in which a game is running or waiting to start.
+    pub fn room_of(&self, game: Id) -> Option<Id> {
+        let table = self.lock();
+        let mut open = table.by_number.values().filter(|entry| !entry.over);
+        let entry = open.find(|entry| entry.header.game_id == game)?;
+        Some(entry.handle.id())
     }
 
     /// Whether a game is running or waiting to start here.
     pub fn is_running(&self, game: Id) -> bool {
-        self.lock()
-            .by_number
-            .values()
-            .any(|entry| entry.game_id == game && !entry.over)
+        self.room_of(game).is_some()
     }
 
     /// Whether the game of a room is over; `None` if the room is unknown or suspended.
@@ -450,10 +450,10 @@ impl Reservation {
     fn of(rooms: &Arc<Rooms>, owner: Token, charged: Key) -> Result<Claim, CreateError> {
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.room) {
-            return match entry.owner.matches(&owner.secret) {
+            return match entry.header.owner.matches(&owner.secret) {
                 true => Ok(Claim::Created(Created {
                     handle: entry.handle.clone(),
-                    join_code: entry.join_code.clone(),
+                    join_code: entry.header.join_code.clone(),
                     owner,
                 })),
                 false => Err(CreateError::RequestIdUsed),
@@ -525,11 +525,8 @@ impl Reservation {
             let handle = spawn_room(core, clock, None, journal, context);
             table.enter(Entry {
                 handle: handle.clone(),
-                game_id: header.game_id,
-                owner: header.owner,
-                join_code: header.join_code.clone(),
-                tournament: header.tournament.map(|game| game.tournament),
                 durable: rooms.is_durable(&header),
+                header: Arc::clone(&header),
                 over: false,
                 suspended: false,
                 place: self.place.take(),

@@ -83,10 +83,7 @@ impl Rooms {
         let handle = spawn_room(core, clock, over_since, game.journal, self.context.clone());
         table.enter(Entry {
             handle,
-            game_id: header.game_id,
-            owner: header.owner,
-            join_code: header.join_code.clone(),
-            tournament: header.tournament.map(|game| game.tournament),
+            header,
             durable: true,
             over: game.concluded,
             suspended: false,

@@ -1,11 +1,13 @@
 //! The table of rooms, in the order of their creation, with look-up by id and join code.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 
 use crate::limits::{Held, Refused};
 use crate::room::Handle;
 use crate::store::StoreError;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::GameHeader;
 
 /// Why no room was created.
 #[derive(Debug, thiserror::Error)]
@@ -44,12 +46,7 @@ pub(super) struct Table {
 
 pub(super) struct Entry {
     pub(super) handle: Handle,
-    pub(super) game_id: Id,
-    /// The hash of the owner token.
-    pub(super) owner: SecretHash,
-    pub(super) join_code: String,
-    /// The tournament that it belongs to.
-    pub(super) tournament: Option<Id>,
+    pub(super) header: Arc<GameHeader>,
     /// Whether the game survives a restart of the server.
     pub(super) durable: bool,
     /// The game has ended.
@@ -92,7 +89,7 @@ impl Table {
         let number = self.next_number;
         self.next_number += 1;
         self.numbers.insert(entry.handle.id(), number);
-        self.codes.insert(entry.join_code.clone(), number);
+        self.codes.insert(entry.header.join_code.clone(), number);
         self.by_number.insert(number, entry);
     }
 
@@ -135,7 +132,7 @@ impl Table {
     pub(super) fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
             self.numbers.remove(&entry.handle.id());
-            self.codes.remove(&entry.join_code);
+            self.codes.remove(&entry.header.join_code);
         }
     }
 }

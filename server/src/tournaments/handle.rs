@@ -9,6 +9,7 @@ use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::shared::{AsOf, Shared};
+use crate::access::{Secrets, Standing};
 use crate::convert::{self, TournamentPlan};
 use crate::limits::Key;
 use crate::outbox::{Outbox, StreamEnd};
@@ -16,6 +17,7 @@ use crate::rooms::Rooms;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::Visibility;
 
 /// A message to a stream that is attached to a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -235,6 +237,18 @@ impl TournamentHandle {
         Token::parse(token).is_some_and(|token| {
             token.room == self.header.id && self.header.owner.matches(&token.secret)
         })
+    }
+
+    /// Who sees it and its games.
+    pub fn visibility(&self) -> Visibility {
+        self.plan.policy.visibility
+    }
+
+    /// What the secrets that a caller shows make of it.
+    pub fn standing(&self, secrets: &Secrets) -> Standing {
+        let state = self.committed();
+        let tickets = state.tickets.values().copied();
+        secrets.standing(self.header.id, &self.header.owner, tickets)
     }
 
     /// The participant with this ticket, in constant time for each.

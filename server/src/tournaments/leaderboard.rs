@@ -123,7 +123,9 @@ fn restored(mut games: Vec<RatedGame>) -> Ratings<Identity> {
 /// The places in a rated game; `None` if it is not rated.
 fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
     let replayed = |seat: &v1::Participant| seat.built_in_agent == BuiltInAgent::REPLAY;
-    if summary.substituted || summary.seats.iter().any(replayed) {
+    // What is not listed elsewhere does not show here either.
+    let is_public = summary.visibility() == v1::Visibility::Unspecified;
+    if !is_public || summary.substituted || summary.seats.iter().any(replayed) {
         return None;
     }
     let places: BTreeMap<u32, u32> = (summary.standings.iter())

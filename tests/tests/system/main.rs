@@ -34,4 +34,5 @@ mod tournament_tables;
 mod tournaments;
 mod vector_columns;
 mod vectors;
+mod visibility;
 mod web;

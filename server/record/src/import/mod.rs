@@ -468,5 +468,6 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         durability: v1::Durability::Durable.into(),
         clocks: Vec::new(),
         one_seat_per_client: false,
+        visibility: v1::Visibility::Unspecified.into(),
     }
 }

@@ -21,7 +21,7 @@ use crate::config::{
     FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
 };
 use crate::convert;
-use crate::grpc::access::{check_room, check_tournament};
+use crate::grpc::reach::Reach;
 use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
 use crate::outbox::{Outbox, StreamEnd};
@@ -251,9 +251,12 @@ impl Reader {
         }
         if let Some(token) = Token::parse(&attach.ticket) {
             let tournament = self.tournaments.get(token.room);
+            let reach = Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments));
             let in_scope = match &tournament {
-                Some(_) => check_tournament(&self.caller, token.room),
-                None => check_room(&self.caller, &self.rooms, token.room),
+                Some(handle) => reach.check_ticket_of(&self.caller, handle, ticket_unknown),
+                None => reach
+                    .room_of_ticket(&self.caller, token.room, ticket_unknown)
+                    .map(drop),
             };
             if let Err(status) = in_scope {
                 return self.refuse(handle, request_id, &status);

@@ -34,16 +34,19 @@ class RecordServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> RecordServiceAsyncStub: ...
     ListRecords: _grpc.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]
-    """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
-    FILTER_REFUSED).
+    """Lists the records of the server, by default oldest first. Those of games that are not public are
+    listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
+    than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
     """
     GetRecord: _grpc.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]
-    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
-    (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
-    deals are.
+    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
+    without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
+    progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
+    the owner token, receive everything; others no record-only expressions, annotations and media.
+    The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _grpc.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]
-    """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+    """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
     (FILTER_REFUSED).
     """
     ImportRecord: _grpc.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]
@@ -60,16 +63,19 @@ class RecordServiceAsyncStub(RecordServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     ListRecords: _aio.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]  # type: ignore[assignment]
-    """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
-    FILTER_REFUSED).
+    """Lists the records of the server, by default oldest first. Those of games that are not public are
+    listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
+    than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
     """
     GetRecord: _aio.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]  # type: ignore[assignment]
-    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
-    (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
-    deals are.
+    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
+    without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
+    progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
+    the owner token, receive everything; others no record-only expressions, annotations and media.
+    The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _aio.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]  # type: ignore[assignment]
-    """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+    """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
     (FILTER_REFUSED).
     """
     ImportRecord: _aio.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]  # type: ignore[assignment]
@@ -89,8 +95,9 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.ListRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ListRecordsResponse, _abc.Awaitable[_record_service_pb2.ListRecordsResponse]]:
-        """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
-        FILTER_REFUSED).
+        """Lists the records of the server, by default oldest first. Those of games that are not public are
+        listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
+        than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
         """
 
     @_abc_1.abstractmethod
@@ -99,9 +106,11 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.GetRecordRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.GetRecordResponse], _abc.AsyncIterator[_record_service_pb2.GetRecordResponse]]:
-        """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
-        (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
-        deals are.
+        """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
+        without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
+        progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
+        the owner token, receive everything; others no record-only expressions, annotations and media.
+        The record of a private game is complete only for its owner and the operator.
         """
 
     @_abc_1.abstractmethod
@@ -110,7 +119,7 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.StreamRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.StreamRecordsResponse], _abc.AsyncIterator[_record_service_pb2.StreamRecordsResponse]]:
-        """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+        """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
         (FILTER_REFUSED).
         """
 

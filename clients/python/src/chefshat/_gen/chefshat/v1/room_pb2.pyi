@@ -76,6 +76,49 @@ DURABILITY_EPHEMERAL: Durability.ValueType  # 2
 """Nothing: the game is in memory only, which is faster. Its record is stored when it ends."""
 Global___Durability: _TypeAlias = Durability  # noqa: Y015
 
+class _Visibility:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _VisibilityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Visibility.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    VISIBILITY_UNSPECIFIED: _Visibility.ValueType  # 0
+    """As PUBLIC; also in every response, where PUBLIC is never used, so that records stay the same."""
+    VISIBILITY_PUBLIC: _Visibility.ValueType  # 1
+    """Listed, and reached by its id."""
+    VISIBILITY_UNLISTED: _Visibility.ValueType  # 2
+    """Reached by its id, but listed only for callers who show a secret of it and for the operator. Its
+    games are not rated.
+    """
+    VISIBILITY_PRIVATE: _Visibility.ValueType  # 3
+    """Listed and reached only for callers who show a secret of it, who have a token for this room or
+    tournament, and for the operator. Others get the same answer as for an unknown id; a join code
+    is enough to look at it and to join. Its games are not rated.
+    """
+
+class Visibility(_Visibility, metaclass=_VisibilityEnumTypeWrapper):
+    """Who sees a room or tournament, and the records of its games. What somebody may do there is not
+    affected: that needs a role, a join code or a ticket as before. A *secret* of a room is its owner
+    token, the ticket of a seat or that of its physical table; of a tournament, its owner token or the
+    ticket of a participant, which also show its rooms. Clients show secrets in the request header
+    `chefshat-secret` (proto/README.md). Join codes do not count.
+    """
+
+VISIBILITY_UNSPECIFIED: Visibility.ValueType  # 0
+"""As PUBLIC; also in every response, where PUBLIC is never used, so that records stay the same."""
+VISIBILITY_PUBLIC: Visibility.ValueType  # 1
+"""Listed, and reached by its id."""
+VISIBILITY_UNLISTED: Visibility.ValueType  # 2
+"""Reached by its id, but listed only for callers who show a secret of it and for the operator. Its
+games are not rated.
+"""
+VISIBILITY_PRIVATE: Visibility.ValueType  # 3
+"""Listed and reached only for callers who show a secret of it, who have a token for this room or
+tournament, and for the operator. Others get the same answer as for an unknown id; a join code
+is enough to look at it and to join. Its games are not rated.
+"""
+Global___Visibility: _TypeAlias = Visibility  # noqa: Y015
+
 class _GameOrigin:
     ValueType = _typing.NewType("ValueType", _builtins.int)
     V: _TypeAlias = ValueType  # noqa: Y015
@@ -389,6 +432,7 @@ class RoomPolicy(_message.Message):
     DURABILITY_FIELD_NUMBER: _builtins.int
     CLOCKS_FIELD_NUMBER: _builtins.int
     ONE_SEAT_PER_CLIENT_FIELD_NUMBER: _builtins.int
+    VISIBILITY_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. For a special
     action, whoever holds the jokers: the longest time of any seat that participants can take, and
@@ -444,6 +488,10 @@ class RoomPolicy(_message.Message):
     their addresses, and remembers them until it is restarted. Participants of tournaments are not
     limited by it.
     """
+    visibility: Global___Visibility.ValueType
+    """Who sees the room, and the record of its game; by default everybody. In a tournament: who sees
+    the tournament and all its games.
+    """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
         """Other times for some kinds of participants, each kind at most once. People have the default
@@ -468,10 +516,11 @@ class RoomPolicy(_message.Message):
         durability: Global___Durability.ValueType = ...,
         clocks: _abc.Iterable[Global___KindClock] | None = ...,
         one_seat_per_client: _builtins.bool = ...,
+        visibility: Global___Visibility.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "visibility", b"visibility", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015

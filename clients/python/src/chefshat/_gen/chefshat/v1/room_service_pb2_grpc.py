@@ -73,8 +73,8 @@ class RoomServiceServicer:
 
     def CreateRoom(self, request, context):
         """Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
-        SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; NOT_FOUND
-        (GAME_UNKNOWN) or FAILED_PRECONDITION (GAME_RUNNING) for a recorded game in the request;
+        SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
+        GetRecord for a recorded game in the request, which the caller must be allowed to read;
         RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
         STORE_FAILED).
         """
@@ -83,7 +83,8 @@ class RoomServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetRoom(self, request, context):
-        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
+        without a secret of it (`Visibility`); PERMISSION_DENIED
         (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -93,7 +94,8 @@ class RoomServiceServicer:
     def ListRooms(self, request, context):
         """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
         first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-        requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        requested without being the last. Rooms that are not public are listed only for callers who show
+        a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

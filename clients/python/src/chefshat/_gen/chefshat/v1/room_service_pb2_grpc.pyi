@@ -35,19 +35,21 @@ class RoomServiceStub:
     def __new__(cls, channel: _aio.Channel) -> RoomServiceAsyncStub: ...
     CreateRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CreateRoomRequest, _room_service_pb2.CreateRoomResponse]
     """Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
-    SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; NOT_FOUND
-    (GAME_UNKNOWN) or FAILED_PRECONDITION (GAME_RUNNING) for a recorded game in the request;
+    SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
+    GetRecord for a recorded game in the request, which the caller must be allowed to read;
     RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
-    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
+    without a secret of it (`Visibility`); PERMISSION_DENIED
     (JOIN_CODE_WRONG).
     """
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
     first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-    requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    requested without being the last. Rooms that are not public are listed only for callers who show
+    a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
@@ -73,19 +75,21 @@ class RoomServiceAsyncStub(RoomServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     CreateRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CreateRoomRequest, _room_service_pb2.CreateRoomResponse]  # type: ignore[assignment]
     """Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
-    SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; NOT_FOUND
-    (GAME_UNKNOWN) or FAILED_PRECONDITION (GAME_RUNNING) for a recorded game in the request;
+    SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
+    GetRecord for a recorded game in the request, which the caller must be allowed to read;
     RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
-    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
+    without a secret of it (`Visibility`); PERMISSION_DENIED
     (JOIN_CODE_WRONG).
     """
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
     first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-    requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    requested without being the last. Rooms that are not public are listed only for callers who show
+    a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
@@ -114,8 +118,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.CreateRoomResponse, _abc.Awaitable[_room_service_pb2.CreateRoomResponse]]:
         """Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
-        SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; NOT_FOUND
-        (GAME_UNKNOWN) or FAILED_PRECONDITION (GAME_RUNNING) for a recorded game in the request;
+        SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
+        GetRecord for a recorded game in the request, which the caller must be allowed to read;
         RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
         STORE_FAILED).
         """
@@ -126,7 +130,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.GetRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.GetRoomResponse, _abc.Awaitable[_room_service_pb2.GetRoomResponse]]:
-        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
+        without a secret of it (`Visibility`); PERMISSION_DENIED
         (JOIN_CODE_WRONG).
         """
 
@@ -138,7 +143,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.ListRoomsResponse, _abc.Awaitable[_room_service_pb2.ListRoomsResponse]]:
         """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
         first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-        requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        requested without being the last. Rooms that are not public are listed only for callers who show
+        a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod

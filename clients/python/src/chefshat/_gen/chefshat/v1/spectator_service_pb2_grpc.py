@@ -48,7 +48,8 @@ class SpectatorServiceServicer:
 
     def Watch(self, request, context):
         """Streams the events of a room, as its policy allows, until the game is over. A message without
-        events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
+        events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
+        (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
         OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
         `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
         the spectator does not keep up: watch again from the event after the last one received.

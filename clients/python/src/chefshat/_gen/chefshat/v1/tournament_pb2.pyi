@@ -254,7 +254,7 @@ class TournamentSettings(_message.Message):
     @_builtins.property
     def policy(self) -> _room_pb2.RoomPolicy:
         """The policy of all games, including clocks for kinds of participants. `abort` is NEVER,
-        `waiting_time_ms` is `no_show_time_ms`.
+        `waiting_time_ms` is `no_show_time_ms`. Its `visibility` is that of the tournament, too.
         """
 
     @_builtins.property

@@ -26,7 +26,8 @@ if _version_not_supported:
 
 
 class TournamentServiceStub:
-    """Tournaments of a server. Tournaments survive restarts of the server.
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
     """
 
     def __init__(self, channel):
@@ -98,7 +99,8 @@ class TournamentServiceStub:
 
 
 class TournamentServiceServicer:
-    """Tournaments of a server. Tournaments survive restarts of the server.
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
     """
 
     def CreateTournament(self, request, context):
@@ -120,8 +122,9 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ListTournaments(self, request, context):
-        """Lists the tournaments of the server, newest first. Later pages do not include tournaments
-        created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
+        """Lists the tournaments of the server, newest first. Those that are not public are listed only for
+        callers who show a secret of them. A page may have fewer tournaments than requested without
+        being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
         (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -204,8 +207,8 @@ class TournamentServiceServicer:
 
     def GetLeaderboard(self, request, context):
         """Returns all who have played a rated game on this server, best first. A game is rated if it
-        finished, was dealt by this server from its own seed, and different participants played all
-        seats without substitutes. Names are not protected: participants choose them. The games of the
+        finished, was public, was dealt by this server from its own seed, and different participants
+        played all seats without substitutes. Names are not protected: participants choose them. The games of the
         last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -284,7 +287,8 @@ def add_TournamentServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class TournamentService:
-    """Tournaments of a server. Tournaments survive restarts of the server.
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
     """
 
     @staticmethod

@@ -27,7 +27,9 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class TournamentServiceStub:
-    """Tournaments of a server. Tournaments survive restarts of the server."""
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
+    """
 
     @_typing.overload
     def __new__(cls, channel: _grpc.Channel) -> _Self: ...
@@ -44,8 +46,9 @@ class TournamentServiceStub:
     PERMISSION_DENIED (JOIN_CODE_WRONG).
     """
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
-    """Lists the tournaments of the server, newest first. Later pages do not include tournaments
-    created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
+    """Lists the tournaments of the server, newest first. Those that are not public are listed only for
+    callers who show a secret of them. A page may have fewer tournaments than requested without
+    being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
     (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
@@ -92,14 +95,16 @@ class TournamentServiceStub:
     """
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
-    finished, was dealt by this server from its own seed, and different participants played all
-    seats without substitutes. Names are not protected: participants choose them. The games of the
+    finished, was public, was dealt by this server from its own seed, and different participants
+    played all seats without substitutes. Names are not protected: participants choose them. The games of the
     last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 @_typing.type_check_only
 class TournamentServiceAsyncStub(TournamentServiceStub):
-    """Tournaments of a server. Tournaments survive restarts of the server."""
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
+    """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     CreateTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CreateTournamentRequest, _tournament_service_pb2.CreateTournamentResponse]  # type: ignore[assignment]
@@ -113,8 +118,9 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     PERMISSION_DENIED (JOIN_CODE_WRONG).
     """
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
-    """Lists the tournaments of the server, newest first. Later pages do not include tournaments
-    created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
+    """Lists the tournaments of the server, newest first. Those that are not public are listed only for
+    callers who show a secret of them. A page may have fewer tournaments than requested without
+    being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
     (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
@@ -161,13 +167,15 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
-    finished, was dealt by this server from its own seed, and different participants played all
-    seats without substitutes. Names are not protected: participants choose them. The games of the
+    finished, was public, was dealt by this server from its own seed, and different participants
+    played all seats without substitutes. Names are not protected: participants choose them. The games of the
     last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
-    """Tournaments of a server. Tournaments survive restarts of the server."""
+    """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
+    the answer for a private tournament without a secret of it (`Visibility`).
+    """
 
     @_abc_1.abstractmethod
     def CreateTournament(
@@ -197,8 +205,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ListTournamentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentsResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentsResponse]]:
-        """Lists the tournaments of the server, newest first. Later pages do not include tournaments
-        created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
+        """Lists the tournaments of the server, newest first. Those that are not public are listed only for
+        callers who show a secret of them. A page may have fewer tournaments than requested without
+        being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
         (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
@@ -299,8 +308,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
         """Returns all who have played a rated game on this server, best first. A game is rated if it
-        finished, was dealt by this server from its own seed, and different participants played all
-        seats without substitutes. Names are not protected: participants choose them. The games of the
+        finished, was public, was dealt by this server from its own seed, and different participants
+        played all seats without substitutes. Names are not protected: participants choose them. The games of the
         last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
         """
 

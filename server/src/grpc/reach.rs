@@ -1,0 +1,319 @@
+//! Which rooms, tournaments and recorded games a caller reaches and finds in lists: by the scope of
+//! its token, by their visibility, and by the secrets that it shows. What a caller does not reach
+//! because it is private is answered exactly like what does not exist.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{self, record_line::Line};
+use tonic::Status;
+
+use super::access::check;
+use super::recorded::read_failed;
+use super::status::{room_gone, room_unknown};
+use super::tournaments::unknown as tournament_unknown;
+use crate::access::{Caller, Role, Standing};
+use crate::room::Handle;
+use crate::rooms::Rooms;
+use crate::store::StoredGame;
+use crate::tournaments::{TournamentHandle, Tournaments};
+use chefshat_room::ids::{Id, Token};
+use chefshat_room::journal::{Change, Entry, GameHeader};
+use chefshat_room::policy::Visibility;
+
+/// Decides what a caller reaches.
+#[derive(Debug, Clone)]
+pub struct Reach {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+}
+
+/// How much of a record its reader sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sight {
+    /// Everything.
+    Whole,
+    /// What the players saw.
+    Players,
+}
+
+impl Reach {
+    /// Decides about these rooms and tournaments.
+    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>) -> Self {
+        Self { rooms, tournaments }
+    }
+
+    /// The rooms.
+    pub(super) fn rooms(&self) -> &Arc<Rooms> {
+        &self.rooms
+    }
+
+    /// The room with an id from a message.
+    pub(super) async fn room(&self, caller: &Caller, id: &str) -> Result<Handle, Status> {
+        let id = Id::parse(id).ok_or_else(room_unknown)?;
+        self.room_or(caller, id, room_unknown).await
+    }
+
+    /// The room with this id. If there is none, or the caller does not see it, `unknown` says so.
+    pub(super) async fn room_or(
+        &self,
+        caller: &Caller,
+        id: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let unknown = || match self.rooms.is_shutting_down() && caller.secrets.mention(id) {
+            // A suspended room has taken the knowledge of its tickets with it.
+            true => room_gone(),
+            false => unknown(),
+        };
+        let handle = self.rooms.get(id).ok_or_else(unknown)?;
+        let header = self.rooms.header(id).ok_or_else(unknown)?;
+        if header.policy.visibility == Visibility::Private
+            && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
+        {
+            return Err(unknown());
+        }
+        check(caller, |caller| reaches(caller, &header))?;
+        Ok(handle)
+    }
+
+    /// Checks that the scope of a caller who has the join code of a room includes it.
+    pub(super) fn check_joining(&self, caller: &Caller, room: Id) -> Result<(), Status> {
+        let tournament = || self.rooms.header(room)?.tournament;
+        check(caller, |caller| {
+            caller.reaches_room(room, tournament().map(|game| game.tournament))
+        })
+    }
+
+    /// The room of a ticket, which is still to be compared. A caller whose scope does not include a
+    /// private room gets the answer for an unknown ticket, whatever the ticket.
+    pub(super) fn room_of_ticket(
+        &self,
+        caller: &Caller,
+        room: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let handle = self.rooms.get(room).ok_or_else(&unknown)?;
+        if caller.scope.is_some() {
+            let header = self.rooms.header(room).ok_or_else(&unknown)?;
+            check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
+                match header.policy.visibility {
+                    Visibility::Private => unknown(),
+                    Visibility::Public | Visibility::Unlisted => refused,
+                }
+            })?;
+        }
+        Ok(handle)
+    }
+
+    /// Whether a room is in the lists of a caller.
+    pub(super) async fn lists_room(&self, caller: &Caller, handle: &Handle) -> bool {
+        let Some(header) = self.rooms.header(handle.id()) else {
+            return false;
+        };
+        reaches(caller, &header)
+            && (header.policy.visibility == Visibility::Public
+                || self.standing_in_room(caller, handle, &header).await > Standing::Stranger)
+    }
+
+    /// The tournament with an id from a message.
+    pub(super) fn tournament(
+        &self,
+        caller: &Caller,
+        id: &str,
+    ) -> Result<Arc<TournamentHandle>, Status> {
+        let found = Id::parse(id).and_then(|id| self.tournaments.get(id));
+        let handle = found.ok_or_else(tournament_unknown)?;
+        if handle.visibility() == Visibility::Private
+            && standing_in_tournament(caller, &handle) == Standing::Stranger
+        {
+            return Err(tournament_unknown());
+        }
+        check(caller, |caller| caller.reaches_tournament(handle.id()))?;
+        Ok(handle)
+    }
+
+    /// Checks that the scope of a caller includes a tournament of which it has a ticket, which is
+    /// still to be compared; as for rooms.
+    pub(super) fn check_ticket_of(
+        &self,
+        caller: &Caller,
+        tournament: &TournamentHandle,
+        unknown: impl Fn() -> Status,
+    ) -> Result<(), Status> {
+        let checked = check(caller, |it| it.reaches_tournament(tournament.id()));
+        checked.map_err(|refused| match tournament.visibility() {
+            Visibility::Private => unknown(),
+            Visibility::Public | Visibility::Unlisted => refused,
+        })
+    }
+
+    /// Whether a tournament is in the lists of a caller.
+    pub(super) fn lists_tournament(&self, caller: &Caller, handle: &TournamentHandle) -> bool {
+        caller.reaches_tournament(handle.id())
+            && (handle.visibility() == Visibility::Public
+                || standing_in_tournament(caller, handle) > Standing::Stranger)
+    }
+
+    /// How much of a recorded game a caller sees. `unknown` answers for a game that it does not see.
+    pub(super) fn recorded(
+        &self,
+        caller: &Caller,
+        stored: &StoredGame,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Sight, Status> {
+        let (visibility, standing) = match stored {
+            StoredGame::Hosted(header, entries, _) => {
+                let standing = self.standing_in_game(caller, header, entries);
+                (header.policy.visibility, standing)
+            }
+            // Whoever added it has made it public.
+            StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger),
+        };
+        let is_private = visibility == Visibility::Private;
+        if is_private && standing == Standing::Stranger {
+            return Err(unknown());
+        }
+        check(caller, |caller| match stored {
+            StoredGame::Hosted(header, ..) => reaches(caller, header),
+            StoredGame::Imported(lines) => {
+                let header = lines.first().and_then(|line| match &line.line {
+                    Some(Line::Header(header)) => Some(header),
+                    _ => None,
+                });
+                header.is_some_and(|it| reaches_record(caller, &it.room_id, &it.tournament_id))
+            }
+        })?;
+        let is_host = caller.role >= Role::Host && !is_private;
+        Ok(match is_host || standing == Standing::Owner {
+            true => Sight::Whole,
+            false => Sight::Players,
+        })
+    }
+
+    /// Whether a recorded game is in the lists of a caller.
+    pub(super) async fn lists_record(
+        &self,
+        caller: &Caller,
+        summary: &v1::RecordSummary,
+    ) -> Result<bool, Status> {
+        if !reaches_record(caller, &summary.room_id, &summary.tournament_id) {
+            return Ok(false);
+        }
+        let is_public = summary.visibility() == v1::Visibility::Unspecified;
+        if is_public || summary.added || caller.standing() > Standing::Stranger {
+            return Ok(true);
+        }
+        let ids = [&summary.room_id, &summary.tournament_id].map(|id| Id::parse(id));
+        if !(ids.into_iter().flatten()).any(|id| caller.secrets.mention(id)) {
+            return Ok(false);
+        }
+        // At most a few games are read: those of the caller's secrets.
+        let Some(game) = Id::parse(&summary.game_id) else {
+            return Ok(false);
+        };
+        let stored = (self.rooms.store().finished(game).await).map_err(read_failed)?;
+        Ok(match stored {
+            Some(StoredGame::Hosted(header, entries, _)) => {
+                self.standing_in_game(caller, &header, &entries) > Standing::Stranger
+            }
+            Some(StoredGame::Imported(_)) | None => false,
+        })
+    }
+
+    async fn standing_in_room(
+        &self,
+        caller: &Caller,
+        handle: &Handle,
+        header: &GameHeader,
+    ) -> Standing {
+        let standing = self.standing_by_header(caller, header);
+        if standing > Standing::Stranger {
+            return standing;
+        }
+        let ids = [Some(header.room_id), tournament_of(header)];
+        let secrets: Vec<_> = (ids.into_iter().flatten())
+            .flat_map(|id| caller.secrets.of_id(id))
+            .map(|token| token.secret)
+            .collect();
+        match !secrets.is_empty() && handle.has_ticket(secrets).await.unwrap_or(false) {
+            true => Standing::Participant,
+            false => Standing::Stranger,
+        }
+    }
+
+    fn standing_in_game(
+        &self,
+        caller: &Caller,
+        header: &GameHeader,
+        entries: &[Entry],
+    ) -> Standing {
+        let mut tickets = BTreeMap::new();
+        for entry in entries {
+            match &entry.change {
+                Change::Seated { seat, participant } => {
+                    tickets.insert(*seat, participant.ticket);
+                }
+                Change::Vacated(seat) => drop(tickets.remove(seat)),
+                _ => {}
+            }
+        }
+        let ids = [Some(header.room_id), tournament_of(header)];
+        let by_ticket = (ids.into_iter().flatten())
+            .map(|id| (caller.secrets).standing(id, &header.owner, tickets.values().copied()));
+        let standing = self.standing_by_header(caller, header);
+        by_ticket.max().map_or(standing, |it| it.max(standing))
+    }
+
+    /// What a caller is to a game by its token, and by what is known before the game starts.
+    fn standing_by_header(&self, caller: &Caller, header: &GameHeader) -> Standing {
+        let by_token = match reaches(caller, header) {
+            true => caller.standing(),
+            false => Standing::Stranger,
+        };
+        let secrets = &caller.secrets;
+        let by_room = secrets.standing(header.room_id, &header.owner, header.table.into_iter());
+        let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
+            Some(tournament) => tournament.standing(secrets),
+            // The server keeps the games of a tournament longer than the tournament.
+            None => {
+                let owns = |token: &Token| {
+                    let owner = Token::of_tournament_room(header.room_id, &token.hash());
+                    header.owner.is(&owner.hash())
+                };
+                match secrets.of_id(id).any(owns) {
+                    true => Standing::Owner,
+                    false => Standing::Stranger,
+                }
+            }
+        });
+        by_token
+            .max(by_room)
+            .max(by_tournament.unwrap_or(Standing::Stranger))
+    }
+}
+
+fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Standing {
+    let by_token = match caller.reaches_tournament(tournament.id()) {
+        true => caller.standing(),
+        false => Standing::Stranger,
+    };
+    by_token.max(tournament.standing(&caller.secrets))
+}
+
+fn tournament_of(header: &GameHeader) -> Option<Id> {
+    header.tournament.map(|game| game.tournament)
+}
+
+/// Whether the scope of a caller includes a game.
+fn reaches(caller: &Caller, header: &GameHeader) -> bool {
+    caller.reaches_room(header.room_id, tournament_of(header))
+}
+
+/// Whether the scope of a caller includes the record of this room and tournament.
+fn reaches_record(caller: &Caller, room: &str, tournament: &str) -> bool {
+    match Id::parse(room) {
+        Some(room) => caller.reaches_room(room, Id::parse(tournament)),
+        None => caller.scope.is_none(),
+    }
+}

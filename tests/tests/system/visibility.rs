@@ -1,0 +1,890 @@
+//! Public, unlisted and private rooms and tournaments: who finds them and their records in lists,
+//! who reaches them by their ids, and that what is private is answered exactly like what does not
+//! exist. Every call is made for each visibility by each kind of caller: before the game, after its
+//! end, and after a restart of the server.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::{Client, ConnectOptions, RandomAgent};
+use chefshat_proto::v1::record_service_client::RecordServiceClient;
+use chefshat_proto::v1::room_service_client::RoomServiceClient;
+use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
+use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
+use chefshat_proto::v1::vector_service_client::VectorServiceClient;
+use chefshat_proto::v1::{
+    self, Visibility, create_room_request::Start, record_line::Line, run_request, seat_config,
+    vector_setup,
+};
+use chefshat_room::ids::{Id, Token};
+use chefshat_server::access::{
+    AccessSettings, MAX_SECRETS, Mode, NewToken, Role, SECRET_HEADER, Scope, TokenFile,
+};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::host::Host;
+use chefshat_server::store::SqliteStore;
+use chefshat_tests::{one_shift, patiently, random_agents, room_of_four};
+use tempfile::TempDir;
+use tokio_stream::iter;
+use tonic::{Code, Request, Response, Status};
+use tonic_types::StatusExt as _;
+
+const VISIBILITIES: [Visibility; 3] = [
+    Visibility::Public,
+    Visibility::Unlisted,
+    Visibility::Private,
+];
+
+/// The request id of a room that exists: other requests with it are refused, but only after the
+/// records that they name were read.
+const USED: [u8; 32] = [7; 32];
+
+/// A server with a database, which can be restarted.
+struct Server {
+    folder: TempDir,
+    settings: AccessSettings,
+    host: Host,
+}
+
+impl Server {
+    async fn start(settings: AccessSettings) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let host = host(folder.path(), &settings, ServerConfig::default().retention).await;
+        Self {
+            folder,
+            settings,
+            host,
+        }
+    }
+
+    /// Ends the server and starts it again; rooms of games that ended longer than `retention` ago
+    /// are gone.
+    async fn restart(self, retention: Duration) -> Self {
+        let Self {
+            folder,
+            settings,
+            host: old,
+        } = self;
+        patiently("the server to stop", old.stop())
+            .await
+            .expect("a clean end");
+        let host = host(folder.path(), &settings, retention).await;
+        Self {
+            folder,
+            settings,
+            host,
+        }
+    }
+
+    fn token(&self, role: Role, scope: Option<Scope>) -> String {
+        let created = TokenFile::of(self.folder.path()).create(NewToken {
+            role,
+            label: String::new(),
+            lifetime: None,
+            scope,
+        });
+        created.expect("the folder is writable").to_text()
+    }
+
+    /// A client with this token that shows these secrets.
+    async fn client(&self, token: Option<&str>, secrets: &[&str]) -> Client {
+        let options = ConnectOptions {
+            token: token.map(str::to_owned),
+            ca: None,
+        };
+        let connecting = Client::connect_with(self.host.url(), &options);
+        let client = connecting.await.expect("the server listens");
+        if token.is_some() {
+            let known = async {
+                let unknown =
+                    |error: &chefshat_client::Error| error.reason() == Some("TOKEN_UNKNOWN");
+                while (client.action_table(0).await).is_err_and(|error| unknown(&error)) {
+                    tokio::time::sleep(Duration::from_millis(50)).await;
+                }
+            };
+            patiently("the server to read the token", known).await;
+        }
+        client.with_secrets(secrets).expect("secrets")
+    }
+}
+
+async fn host(folder: &Path, settings: &AccessSettings, retention: Duration) -> Host {
+    let store = SqliteStore::open(folder).await.expect("a store");
+    let config = ServerConfig {
+        data_dir: Some(PathBuf::from(folder)),
+        grace: Duration::ZERO,
+        access: settings.clone(),
+        retention,
+        ..ServerConfig::default()
+    };
+    let host = Host::start(config, Arc::new(store)).await;
+    host.expect("a free port")
+}
+
+fn mode(mode: Mode) -> AccessSettings {
+    AccessSettings {
+        mode: Some(mode),
+        ..AccessSettings::default()
+    }
+}
+
+/// The ids that calls are about.
+#[derive(Debug, Clone)]
+struct Ids {
+    room: String,
+    game: String,
+    tournament: String,
+}
+
+impl Ids {
+    fn unknown() -> Self {
+        let [room, game, tournament] = [(); 3].map(|()| Id::random().to_string());
+        Self {
+            room,
+            game,
+            tournament,
+        }
+    }
+}
+
+/// A room with a tournament of the same visibility.
+struct Subject {
+    visibility: Visibility,
+    ids: Ids,
+    owners: [String; 2],
+    tickets: Vec<String>,
+    participant: String,
+}
+
+impl Subject {
+    async fn new(host: &Client, visibility: Visibility) -> Self {
+        let policy = v1::RoomPolicy {
+            visibility: visibility.into(),
+            ..v1::RoomPolicy::default()
+        };
+        let (created, tickets) = room_of_four(host, one_shift(), policy.clone()).await;
+        let room = created.room.expect("a room");
+        let settings = v1::TournamentSettings {
+            name: "Coppa".into(),
+            format: v1::TournamentFormat::RoundRobin.into(),
+            rules: Some(one_shift()),
+            rounds: 1,
+            built_in_agents: vec!["random".into(); 3],
+            policy: Some(policy),
+            ..v1::TournamentSettings::default()
+        };
+        let tournament = host.create_tournament(settings).await;
+        let tournament = tournament.expect("a tournament");
+        let joined = host
+            .join_tournament(v1::JoinTournamentRequest {
+                join_code: tournament.join_code,
+                name: "participant".into(),
+                ..v1::JoinTournamentRequest::default()
+            })
+            .await
+            .expect("joined");
+        let described = tournament.tournament.expect("a tournament");
+        assert_eq!(
+            described
+                .settings
+                .and_then(|it| it.policy)
+                .map(|it| it.visibility()),
+            room.policy.map(|policy| policy.visibility()),
+        );
+        Self {
+            visibility,
+            ids: Ids {
+                room: room.room_id,
+                game: room.game_id,
+                tournament: described.tournament_id,
+            },
+            owners: [created.owner_token, tournament.owner_token],
+            tickets,
+            participant: joined.ticket,
+        }
+    }
+
+    /// Plays both to their ends. Returns the ids of the tournament's game.
+    async fn play(&self, host: &Client) -> Ids {
+        let [_, owner] = &self.owners;
+        let tournament = &self.ids.tournament;
+        let started = host.start_tournament(tournament, owner).await;
+        started.expect("started");
+        let agents = random_agents(self.tickets.clone());
+        let playing = host.play_many(agents);
+        for outcome in patiently("the game to end", playing).await {
+            outcome.expect("the game ended");
+        }
+        let agent = |_: &v1::Attached| RandomAgent::new(1);
+        let playing = host.play_tournament(&self.participant, agent);
+        patiently("the tournament to end", playing)
+            .await
+            .expect("played");
+        let owned = host.with_secrets([owner]).expect("a secret");
+        let listed = owned
+            .tournament_games(v1::ListTournamentGamesRequest {
+                tournament_id: tournament.clone(),
+                ..Default::default()
+            })
+            .await
+            .expect("its games");
+        let game = listed.games.first().expect("a game").clone();
+        Ids {
+            room: game.room_id,
+            game: game.game_id,
+            tournament: tournament.clone(),
+        }
+    }
+}
+
+/// Everybody who may ask about a subject, and whether they have shown that they belong to it.
+async fn callers(
+    server: &Server,
+    subject: &Subject,
+    other: &Subject,
+) -> Vec<(&'static str, Client, bool)> {
+    // Roles do not matter here: without a token all are hosts, or with one.
+    let host = match server.settings.mode {
+        Some(Mode::Tokens) => Some(server.token(Role::Host, None)),
+        _ => None,
+    };
+    let host = host.as_deref();
+    let admin = server.token(Role::Admin, None);
+    let [room_owner, tournament_owner] = &subject.owners;
+    let [room, _, tournament] = [
+        &subject.ids.room,
+        &subject.ids.game,
+        &subject.ids.tournament,
+    ]
+    .map(|id| Id::parse(id).expect("an id"));
+    let forged = [room, tournament].map(|id| Token::random(id).to_text());
+    let (forged, others) = (forged.each_ref(), &other.tickets[0]);
+    let ticket = &subject.tickets[2];
+    vec![
+        ("stranger", server.client(host, &[]).await, false),
+        (
+            "forged secrets",
+            server.client(host, &forged.map(String::as_str)).await,
+            false,
+        ),
+        (
+            "another room's secrets",
+            server
+                .client(
+                    host,
+                    &[
+                        others,
+                        &other.owners[0],
+                        &other.owners[1],
+                        &other.participant,
+                    ],
+                )
+                .await,
+            false,
+        ),
+        (
+            "tickets",
+            server.client(host, &[ticket, &subject.participant]).await,
+            true,
+        ),
+        (
+            "owner",
+            server.client(host, &[room_owner, tournament_owner]).await,
+            true,
+        ),
+        ("admin", server.client(Some(&admin), &[]).await, true),
+    ]
+}
+
+/// An answer without what differs from call to call.
+#[derive(Debug, PartialEq, Eq)]
+struct Answer {
+    code: Code,
+    message: String,
+    reason: Option<String>,
+    details: Vec<u8>,
+    headers: BTreeMap<String, String>,
+}
+
+impl Answer {
+    /// What does not depend on the game, as its length does.
+    fn kind(&self) -> (Code, Option<&str>) {
+        (self.code, self.reason.as_deref())
+    }
+}
+
+/// What a call was answered, with the ids of the request left out.
+fn answer<T>(result: Result<Response<T>, Status>, ids: &Ids) -> Answer {
+    let status = result.err().unwrap_or_else(|| Status::ok(""));
+    let without_ids = |bytes: &[u8]| {
+        let mut text = bytes.to_vec();
+        for id in [&ids.room, &ids.game, &ids.tournament] {
+            let id = id.as_bytes();
+            while let Some(at) = text.windows(id.len()).position(|part| part == id) {
+                text[at..at + id.len()].fill(b'.');
+            }
+        }
+        text
+    };
+    let headers = status.metadata().clone().into_headers();
+    let headers = headers.iter().filter(|(name, _)| *name != "date");
+    Answer {
+        code: status.code(),
+        reason: status.get_details_error_info().map(|info| info.reason),
+        message: String::from_utf8(without_ids(status.message().as_bytes())).expect("a text"),
+        details: without_ids(status.details()),
+        headers: headers
+            .map(|(name, value)| (name.to_string(), format!("{value:?}")))
+            .collect(),
+    }
+}
+
+/// A point beyond the end of a game: refused, but only after the record was read.
+fn branch_point(ids: &Ids) -> v1::BranchPoint {
+    v1::BranchPoint {
+        game_id: ids.game.clone(),
+        decisions: u64::MAX,
+        same_deals: false,
+    }
+}
+
+/// Every call that names something by its id, with the answers.
+async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
+    let mut rooms = RoomServiceClient::new(client.channel());
+    let mut records = RecordServiceClient::new(client.channel());
+    let mut tournaments = TournamentServiceClient::new(client.channel());
+    let wrong = |id: &str| Token::random(Id::parse(id).expect("an id")).to_text();
+    let mut answers = BTreeMap::new();
+    let (room_id, tournament_id) = (&ids.room, &ids.tournament);
+    macro_rules! ask {
+        ($name:literal, $call:expr) => {
+            let called = patiently($name, $call).await;
+            answers.insert($name, answer(called, ids));
+        };
+    }
+    ask!(
+        "GetRoom",
+        rooms.get_room(v1::GetRoomRequest {
+            room_id: room_id.clone(),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "CloseRoom",
+        rooms.close_room(v1::CloseRoomRequest {
+            room_id: room_id.clone(),
+            owner_token: wrong(room_id),
+        })
+    );
+    let mut spectators = SpectatorServiceClient::new(client.channel());
+    ask!(
+        "Watch",
+        spectators.watch(v1::SpectatorServiceWatchRequest {
+            room_id: room_id.clone(),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "GetRecord",
+        records.get_record(v1::GetRecordRequest {
+            game_id: ids.game.clone(),
+        })
+    );
+    ask!(
+        "CreateRoom, branch",
+        rooms.create_room(v1::CreateRoomRequest {
+            start: Some(Start::Branch(branch_point(ids))),
+            ..Default::default()
+        })
+    );
+    let replayed = v1::SeatConfig {
+        filled_by: Some(seat_config::FilledBy::Replay(v1::RecordedPlayer {
+            game_id: ids.game.clone(),
+            seat: 0,
+        })),
+        ..Default::default()
+    };
+    ask!(
+        "CreateRoom, replay",
+        rooms.create_room(v1::CreateRoomRequest {
+            seats: vec![replayed; 4],
+            request_id: USED.to_vec(),
+            ..Default::default()
+        })
+    );
+    ask!("Run, branch", run(client, ids));
+    ask!(
+        "GetTournament",
+        tournaments.get_tournament(v1::GetTournamentRequest {
+            tournament_id: tournament_id.clone(),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "FollowTournament",
+        tournaments.follow_tournament(v1::FollowTournamentRequest {
+            tournament_id: tournament_id.clone(),
+        })
+    );
+    ask!(
+        "GetTournamentResults",
+        tournaments.get_tournament_results(v1::GetTournamentResultsRequest {
+            tournament_id: tournament_id.clone(),
+        })
+    );
+    ask!(
+        "ListTournamentGames",
+        tournaments.list_tournament_games(v1::ListTournamentGamesRequest {
+            tournament_id: tournament_id.clone(),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "StartTournament",
+        tournaments.start_tournament(v1::StartTournamentRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+        })
+    );
+    ask!(
+        "CloseTournament",
+        tournaments.close_tournament(v1::CloseTournamentRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+        })
+    );
+    ask!(
+        "AddTableParticipant",
+        tournaments.add_table_participant(v1::AddTableParticipantRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "GetPhysicalTable",
+        tournaments.get_physical_table(v1::GetPhysicalTableRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    answers
+}
+
+/// Starts a batch of games from a recorded one; the first message says whether that is allowed.
+async fn run(client: &Client, ids: &Ids) -> Result<Response<()>, Status> {
+    let setup = v1::VectorSetup {
+        games: 1,
+        start: Some(vector_setup::Start::Branch(branch_point(ids))),
+        ..Default::default()
+    };
+    let request = v1::RunRequest {
+        request: Some(run_request::Request::Setup(Box::new(setup))),
+    };
+    // The stream of requests stays open until the answer has come.
+    let requests = tokio_stream::StreamExt::chain(iter([request]), tokio_stream::pending());
+    let mut service = VectorServiceClient::new(client.channel());
+    let mut responses = service.run(requests).await?.into_inner();
+    responses.message().await?.expect("an answer");
+    Ok(Response::new(()))
+}
+
+/// The calls that name something by its id, with a join code that is wrong.
+async fn asked_with_codes(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
+    let mut rooms = RoomServiceClient::new(client.channel());
+    let mut tournaments = TournamentServiceClient::new(client.channel());
+    let join_code = "BCDFGHJK".to_owned();
+    let (room_id, tournament_id) = (ids.room.clone(), ids.tournament.clone());
+    BTreeMap::from([
+        (
+            "GetRoom",
+            answer(
+                rooms
+                    .get_room(v1::GetRoomRequest {
+                        room_id: room_id.clone(),
+                        join_code: join_code.clone(),
+                    })
+                    .await,
+                ids,
+            ),
+        ),
+        (
+            "JoinRoom",
+            answer(
+                rooms
+                    .join_room(v1::JoinRoomRequest {
+                        room_id,
+                        join_code: join_code.clone(),
+                        ..Default::default()
+                    })
+                    .await,
+                ids,
+            ),
+        ),
+        (
+            "GetTournament",
+            answer(
+                tournaments
+                    .get_tournament(v1::GetTournamentRequest {
+                        tournament_id: tournament_id.clone(),
+                        join_code: join_code.clone(),
+                    })
+                    .await,
+                ids,
+            ),
+        ),
+        (
+            "JoinTournament",
+            answer(
+                tournaments
+                    .join_tournament(v1::JoinTournamentRequest {
+                        tournament_id,
+                        join_code,
+                        ..Default::default()
+                    })
+                    .await,
+                ids,
+            ),
+        ),
+    ])
+}
+
+/// The ids that each list has.
+async fn lists(client: &Client) -> BTreeMap<&'static str, BTreeSet<String>> {
+    let rooms = client.list_rooms(v1::ListRoomsRequest::default()).await;
+    let rooms = rooms.expect("a list").rooms.into_iter();
+    let tournaments = client
+        .list_tournaments(v1::ListTournamentsRequest::default())
+        .await;
+    let tournaments = tournaments.expect("a list").tournaments.into_iter();
+    let records = client.list_records(v1::ListRecordsRequest::default()).await;
+    let records = records.expect("a list").records.into_iter();
+    let mut streamed = BTreeSet::new();
+    let mut stream = RecordServiceClient::new(client.channel())
+        .stream_records(v1::StreamRecordsRequest::default())
+        .await
+        .expect("a stream")
+        .into_inner();
+    while let Some(part) = stream.message().await.expect("no error") {
+        streamed.extend(part.lines.into_iter().filter_map(|line| match line.line {
+            Some(Line::Header(header)) => Some(header.game_id),
+            _ => None,
+        }));
+    }
+    BTreeMap::from([
+        ("ListRooms", rooms.map(|it| it.room_id).collect()),
+        (
+            "ListTournaments",
+            tournaments.map(|it| it.tournament_id).collect(),
+        ),
+        ("ListRecords", records.map(|it| it.game_id).collect()),
+        ("StreamRecords", streamed),
+    ])
+}
+
+/// Compares what every caller gets for every subject with what it gets for the public one, if it
+/// sees the subject, or for what does not exist.
+async fn check(server: &Server, subjects: &[Subject], ids_of: impl Fn(usize) -> Ids, when: &str) {
+    let public_ids = ids_of(0);
+    for (index, subject) in subjects.iter().enumerate() {
+        let other = &subjects[(index + 1) % subjects.len()];
+        for (name, client, belongs) in callers(server, subject, other).await {
+            let who = format!("{name}, {:?}, {when}", subject.visibility);
+            let ids = ids_of(index);
+            let reached = belongs || subject.visibility != Visibility::Private;
+            let twin = match reached {
+                true => public_ids.clone(),
+                false => Ids::unknown(),
+            };
+            let expected = asked(&client, &twin).await;
+            for (call, answer) in asked(&client, &ids).await {
+                let who = format!("{call}, {who}");
+                match reached {
+                    true => assert_eq!(answer.kind(), expected[call].kind(), "{who}"),
+                    // To the byte.
+                    false => assert_eq!(answer, expected[call], "{who}"),
+                }
+            }
+            let is_listed = belongs || subject.visibility == Visibility::Public;
+            for (list, found) in lists(&client).await {
+                let has = |ids: &Ids| {
+                    let ids = [&ids.room, &ids.game, &ids.tournament];
+                    ids.iter().any(|id| found.contains(*id))
+                };
+                assert_eq!(has(&ids), is_listed && has(&public_ids), "{list}, {who}");
+            }
+        }
+    }
+}
+
+async fn everything_for_everybody(mode: AccessSettings) {
+    let server = Server::start(mode).await;
+    let host = match server.settings.mode {
+        Some(Mode::Tokens) => Some(server.token(Role::Host, None)),
+        _ => None,
+    };
+    let client = server.client(host.as_deref(), &[]).await;
+    let used = v1::CreateRoomRequest {
+        request_id: USED.to_vec(),
+        ..Default::default()
+    };
+    client.create_room(used).await.expect("a room");
+    let mut subjects = Vec::new();
+    for visibility in VISIBILITIES {
+        subjects.push(Subject::new(&client, visibility).await);
+    }
+    let first = |index: usize| subjects[index].ids.clone();
+    check(&server, &subjects, first, "before").await;
+
+    let mut games = Vec::new();
+    for subject in &subjects {
+        games.push(subject.play(&client).await);
+    }
+    // The rooms and records of tournaments are those of their tournaments.
+    let called = |index: usize| games[index].clone();
+    check(&server, &subjects, first, "after the end").await;
+    check(&server, &subjects, called, "a tournament's game").await;
+
+    let server = server.restart(ServerConfig::default().retention).await;
+    check(&server, &subjects, first, "after a restart").await;
+    check(&server, &subjects, called, "a tournament's game, restarted").await;
+    // Only the records are left of the rooms.
+    let server = server.restart(Duration::ZERO).await;
+    check(&server, &subjects, first, "without rooms").await;
+    check(
+        &server,
+        &subjects,
+        called,
+        "a tournament's game, without rooms",
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn on_an_open_server_each_sees_what_is_public_or_theirs() {
+    everything_for_everybody(mode(Mode::Open)).await;
+}
+
+#[tokio::test]
+async fn with_tokens_each_sees_what_is_public_or_theirs() {
+    everything_for_everybody(mode(Mode::Tokens)).await;
+}
+
+#[tokio::test]
+async fn a_wrong_join_code_does_not_tell_whether_an_id_is_private_or_unknown() {
+    let server = Server::start(mode(Mode::Open)).await;
+    let client = server.client(None, &[]).await;
+    let [public, private] = [
+        Subject::new(&client, Visibility::Public).await,
+        Subject::new(&client, Visibility::Private).await,
+    ];
+    let stranger = asked_with_codes(&client, &private.ids).await;
+    assert_eq!(stranger, asked_with_codes(&client, &Ids::unknown()).await);
+    let secrets = [&private.tickets[0], &private.participant];
+    let own = client.with_secrets(secrets).expect("secrets");
+    let known = asked_with_codes(&own, &private.ids).await;
+    assert_eq!(known, asked_with_codes(&own, &public.ids).await);
+    assert_ne!(known, stranger);
+}
+
+#[tokio::test]
+async fn a_join_code_shows_a_private_room_and_lets_join() {
+    let server = Server::start(mode(Mode::Open)).await;
+    let client = server.client(None, &[]).await;
+    let created = client
+        .create_room(v1::CreateRoomRequest {
+            policy: Some(v1::RoomPolicy {
+                visibility: Visibility::Private.into(),
+                ..Default::default()
+            }),
+            ..Default::default()
+        })
+        .await
+        .expect("a room");
+    let id = created.room.expect("a room").room_id;
+    let request = v1::GetRoomRequest {
+        join_code: created.join_code.clone(),
+        ..Default::default()
+    };
+    let mut service = RoomServiceClient::new(client.channel());
+    let shown = service
+        .get_room(request)
+        .await
+        .expect("shown")
+        .into_inner()
+        .room;
+    assert_eq!(shown.expect("a room").room_id, id);
+    let joined = client.join_with_code(&created.join_code, "guest");
+    let ticket = joined.await.expect("joined").ticket;
+    // The owner needs no header to close it, nor does a player to leave it.
+    client.get_room(&id).await.expect_err("no secret");
+    client.leave_room(&ticket).await.expect("left");
+    // The ticket is no longer one.
+    let before = client.with_secrets([&ticket]).expect("a secret");
+    before.get_room(&id).await.expect_err("not any more");
+    let closed = client.close_room(&id, &created.owner_token).await;
+    closed.expect("closed");
+}
+
+#[tokio::test]
+async fn a_token_for_a_private_room_shows_it() {
+    let server = Server::start(mode(Mode::Tokens)).await;
+    let host = server.token(Role::Host, None);
+    let client = server.client(Some(&host), &[]).await;
+    let private = Subject::new(&client, Visibility::Private).await;
+    let other = Subject::new(&client, Visibility::Private).await;
+    let scope = |id: &str| Id::parse(id).expect("an id");
+    let room = Scope::Room(scope(&private.ids.room));
+    let token = server.token(Role::Spectator, Some(room));
+    let scoped = server.client(Some(&token), &[]).await;
+    scoped.get_room(&private.ids.room).await.expect("its room");
+    let rooms = scoped.list_rooms(v1::ListRoomsRequest::default()).await;
+    assert_eq!(rooms.expect("a list").rooms.len(), 1);
+    // Not even that another private room exists, whatever ticket for it is shown.
+    let [hidden, unknown] = [other.ids.clone(), Ids::unknown()];
+    let get = |ids: Ids| {
+        let mut service = RoomServiceClient::new(scoped.channel());
+        let request = v1::GetRoomRequest {
+            room_id: ids.room.clone(),
+            ..Default::default()
+        };
+        async move { answer(service.get_room(request).await, &ids) }
+    };
+    assert_eq!(get(hidden.clone()).await, get(unknown.clone()).await);
+    let player = server.token(Role::Player, Some(room));
+    let player = server.client(Some(&player), &[]).await;
+    let leave = |ids: Ids| {
+        let mut service = RoomServiceClient::new(player.channel());
+        let ticket = Token::random(Id::parse(&ids.room).expect("an id")).to_text();
+        async move {
+            let request = v1::LeaveRoomRequest { ticket };
+            answer(service.leave_room(request).await, &ids)
+        }
+    };
+    assert_eq!(leave(hidden).await, leave(unknown).await);
+    let tournament = Scope::Tournament(scope(&private.ids.tournament));
+    let token = server.token(Role::Spectator, Some(tournament));
+    let scoped = server.client(Some(&token), &[]).await;
+    let shown = scoped.tournament(&private.ids.tournament).await;
+    shown.expect("its tournament");
+}
+
+#[tokio::test]
+async fn a_record_is_whole_for_its_owner_and_as_players_saw_it_for_participants() {
+    for mode in [mode(Mode::Open), mode(Mode::Tokens)] {
+        let is_open = mode.mode == Some(Mode::Open);
+        let server = Server::start(mode).await;
+        let token = |role| (!is_open).then(|| server.token(role, None));
+        let host = token(Role::Host);
+        let client = server.client(host.as_deref(), &[]).await;
+        let player = token(Role::Player);
+        for visibility in VISIBILITIES {
+            let subject = Subject::new(&client, visibility).await;
+            let expression = v1::Expression {
+                label: "secret".into(),
+                record_only: true,
+                ..Default::default()
+            };
+            let ticket = &subject.tickets[0];
+            let expressed = client.express(ticket, expression).await;
+            expressed.expect("expressed");
+            subject.play(&client).await;
+            let is_private = visibility == Visibility::Private;
+            let cases = [
+                (&player, ticket, is_open && !is_private),
+                (&player, &subject.owners[0], true),
+                (&host, ticket, !is_private),
+                (&host, &subject.owners[0], true),
+            ];
+            for (token, secret, whole) in cases {
+                let reader = server.client(token.as_deref(), &[secret]).await;
+                let lines = reader.record(&subject.ids.game).await.expect("a record");
+                let is_owner = secret == &subject.owners[0];
+                let said = format!("{visibility:?}, open: {is_open}, owner: {is_owner}");
+                assert_eq!(format!("{lines:?}").contains("secret"), whole, "{said}");
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn who_may_not_read_records_cannot_branch_from_them() {
+    let server = Server::start(AccessSettings {
+        records: Role::Admin,
+        ..mode(Mode::Tokens)
+    })
+    .await;
+    let host = server.token(Role::Host, None);
+    let client = server.client(Some(&host), &[]).await;
+    let subject = Subject::new(&client, Visibility::Public).await;
+    subject.play(&client).await;
+    let of = |name: &'static str, answers: &BTreeMap<_, Answer>| answers[name].code;
+    let refused = asked(&client, &subject.ids).await;
+    let admin = server.token(Role::Admin, None);
+    let admin = server.client(Some(&admin), &[]).await;
+    let allowed = asked(&admin, &subject.ids).await;
+    assert_eq!(of("GetRecord", &allowed), Code::Ok);
+    for call in [
+        "GetRecord",
+        "CreateRoom, branch",
+        "CreateRoom, replay",
+        "Run, branch",
+    ] {
+        assert_eq!(of(call, &refused), Code::PermissionDenied, "{call}");
+        assert_ne!(of(call, &allowed), Code::PermissionDenied, "{call}");
+    }
+}
+
+#[tokio::test]
+async fn games_that_are_not_public_are_not_rated() {
+    let server = Server::start(mode(Mode::Open)).await;
+    let client = server.client(None, &[]).await;
+    for visibility in [Visibility::Unlisted, Visibility::Private] {
+        Subject::new(&client, visibility).await.play(&client).await;
+    }
+    let board = client
+        .leaderboard(v1::GetLeaderboardRequest::default())
+        .await;
+    assert_eq!(board.expect("a leaderboard").games, 0);
+    let public = Subject::new(&client, Visibility::Public).await;
+    public.play(&client).await;
+    let rated = async {
+        loop {
+            let board = client
+                .leaderboard(v1::GetLeaderboardRequest::default())
+                .await;
+            // The room's game: in the tournament one participant has several seats' names.
+            if board.expect("a leaderboard").games > 0 {
+                break;
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    };
+    patiently("the public game to be rated", rated).await;
+}
+
+#[tokio::test]
+async fn malformed_secrets_are_refused() {
+    let server = Server::start(mode(Mode::Open)).await;
+    let client = server.client(None, &[]).await;
+    let secret = Token::random(Id::random()).to_text();
+    let ask = |values: Vec<&str>| {
+        let mut request = Request::new(v1::GetServerInfoRequest {});
+        for value in values {
+            let value = value.parse().expect("a value");
+            request.metadata_mut().append(SECRET_HEADER, value);
+        }
+        let mut service = v1::server_service_client::ServerServiceClient::new(client.channel());
+        async move { service.get_server_info(request).await.map(drop) }
+    };
+    ask(vec![&secret; MAX_SECRETS]).await.expect("not too many");
+    let joined = format!("{secret}, {secret}");
+    ask(vec![&joined]).await.expect("as proxies join them");
+    for wrong in [vec!["BCDF2345"], vec![&secret; MAX_SECRETS + 1]] {
+        let status = ask(wrong).await.expect_err("refused");
+        assert_eq!(status.code(), Code::InvalidArgument);
+    }
+}
