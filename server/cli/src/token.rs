@@ -109,7 +109,7 @@ impl TokenCommand {
 
 impl Create {
     fn run(self) -> Result<(), CommandError> {
-        let file = TokenFile::of(&data_dir::prepare(self.place.data_dir)?);
+        let file = TokenFile::of(&data_dir::prepare(self.place.data_dir.clone())?);
         let is_first = file.read()?.is_none();
         let room = self.room.map(Scope::Room);
         let created = file.create(NewToken {
@@ -131,8 +131,12 @@ impl Create {
             say(line)?;
         } else {
             say(link.unwrap_or_else(|| created.to_text()))?;
+            let place = match &self.place.data_dir {
+                Some(folder) => format!(" --data-dir {}", folder.display()),
+                None => String::new(),
+            };
             eprintln!(
-                "this is shown only once; revoke it with `chefshat token revoke {}`",
+                "this is shown only once; revoke it with `chefshat token revoke {}{place}`",
                 created.id
             );
         }

@@ -138,8 +138,12 @@ pub(crate) fn tmux() -> Result<(), Failure> {
     debian_package("tmux")
 }
 
-/// The proxies that are Debian packages, for the tests of docker/proxies.
+/// The proxies that are Debian packages, for the tests of docker/proxies, and what makes the
+/// certificates of docs/access.md.
 pub(crate) fn proxies() -> Result<(), Failure> {
+    if !succeeds("openssl", &["version"]) {
+        debian_package("openssl")?;
+    }
     for name in ["nginx", "haproxy"] {
         if !succeeds(format!("/usr/sbin/{name}"), &["-v"]) {
             debian_package(name)?;

@@ -23,6 +23,8 @@ from chefshat.outcome import Played
 from chefshat.participant import MakeAgent
 from chefshat.ticket_file import TicketFile
 
+#: Environment variable that may contain the address of a server, for commands that play on one.
+SERVER = "CHEFSHAT_SERVER"
 #: Environment variable that may contain a ticket.
 TICKET = "CHEFSHAT_TICKET"
 
@@ -53,14 +55,17 @@ class JoinOptions:
 
 
 def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False, default: str | None = None) -> None:
-    """Adds --address (and other `flags` for the same), --token and --ca."""
+    """Adds --address (and other `flags` for the same), --token and --ca. A required address may come from the environment."""
     what = "the server" if required or default else "a running server"
     unless = f" (default: {default})" if default else ""
+    if required:
+        unless = f" (default: that of the environment variable {SERVER})"
+        default = os.environ.get(SERVER)
     parser.add_argument(
         *flags,
         "--address",
         dest="address",
-        required=required,
+        required=required and default is None,
         default=default,
         metavar="ADDRESS",
         help=f"{what}, HOST:PORT or https://HOST:PORT{unless}",
