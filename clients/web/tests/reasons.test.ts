@@ -31,6 +31,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "REQUEST_ID_REFUSED",
     "REQUEST_ID_USED",
     "SCRIPT_REFUSED",
+    "SECRETS_REFUSED",
     "SEED_REFUSED",
     "SNAPSHOT_DELAYED",
     "STATE_REFUSED",

@@ -222,7 +222,7 @@ test("a room closed before its game has no last questionnaire, and a room that i
   const gone = "0".repeat(32);
   await page.evaluate((id) => localStorage.setItem(`chefshat.study.${id}`, "?hide=pages"), gone);
   await page.goto(`${server.url}/rooms/${gone}`);
-  await page.getByText("This room no longer exists.").waitFor();
+  await page.getByText("This room no longer exists, or it is private.").waitFor();
   expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
   expect(await page.locator('[data-part~="error-page"]').getByRole("link").count()).toBe(0);
 });

@@ -16,7 +16,7 @@ export const faults: Texts["faults"] = {
     TOKEN_EXPIRED: "Il token del tuo link è scaduto. Chiedi un nuovo link a chi gestisce il server.",
     ROLE_TOO_LOW: "Il tuo link non lo permette. Chiedine uno adatto a chi gestisce il server.",
     OUT_OF_SCOPE: "Il tuo link vale per un’altra stanza o un altro torneo.",
-    ROOM_UNKNOWN: "Questa stanza non esiste più.",
+    ROOM_UNKNOWN: "Questa stanza non esiste più, oppure è privata.",
     ROOM_FULL: "Tutti i posti di questa stanza sono occupati.",
     SEAT_TAKEN: "Qualcun altro ha appena preso questo posto.",
     NO_SUCH_SEAT: "Questa stanza non ha quel posto.",
@@ -58,11 +58,11 @@ export const faults: Texts["faults"] = {
     ROOM_GONE: "Questa stanza si è appena chiusa, o il server si sta fermando. Riprova tra poco.",
     INTERNAL: "Il server non è riuscito a farlo. Riprova; se non basta, avvisa chi gestisce il server.",
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite riprendono al suo ritorno.",
-    GAME_UNKNOWN: "Il server non ha la registrazione di questa partita.",
+    GAME_UNKNOWN: "Il server non ha la registrazione di questa partita, oppure è privata.",
     GAME_RUNNING: "La partita è ancora in corso. La registrazione sarà disponibile alla fine.",
     SERIES_OPEN:
       "Altre partite con le stesse carte sono ancora in corso. La registrazione sarà disponibile alla fine del turno.",
-    TOURNAMENT_UNKNOWN: "Questo torneo non esiste.",
+    TOURNAMENT_UNKNOWN: "Questo torneo non esiste, oppure è privato.",
     TOURNAMENT_STARTED: "Il torneo è già iniziato.",
     TOO_FEW_PARTICIPANTS: "Prima dell’inizio devono iscriversi almeno due partecipanti.",
     TOO_MANY_TOURNAMENTS:
