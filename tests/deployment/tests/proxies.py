@@ -116,6 +116,8 @@ class Nginx(Proxy):
         return [
             ("server server:50051;", f"server {server};"),
             ("listen 443 ", f"listen {self.address} "),
+            # Not every machine has IPv6.
+            ("listen [::]:443 ", "# "),
             ("/etc/chefshat/tls", str(self._tls)),
             ("http {", f"http {{{temporary}"),
         ]
@@ -139,6 +141,16 @@ class HAProxy(Proxy):
             ("server chefshat server:50051 ", f"server chefshat {server} "),
             ("bind :443 ", f"bind {self.address} "),
             ("/etc/chefshat/tls", str(self._tls)),
+            *self._of_this_machine(),
+        ]
+
+    def _of_this_machine(self) -> list[tuple[str, str]]:
+        """Only root can become another user, and not every machine has IPv6."""
+        identity = "    user haproxy\n    group haproxy\n"
+        return [
+            (identity, identity if os.geteuid() == 0 else ""),
+            ("/run/haproxy/admin.sock", f"{self._folder}/admin.sock"),
+            ("bind :::443 ", "# "),
         ]
 
     def _start(self) -> None:
@@ -154,7 +166,11 @@ class HAProxyPassingThrough(HAProxy):
     files = ("haproxy-passing-through.cfg",)
 
     def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
-        return [("server chefshat server:50051", f"server chefshat {server}"), ("bind :443", f"bind {self.address}")]
+        return [
+            ("server chefshat server:50051", f"server chefshat {server}"),
+            ("bind :443", f"bind {self.address}"),
+            *self._of_this_machine(),
+        ]
 
 
 class Envoy(Proxy):
@@ -173,6 +189,8 @@ class Envoy(Proxy):
         return [
             ("address: server, port_value: 50051", f"address: {host}, port_value: {port}"),
             ("address: 0.0.0.0, port_value: 443", f"address: {self.host}, port_value: {_PORT}"),
+            # Not every machine has IPv6.
+            ("additional_addresses: ", "# "),
             ("address: 127.0.0.1, port_value: 9901", f"address: {self.host}, port_value: 9901"),
             ("/etc/chefshat/envoy-certificate.yaml", str(self._folder / "envoy-certificate.yaml")),
         ]

@@ -94,4 +94,5 @@ def test_nothing_is_overwritten_and_damaged_copies_are_refused(server: GuardedSe
         assert not (tmp_path / "new").exists()
     missing = attempt("backup", tmp_path / "other", "--data-dir", tmp_path / "nowhere")
     assert missing.returncode == 1
+    assert "nowhere" in missing.stderr
     assert not list(tmp_path.glob("other*"))

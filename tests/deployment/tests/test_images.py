@@ -88,13 +88,13 @@ def check(images: Images, server_image: str, agent_image: str) -> None:
 
 def create_token(container: Container, environment: dict[str, str]) -> str:
     """Creates a token in the data directory of a container."""
-    token = None
     # Buildah can lose the output of a program that ends at once.
-    while token is None:
+    for _ in range(10):
         code, output = container.run("token", "create", "--role", "host", "--json", environment=environment)
         assert code == 0, output
-        token = re.search(r'"token":"([^"]+)"', output)
-    return token[1]
+        if token := re.search(r'"token":"([^"]+)"', output):
+            return token[1]
+    raise AssertionError("the container printed no token")
 
 
 def play(address: str, token: str, agent: Container) -> str:

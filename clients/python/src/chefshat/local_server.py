@@ -88,7 +88,7 @@ class LocalServer:
         self._options = list(options)
         self._process: subprocess.Popen[str] | None = None
         # Closed with this object.
-        self._log = tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self._log = tempfile.TemporaryFile("a+")  # noqa: SIM115
         weakref.finalize(self, self._log.close)
         self.address = f"{host}:0"
 
