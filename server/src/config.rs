@@ -32,8 +32,9 @@ pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
 pub const MAX_VECTOR_BATCH_BYTES: usize = 16 * 1024 * 1024;
 /// Most vector streams at a time.
 pub const MAX_VECTOR_STREAMS: usize = 128;
-/// Most seats played on all vector streams together, games times seats: about 5 KB each.
-pub const MAX_VECTOR_SEATS_IN_ALL: usize = 131_072;
+/// Most seats played on all vector streams together, games times seats: about 5 KB each. The
+/// default share of one caller is as many as one stream may have.
+pub const MAX_VECTOR_SEATS_IN_ALL: usize = 163_840;
 /// Most game seeds in one message.
 pub const MAX_VECTOR_SEEDS: usize = 16_384;
 /// Most games of a vector stream with records.

@@ -38,7 +38,7 @@ const LOG_INTERVAL: Duration = Duration::from_secs(60);
 /// its first frame. No request of HTTP/1.1 is shorter, and its headers have a time limit, too.
 const FIRST_BYTES: usize = 33;
 /// How long a client may take to read an answer.
-const STALLED_LIMIT: Duration = Duration::from_secs(30);
+pub(crate) const STALLED_LIMIT: Duration = Duration::from_secs(30);
 /// Time between two checks of that.
 const STALLED_INTERVAL: Duration = Duration::from_secs(5);
 

@@ -1,10 +1,10 @@
-//! Reads recorded games for the services, a few at a time, on blocking threads. The work itself
-//! holds its permit, so a cancelled call does not make room for another before its work has ended.
+//! Reads recorded games for the services, a few at a time and for callers in turns, on blocking
+//! threads. The work itself holds its place, so a cancelled call does not make room for another
+//! before its work has ended.
 
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Code, Status};
 
 use super::access::refused;
@@ -13,6 +13,7 @@ use super::status::{self, status};
 use crate::access::{Caller, Refusal, Role};
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert::lines_of;
+use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use chefshat_room::ids::Id;
@@ -27,16 +28,17 @@ pub struct Recorded {
     /// The role that is required to read records.
     required: Role,
     /// Limits how many records are assembled at a time, because they are large.
-    permits: Arc<Semaphore>,
+    places: Arc<Places>,
 }
 
 impl Recorded {
     /// Creates a reader of the recorded games that callers with the role `required` reach.
     pub fn new(reach: Reach, required: Role) -> Self {
+        let places = Places::new(MAX_CONCURRENT_RECORDS, reach.rooms().shares());
         Self {
             reach,
             required,
-            permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
+            places,
         }
     }
 
@@ -77,7 +79,7 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        let permit = permit(&self.permits).await;
+        let place = self.places.take(Key::of_caller(caller)).await;
         let stored = (self.rooms().store().finished(game).await)
             .map_err(read_failed)?
             .ok_or_else(unknown)?;
@@ -90,22 +92,17 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        in_background(permit, move || work(lines_of(&stored).into_owned(), sight)).await
+        in_background(place, move || work(lines_of(&stored).into_owned(), sight)).await
     }
 
     /// Runs work that needs as much memory as a record.
-    pub(super) async fn with_permit<T: Send + 'static>(
+    pub(super) async fn with_place<T: Send + 'static>(
         &self,
+        key: Key,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        in_background(permit(&self.permits).await, work).await
+        in_background(self.places.take(key).await, work).await
     }
-}
-
-/// Waits for a permit.
-pub(super) async fn permit(permits: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
-    // The semaphore is never closed; if it were, the request would merely not wait.
-    Arc::clone(permits).acquire_owned().await.ok()
 }
 
 /// The status for a client when the store cannot be read.
@@ -114,13 +111,13 @@ pub(super) fn read_failed(error: StoreError) -> Status {
     status::internal()
 }
 
-/// Runs work that takes milliseconds on a blocking thread. The permit is released when it ends.
+/// Runs work that takes milliseconds on a blocking thread. The place is free when it ends.
 async fn in_background<T: Send + 'static>(
-    permit: Option<OwnedSemaphorePermit>,
+    place: Held,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Status> {
     let working = tokio::task::spawn_blocking(move || {
-        let _permit = permit;
+        let _place = place;
         work()
     });
     working.await.map_err(|error| {

@@ -225,7 +225,7 @@ impl RecordService for Records {
             let summary = replay::replay(&lines).map(|replayed| summary(&lines, &replayed));
             (Arc::<[v1::RecordLine]>::from(lines), summary)
         };
-        let (lines, summary) = self.recorded.with_permit(replaying).await?;
+        let (lines, summary) = self.recorded.with_place(key, replaying).await?;
         let summary = summary
             .map_err(|error| refused(error.line, &error.problem))?
             .ok_or_else(|| refused(1, "the game has no deal"))?;

@@ -16,16 +16,12 @@ use super::recorded::Recorded;
 use super::status::{self, Refusal, field, request_id, ticket_unknown};
 use crate::access::Caller;
 use crate::convert;
-use crate::limits::{CallLimits, Key};
+use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key};
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::ParticipantKind;
 
-/// Calls that creating a room counts as: it is written to the disk, with its game and record.
-const COST_OF_ROOM: u64 = 20;
-/// The same if the server plays all seats.
-const COST_OF_BUILT_IN_GAME: u64 = 100;
 /// Rooms examined for one page.
 const ROOMS_LOOKED_AT: usize = 200;
 

@@ -29,7 +29,7 @@ use crate::config::{
     MAX_LEADERBOARD_LINES,
 };
 use crate::convert;
-use crate::limits::{CallLimits, Key, Places, Refused};
+use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
@@ -40,9 +40,6 @@ use chefshat_room::journal::ParticipantKind;
 
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;
-
-/// Calls that creating a tournament counts as: its games cost far more than the request.
-const COST_OF_TOURNAMENT: u64 = 100;
 
 /// The service.
 #[derive(Debug, Clone)]

@@ -20,7 +20,7 @@ use chefshat_simulation::vector::{
 use prost::Message as _;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::mpsc::error::SendTimeoutError;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -37,7 +37,7 @@ use crate::config::{
 };
 use crate::convert;
 use crate::convert::Reset;
-use crate::limits::{Held, Places, Refused};
+use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
 use chefshat_record::convert::Played;
 use chefshat_room::ids::random_bytes;
@@ -57,8 +57,8 @@ pub struct Vectors {
     recorded: Recorded,
     pool: Arc<ThreadPool>,
     streams: Arc<Places>,
-    /// Permits for games times seats that clients play.
-    seats: Arc<Semaphore>,
+    /// Places for games times seats that clients play.
+    seats: Arc<Places>,
     closing: CancellationToken,
 }
 
@@ -82,7 +82,7 @@ impl Vectors {
             recorded,
             pool: Arc::new(pool),
             streams: Places::new(MAX_VECTOR_STREAMS, shares),
-            seats: Arc::new(Semaphore::new(MAX_VECTOR_SEATS_IN_ALL)),
+            seats: Places::new(MAX_VECTOR_SEATS_IN_ALL, shares),
             closing,
         })
     }
@@ -259,12 +259,13 @@ impl Runner {
             })
     }
 
-    /// Reserves the seats of these games among those of all streams, until the permit is dropped.
-    fn reserve(&self, setup: &VectorSetup) -> Result<OwnedSemaphorePermit, Status> {
-        let seats = setup.games() * convert::number(setup.client_seats().count());
-        Arc::clone(&self.service.seats)
-            .try_acquire_many_owned(seats)
-            .map_err(|_| too_many_games(seats))
+    /// Reserves the seats of these games among those of all streams, until they are dropped.
+    fn reserve(&self, setup: &VectorSetup) -> Result<Held, Status> {
+        let key = Key::of_caller(&self.caller);
+        let games = usize::try_from(setup.games()).unwrap_or(usize::MAX);
+        let seats = &self.service.seats;
+        let reserved = seats.try_take_many(key, games * setup.client_seats().count());
+        Ok(reserved.ok_or_else(|| Refusal::from(too_many_seats(seats.share_of(key))))?)
     }
 
     /// Checks a setup message and reads the recorded game it names.
@@ -487,21 +488,13 @@ fn too_many(limit: usize) -> Refused {
     }
 }
 
-fn too_many_games(seats: u32) -> Status {
-    status(
-        Code::ResourceExhausted,
-        "TOO_MANY_VECTOR_GAMES",
-        format!(
-            "these games have {seats} seats in total, and all streams of this server together may play {MAX_VECTOR_SEATS_IN_ALL}; play fewer games, or wait until others have ended"
-        ),
-        [
-            ("limit", "max_vector_seats_in_all"),
-            (
-                "max_vector_seats_in_all",
-                &MAX_VECTOR_SEATS_IN_ALL.to_string(),
-            ),
-        ],
-    )
+fn too_many_seats(limit: usize) -> Refused {
+    Refused {
+        reason: "TOO_MANY_VECTOR_GAMES",
+        what: "too many vector games (counted times the seats that their client plays); play fewer, or end others",
+        limit: limit as u64,
+        retry_after: VECTOR_SETUP_TIMEOUT,
+    }
 }
 
 fn setup_too_late() -> Status {

@@ -14,13 +14,13 @@ use tracing::error;
 use super::{Held, Key, Places, Rate, Shares};
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
-const MAX_GAMES: usize = 32;
+pub(super) const MAX_GAMES: usize = 32;
 /// 1/N of the cores play them.
 const CORES: usize = 4;
 /// How much the threads give way to others: as much as the system allows.
 const NICENESS: i32 = 19;
 /// Longest time for which decisions may be made faster than the rate.
-const BURST: Duration = Duration::from_secs(60);
+pub(super) const BURST: Duration = Duration::from_secs(60);
 
 /// Plays the games of built-in agents.
 #[derive(Debug)]

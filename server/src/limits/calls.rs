@@ -7,34 +7,40 @@ use std::time::Duration;
 use super::{Held, Key, Places, Rate, Refused, Shares};
 
 /// Most streams of all callers, except those that have limits of their own.
-const MAX_STREAMS: usize = 20_000;
+pub(super) const MAX_STREAMS: usize = 20_000;
 /// Most answers of all callers that have not been read.
-const MAX_ANSWERS: usize = 1_024;
+pub(super) const MAX_ANSWERS: usize = 1_024;
 /// Most calls of all callers that are executed at a time.
-const MAX_EXECUTED: usize = 64;
+pub(super) const MAX_EXECUTED: usize = 64;
 /// Most lists of rooms that are made at a time: each asks many rooms.
-const MAX_LISTS: usize = 4;
+pub(super) const MAX_LISTS: usize = 4;
 /// Most calls of all callers that wait for something.
-const MAX_WAITING: usize = 16_384;
+pub(super) const MAX_WAITING: usize = 16_384;
 /// Calls of one caller in a second; an answer counts as one more call for each 512 bytes.
-const CALLS_PER_SECOND: u64 = 2_000;
+pub(super) const CALLS_PER_SECOND: u64 = 2_000;
 /// Calls of one caller at once.
-const CALLS_AT_ONCE: u64 = 20_000;
+pub(super) const CALLS_AT_ONCE: u64 = 20_000;
 /// Bytes of an answer that cost as much as one call.
 pub const BYTES_PER_CALL: u64 = 512;
 /// Calls that opening a stream counts as.
-const COST_OF_STREAM: u64 = 5;
+pub(super) const COST_OF_STREAM: u64 = 5;
+/// Calls that creating a room counts as: it is written to the disk, with its game and record.
+pub const COST_OF_ROOM: u64 = 20;
+/// The same if the server plays all seats.
+pub const COST_OF_BUILT_IN_GAME: u64 = 100;
+/// Calls that creating a tournament counts as: its games cost far more than the request.
+pub const COST_OF_TOURNAMENT: u64 = 100;
 /// Longest time that a call waits until its caller may make another one.
-const MAX_WAIT: Duration = Duration::from_secs(5);
+pub(super) const MAX_WAIT: Duration = Duration::from_secs(5);
 /// How long a refusal takes: whoever ignores it and calls again waits each time.
 const REFUSAL_DELAY: Duration = Duration::from_secs(1);
 /// Wrong join codes of one caller in a second, and at once.
-const WRONG_CODES_PER_SECOND: u64 = 1;
-const WRONG_CODES_AT_ONCE: u64 = 100;
+pub(super) const WRONG_CODES_PER_SECOND: u64 = 1;
+pub(super) const WRONG_CODES_AT_ONCE: u64 = 100;
 /// Wrong join codes of all callers in a second, and at once. Beyond them, callers that have just
 /// sent wrong codes are refused.
-const ALL_WRONG_CODES_PER_SECOND: u64 = 50;
-const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
+pub(super) const ALL_WRONG_CODES_PER_SECOND: u64 = 50;
+pub(super) const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
 
 /// What the calls of all callers take.
 #[derive(Debug)]

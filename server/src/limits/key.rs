@@ -4,7 +4,7 @@ use std::net::{IpAddr, Ipv6Addr};
 
 use chefshat_room::ids::Id;
 
-use crate::access::TokenId;
+use crate::access::{Caller, TokenId};
 
 /// Who is charged. Addresses of one IPv6 network count as one: a client has many of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -34,6 +34,14 @@ impl Key {
                 Self::Address(Ipv6Addr::from_bits(network).into())
             }
             Some(address) => Self::Address(address),
+        }
+    }
+
+    /// The key of a caller.
+    pub fn of_caller(caller: &Caller) -> Self {
+        match caller.token {
+            Some(token) => Self::Token(token),
+            None => Self::of_address(caller.address),
         }
     }
 

@@ -6,13 +6,17 @@ mod background;
 mod calls;
 mod frames;
 mod key;
+#[cfg(test)]
+mod page;
 mod places;
 mod rate;
 
 use std::time::Duration;
 
 pub use background::{Background, Turn};
-pub use calls::{Admitted, BYTES_PER_CALL, CallLimits};
+pub use calls::{
+    Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
+};
 pub use frames::Metered;
 pub use key::{Key, Shares};
 pub use places::{Held, Places};

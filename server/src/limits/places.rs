@@ -1,7 +1,7 @@
 //! A limited number of places, shared by all callers: nobody has more than its share, and those
 //! that wait get the next free place in turns, one caller after another.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use tokio::sync::oneshot;
@@ -19,9 +19,30 @@ pub struct Places {
 #[derive(Debug, Default)]
 struct State {
     taken: usize,
-    by_key: HashMap<Key, usize>,
-    /// Callers that wait, in the order of their next turn, with those who wait for each.
-    waiting: VecDeque<(Key, VecDeque<oneshot::Sender<Held>>)>,
+    /// Callers that have places or wait for one.
+    callers: HashMap<Key, Caller>,
+    /// Callers that wait, in the order of their next turn.
+    turns: VecDeque<Key>,
+    /// Number of the next one that waits.
+    next: u64,
+}
+
+#[derive(Debug, Default)]
+struct Caller {
+    taken: usize,
+    /// Those that wait for one place each, by number. A flood makes this long: nothing may search
+    /// it.
+    waiting: BTreeMap<u64, oneshot::Sender<Held>>,
+}
+
+impl State {
+    /// Removes a caller that has nothing and waits for nothing.
+    fn forget_idle(&mut self, key: Key) {
+        let is_idle = |caller: &Caller| caller.taken == 0 && caller.waiting.is_empty();
+        if self.callers.get(&key).is_some_and(is_idle) {
+            self.callers.remove(&key);
+        }
+    }
 }
 
 impl Places {
@@ -49,93 +70,89 @@ impl Places {
         self.lock().taken
     }
 
-    /// Takes a place if one is free, the caller's share is not used up, and nobody at the caller's
-    /// address waits.
+    /// Takes a place if one is free, the caller's share is not used up, and the caller does not
+    /// wait for another one.
     pub fn try_take(self: &Arc<Self>, key: Key) -> Option<Held> {
-        let mut state = self.lock();
-        let waits = state.waiting.iter().any(|(waiting, _)| *waiting == key);
-        (!waits && self.has_place(&state, key)).then(|| self.hold(&mut state, key))
+        self.try_take_many(key, 1)
+    }
+
+    /// Takes this number of places, or none.
+    pub fn try_take_many(self: &Arc<Self>, key: Key, count: usize) -> Option<Held> {
+        self.take_now(&mut self.lock(), key, count)
     }
 
     /// Waits for a place.
     pub async fn take(self: &Arc<Self>, key: Key) -> Held {
-        if let Some(held) = self.try_take(key) {
-            return held;
-        }
-        let (sender, granted) = oneshot::channel();
-        {
+        let (granted, _waiting) = {
             let mut state = self.lock();
-            match state
-                .waiting
-                .iter_mut()
-                .find(|(waiting, _)| *waiting == key)
-            {
-                Some((_, senders)) => senders.push_back(sender),
-                None => state.waiting.push_back((key, [sender].into())),
+            if let Some(held) = self.take_now(&mut state, key, 1) {
+                return held;
             }
-        }
-        // A place may have been freed between the two locks.
-        self.grant();
+            let (sender, granted) = oneshot::channel();
+            let number = state.next;
+            state.next += 1;
+            let caller = state.callers.entry(key).or_default();
+            let is_first = caller.waiting.is_empty();
+            caller.waiting.insert(number, sender);
+            if is_first {
+                state.turns.push_back(key);
+            }
+            let places = self;
+            let waiting = Waiting {
+                places,
+                key,
+                number,
+            };
+            (granted, waiting)
+        };
         granted.await.expect("those that wait stay in the queue")
     }
 
-    fn has_place(&self, state: &State, key: Key) -> bool {
-        let own = state.by_key.get(&key).copied().unwrap_or_default();
-        state.taken < self.total && own < self.share_of(key)
+    fn take_now(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Option<Held> {
+        let waits = (state.callers.get(&key)).is_some_and(|caller| !caller.waiting.is_empty());
+        (!waits && self.has_places(state, key, count)).then(|| self.hold(state, key, count))
     }
 
-    fn hold(self: &Arc<Self>, state: &mut State, key: Key) -> Held {
-        state.taken += 1;
-        *state.by_key.entry(key).or_default() += 1;
+    fn has_places(&self, state: &State, key: Key, count: usize) -> bool {
+        let own = state.callers.get(&key).map_or(0, |caller| caller.taken);
+        state.taken + count <= self.total && own + count <= self.share_of(key)
+    }
+
+    fn hold(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Held {
+        state.taken += count;
+        state.callers.entry(key).or_default().taken += count;
         Held {
             places: Arc::clone(self),
             key,
+            count,
         }
     }
 
-    /// Gives free places to those that wait.
-    fn grant(self: &Arc<Self>) {
-        let mut granted = Vec::new();
-        let mut state = self.lock();
-        let mut passed = 0;
-        while passed < state.waiting.len() && state.taken < self.total {
-            let (key, mut senders) = state.waiting.pop_front().expect("someone waits");
-            // Those that have given up are not asked again.
-            senders.retain(|sender| !sender.is_closed());
-            if self.has_place(&state, key)
-                && let Some(sender) = senders.pop_front()
-            {
-                granted.push((sender, self.hold(&mut state, key)));
-                passed = 0;
-            } else {
-                passed += 1;
-            }
-            if senders.is_empty() {
-                passed = passed.saturating_sub(1);
-            } else {
-                state.waiting.push_back((key, senders));
-            }
+    /// Gives a free place to the next one that waits.
+    fn grant(self: &Arc<Self>, state: &mut State) -> Option<(oneshot::Sender<Held>, Held)> {
+        let mut turns = state.turns.iter();
+        let turn = turns.position(|key| self.has_places(state, *key, 1))?;
+        let key = state.turns.remove(turn)?;
+        let caller = state.callers.get_mut(&key)?;
+        let (_, sender) = caller.waiting.pop_first()?;
+        if !caller.waiting.is_empty() {
+            state.turns.push_back(key);
         }
+        Some((sender, self.hold(state, key, 1)))
+    }
+
+    fn free(self: &Arc<Self>, key: Key, count: usize) {
+        let mut state = self.lock();
+        state.taken -= count;
+        if let Some(caller) = state.callers.get_mut(&key) {
+            caller.taken -= count;
+        }
+        let granted: Vec<_> = std::iter::from_fn(|| self.grant(&mut state)).collect();
+        state.forget_idle(key);
         drop(state);
         for (sender, held) in granted {
             // If it has just given up, the place is freed again here.
             let _ = sender.send(held);
-        }
-    }
-
-    fn free(self: &Arc<Self>, key: Key) {
-        let mut state = self.lock();
-        state.taken -= 1;
-        if let Some(own) = state.by_key.get_mut(&key) {
-            *own -= 1;
-            if *own == 0 {
-                state.by_key.remove(&key);
-            }
-        }
-        let anyone_waits = !state.waiting.is_empty();
-        drop(state);
-        if anyone_waits {
-            self.grant();
         }
     }
 
@@ -144,16 +161,37 @@ impl Places {
     }
 }
 
-/// A place, free again when dropped.
+/// Places, free again when dropped.
 #[derive(Debug)]
 pub struct Held {
     places: Arc<Places>,
     key: Key,
+    count: usize,
 }
 
 impl Drop for Held {
     fn drop(&mut self) {
-        self.places.free(self.key);
+        self.places.free(self.key, self.count);
+    }
+}
+
+/// One that waits. When dropped, it waits no longer.
+struct Waiting<'a> {
+    places: &'a Places,
+    key: Key,
+    number: u64,
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        let mut state = self.places.lock();
+        let Some(caller) = state.callers.get_mut(&self.key) else {
+            return;
+        };
+        if caller.waiting.remove(&self.number).is_some() && caller.waiting.is_empty() {
+            state.turns.retain(|key| *key != self.key);
+        }
+        state.forget_idle(self.key);
     }
 }
 
@@ -182,6 +220,38 @@ mod tests {
         drop(first);
         assert!(places.try_take(key(1)).is_some());
         assert_eq!(places.taken(), 2);
+    }
+
+    #[test]
+    fn several_places_are_taken_together_or_not_at_all() {
+        let places = Places::new(8, SHARES);
+        let first = places.try_take_many(key(1), 3).expect("free");
+        assert!(
+            places.try_take_many(key(1), 2).is_none(),
+            "beyond its share"
+        );
+        let _rest = places.try_take_many(key(1), 1).expect("free");
+        let _other = places.try_take_many(key(2), 4).expect("free");
+        assert!(places.try_take(key(3)).is_none(), "none is free");
+        drop(first);
+        assert_eq!(places.taken(), 5);
+        assert!(places.try_take_many(key(3), 3).is_some());
+    }
+
+    #[tokio::test]
+    async fn those_that_give_up_leave_nothing() {
+        let places = Places::new(2, SHARES);
+        let held = places.try_take_many(key(1), 1).expect("free");
+        let mut waiting: Vec<_> = (0..3).map(|_| Box::pin(places.take(key(1)))).collect();
+        for take in &mut waiting {
+            assert!(take.now_or_never().is_none(), "its share is used up");
+        }
+        assert!(places.try_take(key(1)).is_none());
+        drop(waiting);
+        assert!(places.lock().turns.is_empty());
+        drop(held);
+        assert!(places.lock().callers.is_empty());
+        assert!(places.take(key(1)).now_or_never().is_some());
     }
 
     #[tokio::test]

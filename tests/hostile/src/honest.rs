@@ -21,8 +21,10 @@ const SEATS: u32 = 4;
 const DECISION_TIME_MS: u32 = 1_500;
 /// How long an agent thinks.
 const THINKING: Duration = Duration::from_millis(5);
-/// Shifts of a game: short, so that new rooms are part of what is measured.
-const SHIFTS: u32 = 2;
+/// Shifts of a short game, so that new rooms are part of what is measured.
+pub(crate) const SHORT: u32 = 2;
+/// Shifts of a game that outlasts a measurement.
+pub(crate) const LONG: u32 = 1_000;
 /// How long a call or a new connection may take before the room counts it as not served.
 const CALL_LIMIT: Duration = Duration::from_secs(5);
 /// Pause after a call that was not served.
@@ -46,7 +48,8 @@ pub(crate) struct Noticed {
 }
 
 impl Noticed {
-    fn new() -> Self {
+    /// Nothing yet.
+    pub(crate) fn new() -> Self {
         Self {
             latencies: Histogram::new_with_bounds(1, LONGEST_US, 2)
                 .expect("the bounds are in order"),
@@ -55,6 +58,15 @@ impl Noticed {
             lost_games: 0,
             not_served: 0,
         }
+    }
+
+    /// Adds what was noticed in another phase, or by another room.
+    pub(crate) fn add(&mut self, other: &Self) {
+        (self.latencies.add(&other.latencies)).expect("all histograms have the same bounds");
+        self.missed += other.missed;
+        self.games += other.games;
+        self.lost_games += other.lost_games;
+        self.not_served += other.not_served;
     }
 
     /// A percentile of the latencies, milliseconds.
@@ -71,6 +83,10 @@ pub(crate) struct HonestRoom {
 
 struct Shared {
     url: String,
+    /// Shifts of a game.
+    shifts: u32,
+    /// The id of the current room, empty before the first.
+    room_id: Mutex<String>,
     leaving: AtomicBool,
     noticed: Mutex<Noticed>,
     /// When the last answer was given that no decision has followed yet.
@@ -80,10 +96,12 @@ struct Shared {
 }
 
 impl HonestRoom {
-    /// Starts to play.
-    pub(crate) fn start(url: String) -> Self {
+    /// Starts to play games of this length.
+    pub(crate) fn start(url: String, shifts: u32) -> Self {
         let shared = Arc::new(Shared {
             url,
+            shifts,
+            room_id: Mutex::default(),
             leaving: AtomicBool::new(false),
             noticed: Mutex::new(Noticed::new()),
             answered: Mutex::default(),
@@ -103,6 +121,11 @@ impl HonestRoom {
             record(&mut noticed.latencies, waiting.elapsed());
         }
         std::mem::replace(&mut noticed, Noticed::new())
+    }
+
+    /// The id of the current room, empty before the first.
+    pub(crate) fn room_id(&self) -> String {
+        lock(&self.shared.room_id).clone()
     }
 
     /// The last problem of a call, for an error message.
@@ -140,7 +163,7 @@ impl Shared {
         let request = v1::CreateRoomRequest {
             name: "honest".into(),
             rules: Some(v1::RuleSet {
-                stop: Some(Stop::TargetShifts(SHIFTS)),
+                stop: Some(Stop::TargetShifts(self.shifts)),
                 ..v1::RuleSet::default()
             }),
             policy: Some(v1::RoomPolicy {
@@ -164,6 +187,7 @@ impl Shared {
             let joined = served(client.join(request)).await?;
             tickets.push((client, joined.ticket));
         }
+        *lock(&self.room_id) = created.room.unwrap_or_default().room_id;
         Ok(tickets)
     }
 

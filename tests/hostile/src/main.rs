@@ -11,6 +11,7 @@ mod probe;
 mod raw;
 mod report;
 mod run;
+mod scenarios;
 mod tally;
 
 use std::process::ExitCode;
@@ -20,15 +21,20 @@ use clap::Parser as _;
 use error::HostileError;
 use options::Options;
 use report::Report;
+use scenarios::Scenario;
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    match measure(&options) {
-        Ok(report) => {
-            match options.json {
-                true => println!("{}", report.to_json()),
-                false => print!("{}", report.to_markdown()),
-            }
+    let measured = match options.scenario {
+        Some(scenario) => measure_scenario(scenario, &options),
+        None => measure(&options).map(|report| match options.json {
+            true => report.to_json(),
+            false => report.to_markdown(),
+        }),
+    };
+    match measured {
+        Ok(text) => {
+            println!("{}", text.trim_end());
             ExitCode::SUCCESS
         }
         Err(error) => {
@@ -36,6 +42,21 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Runs a scenario and returns its report: JSON, or a line for each figure.
+fn measure_scenario(scenario: Scenario, options: &Options) -> Result<String, HostileError> {
+    gauge::raise_descriptor_limit();
+    let server = options.server()?;
+    let report = run::Runtimes::new()?.honest(scenario.run(&server))?;
+    if options.json {
+        return Ok(format!("{report:#}"));
+    }
+    let figures = report.as_object().into_iter().flatten();
+    let figures = figures.filter(|(_, value)| !value.is_array());
+    Ok(figures
+        .map(|(name, value)| format!("{name:20} {value}\n"))
+        .collect())
 }
 
 /// Runs the attacks one after another, each on a server of its own.

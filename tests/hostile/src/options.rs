@@ -7,6 +7,7 @@ use clap::Parser;
 
 use crate::attacks::{ATTACKS, Attack};
 use crate::error::HostileError;
+use crate::scenarios::Scenario;
 
 /// Maximum length of a phase, seconds.
 const MAX_SECONDS: f64 = 600.0;
@@ -17,14 +18,16 @@ const MAX_SECONDS: f64 = 600.0;
 #[command(
     name = "chefshat-hostile",
     version,
-    after_help = "Examples:\n  chefshat-hostile                          all attacks, about eight minutes\n  chefshat-hostile --attack ping-flood      one of them\n  chefshat-hostile --list                   their names\n  chefshat-hostile --server old/chefshat --json > before.json"
+    after_help = "Examples:\n  chefshat-hostile                          all attacks, about eight minutes\n  chefshat-hostile idle                     memory of 10,000 idle connections\n  chefshat-hostile spectators               1,000 spectators that do not read\n  chefshat-hostile soak --json              an hour of rooms that start and end\n  chefshat-hostile --attack ping-flood      one of them\n  chefshat-hostile --list                   their names\n  chefshat-hostile --server old/chefshat --json > before.json"
 )]
 pub(crate) struct Options {
+    #[command(subcommand)]
+    pub(crate) scenario: Option<Scenario>,
     /// Run only this attack. Repeatable.
     #[arg(long = "attack", value_name = "NAME", value_parser = attack)]
     only: Vec<&'static Attack>,
     /// The server: the binary chefshat. Default: the one beside this program.
-    #[arg(long, value_name = "PROGRAM")]
+    #[arg(long, value_name = "PROGRAM", global = true)]
     server: Option<PathBuf>,
     /// List the attacks.
     #[arg(long, exclusive = true)]
@@ -41,8 +44,8 @@ pub(crate) struct Options {
     /// Divide all counts of the attacks by this number, to test that the program works.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub(crate) divide: u32,
-    /// Print one JSON document instead of a Markdown table.
-    #[arg(long)]
+    /// Print one JSON document instead of a table.
+    #[arg(long, global = true)]
     pub(crate) json: bool,
 }
 
@@ -81,7 +84,8 @@ fn attack(name: &str) -> Result<&'static Attack, String> {
         .ok_or_else(|| format!("there is no attack {name:?}; --list shows them"))
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
+/// A length of time in seconds.
+pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
     text.parse()
         .ok()
         .filter(|seconds| (0.0..=MAX_SECONDS).contains(seconds))

@@ -8,7 +8,7 @@ use crate::probe::Served;
 use crate::tally::Counts;
 
 /// Bytes of a mebibyte.
-const MIB: f64 = 1024.0 * 1024.0;
+pub(crate) const MIB: f64 = 1024.0 * 1024.0;
 
 /// The result of one attack.
 #[derive(Debug, serde::Serialize)]
@@ -134,6 +134,7 @@ impl Report {
     }
 }
 
-fn round(number: f64) -> f64 {
+/// Two decimals.
+pub(crate) fn round(number: f64) -> f64 {
     (number * 100.0).round() / 100.0
 }

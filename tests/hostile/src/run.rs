@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use crate::attacks::{Act, Attack, Target};
 use crate::error::HostileError;
 use crate::gauge::{self, folder_bytes};
-use crate::honest::HonestRoom;
+use crate::honest::{HonestRoom, SHORT};
 use crate::options::Options;
 use crate::probe;
 use crate::report::Row;
@@ -45,6 +45,11 @@ impl Runtimes {
             attacker: attacker.map_err(HostileError::io("starting threads"))?,
         })
     }
+
+    /// Runs something on the honest threads.
+    pub(crate) fn honest<T>(&self, work: impl Future<Output = T>) -> T {
+        self.honest.block_on(work)
+    }
 }
 
 /// Runs one attack.
@@ -54,7 +59,7 @@ pub(crate) fn run(
     attack: &'static Attack,
     options: &Options,
 ) -> Result<Row, HostileError> {
-    (runtimes.honest).block_on(attacked(&runtimes.attacker, server, attack, options))
+    runtimes.honest(attacked(&runtimes.attacker, server, attack, options))
 }
 
 async fn attacked(
@@ -98,7 +103,7 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let honest = HonestRoom::start(url.clone());
+    let honest = HonestRoom::start(url.clone(), SHORT);
     tokio::time::sleep(options.quiet).await;
     let quiet = honest.take();
     if quiet.latencies.is_empty() {

@@ -55,6 +55,61 @@ fn what_one_client_may_not_take_is_refused_and_others_are_served() {
     }
 }
 
+/// Runs a scenario and returns its report.
+fn scenario(arguments: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_chefshat-hostile"))
+        .arg("--server")
+        .arg(set_up("CHEFSHAT_BIN"))
+        .arg("--json")
+        .args(arguments)
+        .output()
+        .expect("the program can be started");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    serde_json::from_slice(&output.stdout).expect("a JSON document")
+}
+
+#[test]
+fn idle_connections_are_counted_and_stay() {
+    let report = scenario(&["idle", "--connections", "20", "--seconds", "1"]);
+    assert_eq!(report["connections"], 20, "{report:#}");
+    assert_eq!(report["served_again"], 20, "{report:#}");
+}
+
+#[test]
+fn spectators_that_do_not_read_are_admitted_and_players_miss_nothing() {
+    let report = scenario(&[
+        "spectators",
+        "--spectators",
+        "20",
+        "--rooms",
+        "2",
+        "--rounds",
+        "1",
+        "--seconds",
+        "1",
+    ]);
+    assert_eq!(report["tried"], 20, "{report:#}");
+    assert_eq!(report["admitted"], 20, "{report:#}");
+    assert_eq!(report["missed"], 0, "{report:#}");
+    assert!(report["watched_p99_ms"].as_f64() > Some(0.0), "{report:#}");
+}
+
+#[test]
+fn rooms_of_a_soak_start_and_end() {
+    let report = scenario(&["soak", "--seconds", "3", "--settle", "1", "--rooms", "2"]);
+    assert!(report["games"].as_u64() > Some(0), "{report:#}");
+    assert_eq!(report["lost_games"], 0, "{report:#}");
+    assert_eq!(report["missed"], 0, "{report:#}");
+    assert!(
+        report["samples"]
+            .as_array()
+            .is_some_and(|samples| samples.len() > 100),
+        "{report:#}"
+    );
+    assert!(report["mib_per_hour"].is_number(), "{report:#}");
+}
+
 #[test]
 fn an_unknown_attack_is_refused_with_advice() {
     let output = Command::new(env!("CARGO_BIN_EXE_chefshat-hostile"))

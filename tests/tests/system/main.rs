@@ -8,6 +8,7 @@ mod branches;
 mod connections;
 mod cup;
 mod database;
+mod descriptors;
 mod doors;
 mod encrypted;
 mod examiner;

@@ -481,7 +481,7 @@ async fn streams_are_limited_and_end_with_the_server() {
         }
     })
     .await;
-    // The seats of all streams together are limited too.
+    // The seats of all its streams together are limited too.
     open.truncate(1);
     let whole = u32::try_from(limits["max_vector_seats"] / 4).expect("a number of games");
     let error = patiently("too many games", async {
@@ -494,11 +494,9 @@ async fn streams_are_limited_and_end_with_the_server() {
         }
     })
     .await;
-    assert_eq!(
-        open.len() as u64,
-        limits["max_vector_seats_in_all"] / (4 * u64::from(whole))
-    );
-    assert!(error.message().contains("play fewer games"));
+    let share = limits["max_vector_seats_in_all"] * limits["local_share_percent"] / 100;
+    assert_eq!(open.len() as u64, share / (4 * u64::from(whole)));
+    assert!(error.message().contains(&share.to_string()));
     let (mut games, batch) = open.swap_remove(0);
     let actions = choose(&mut RandomAgent::new(1), &batch);
     games.step(actions.clone()).await.expect("it still plays");

@@ -7,7 +7,7 @@ use sqlx::Connection as _;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
-use super::open::{APPLICATION_ID, OpenError, make_private};
+use super::open::{APPLICATION_ID, OpenError, SHRINKABLE, make_private};
 use chefshat_room::ids::Id;
 
 /// What a copy of a database contains.
@@ -22,7 +22,8 @@ pub struct DatabaseCopy {
 }
 
 /// Copies the database of a data directory into a folder that has none. A server may use it: the
-/// copy is its state at one moment, and nobody waits.
+/// copy is its state at one moment, and nobody waits. It can give back the pages of deleted games,
+/// even if the database was created by a version that could not.
 ///
 /// # Errors
 /// There is no database of ours, or it cannot be read, or the copy cannot be written.
@@ -32,6 +33,10 @@ pub async fn copy_database(data_dir: &Path, folder: &Path) -> Result<DatabaseCop
     let mut database = open(&source).await?;
     // SQLite writes to an empty file, which keeps its permissions.
     make_private(&copy)?;
+    sqlx::query(SHRINKABLE)
+        .execute(&mut database)
+        .await
+        .map_err(failed)?;
     sqlx::query("VACUUM INTO ?")
         .bind(copy.to_string_lossy())
         .execute(&mut database)

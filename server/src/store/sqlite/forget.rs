@@ -166,7 +166,11 @@ impl Forgetting {
                 .await?;
         }
         self.0.readers.close().await;
-        for tidying in ["VACUUM", "PRAGMA wal_checkpoint(TRUNCATE)"] {
+        for tidying in [
+            open::SHRINKABLE,
+            "VACUUM",
+            "PRAGMA wal_checkpoint(TRUNCATE)",
+        ] {
             sqlx::query(tidying).execute(&mut self.0.writer).await?;
         }
         Ok(self.0.writer.close().await?)

@@ -81,6 +81,9 @@ pub(super) struct Opened {
     pub(super) lock: File,
 }
 
+/// Lets the next VACUUM make a database that can give back the pages of deleted games.
+pub(super) const SHRINKABLE: &str = "PRAGMA auto_vacuum = INCREMENTAL";
+
 /// Lets a new database give back the pages of deleted games while rooms commit. Later that would
 /// take a copy of the database.
 async fn make_shrinkable(writer: &mut SqliteConnection) -> sqlx::Result<()> {
@@ -88,7 +91,7 @@ async fn make_shrinkable(writer: &mut SqliteConnection) -> sqlx::Result<()> {
         .fetch_one(&mut *writer)
         .await?;
     if pages <= 1 {
-        for text in ["PRAGMA auto_vacuum = INCREMENTAL", "VACUUM"] {
+        for text in [SHRINKABLE, "VACUUM"] {
             sqlx::query(text).execute(&mut *writer).await?;
         }
     }

@@ -1,0 +1,210 @@
+//! The tables of limits in docs/hosting.md, made from the constants.
+
+use std::fmt::Display;
+use std::path::Path;
+use std::time::Duration;
+
+use super::{background, calls, frames};
+use crate::config::{
+    FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS,
+    MAX_RECORDS_SENT, MAX_TOURNAMENTS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
+    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
+};
+use crate::connections::STALLED_LIMIT;
+use crate::room::MAX_SPECTATORS;
+
+/// A number with commas between thousands.
+fn number(number: impl Display) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn seconds(time: Duration) -> String {
+    format!("{} s", time.as_secs())
+}
+
+fn table<const COLUMNS: usize>(header: [&str; COLUMNS], rows: &[[String; COLUMNS]]) -> String {
+    let line = |cells: &[String; COLUMNS]| {
+        let cells = cells.iter().map(|cell| match cell.as_str() {
+            "" => " |".to_owned(),
+            cell => format!(" {cell} |"),
+        });
+        format!("|{}\n", cells.collect::<String>())
+    };
+    let mut text = line(&header.map(str::to_owned));
+    text += &format!("|{}\n", "---|".repeat(COLUMNS));
+    text.extend(rows.iter().map(line));
+    text
+}
+
+fn of_all() -> String {
+    let config = ServerConfig::default();
+    let rows: [(&str, String, &str); _] = [
+        (
+            "connections",
+            format!(
+                "{}, or what `ulimit -n` leaves",
+                number(config.max_connections)
+            ),
+            "`--max-connections`",
+        ),
+        (
+            "rooms that wait or play",
+            number(config.max_rooms),
+            "`--max-rooms`",
+        ),
+        ("spectators of a room", number(MAX_SPECTATORS), ""),
+        ("tournaments that are not over", number(MAX_TOURNAMENTS), ""),
+        (
+            "streams (play, watch, follow, read)",
+            number(calls::MAX_STREAMS),
+            "",
+        ),
+        ("streams of vector games", number(MAX_VECTOR_STREAMS), ""),
+        (
+            "vector games, counted times the seats that their client plays",
+            number(MAX_VECTOR_SEATS_IN_ALL),
+            "",
+        ),
+        ("streams that follow tournaments", number(MAX_FOLLOWERS), ""),
+        (
+            "answers that have not been read",
+            format!(
+                "{}; after {} the connection is closed",
+                number(calls::MAX_ANSWERS),
+                seconds(STALLED_LIMIT)
+            ),
+            "",
+        ),
+        (
+            "calls that are executed at a time",
+            format!(
+                "{}; others wait for {}",
+                number(calls::MAX_EXECUTED),
+                seconds(calls::MAX_WAIT)
+            ),
+            "",
+        ),
+        (
+            "lists of rooms that are made at a time",
+            number(calls::MAX_LISTS),
+            "",
+        ),
+        (
+            "records that are read at a time",
+            format!("{}; others wait", number(MAX_CONCURRENT_RECORDS)),
+            "",
+        ),
+        (
+            "records that are sent at a time",
+            format!(
+                "{}; others wait. A part that is not received in {} ends one",
+                number(MAX_RECORDS_SENT),
+                seconds(RECORD_SEND_TIMEOUT)
+            ),
+            "",
+        ),
+        (
+            "imports at a time",
+            format!(
+                "{}; others wait. {} without a part end one",
+                number(MAX_IMPORTS),
+                seconds(IMPORT_IDLE_TIMEOUT)
+            ),
+            "",
+        ),
+        (
+            "games that only built-in agents play",
+            format!("{} at a time; others wait", number(background::MAX_GAMES)),
+            "",
+        ),
+        (
+            "their decisions",
+            format!(
+                "{} a second; for {} as fast as the machine can",
+                number(config.built_in_decisions_per_second),
+                seconds(background::BURST)
+            ),
+            "`--built-in-rate`",
+        ),
+    ];
+    let rows = rows.map(|(what, most, flag)| [what.to_owned(), most, flag.to_owned()]);
+    table(["limit of all clients together", "default", "flag"], &rows)
+}
+
+fn of_each() -> String {
+    let rate = |per_second: u64, at_once: u64| {
+        format!(
+            "{} a second, {} at once",
+            number(per_second),
+            number(at_once)
+        )
+    };
+    assert_eq!(calls::COST_OF_BUILT_IN_GAME, calls::COST_OF_TOURNAMENT);
+    let rows = [
+        (
+            "calls",
+            format!(
+                "{}. An answer costs one more for each {} bytes, a stream {}, a new room {}, one of built-in agents or a tournament {}",
+                rate(calls::CALLS_PER_SECOND, calls::CALLS_AT_ONCE),
+                calls::BYTES_PER_CALL,
+                calls::COST_OF_STREAM,
+                calls::COST_OF_ROOM,
+                calls::COST_OF_BUILT_IN_GAME
+            ),
+        ),
+        (
+            "wrong join codes",
+            format!(
+                "{}; of all clients {}",
+                rate(calls::WRONG_CODES_PER_SECOND, calls::WRONG_CODES_AT_ONCE),
+                rate(
+                    calls::ALL_WRONG_CODES_PER_SECOND,
+                    calls::ALL_WRONG_CODES_AT_ONCE
+                )
+            ),
+        ),
+        (
+            "PING, SETTINGS, PRIORITY and RST_STREAM frames of a connection",
+            format!(
+                "{}; it is read more slowly then",
+                rate(frames::PER_SECOND.into(), frames::BURST.into())
+            ),
+        ),
+        (
+            "time until a connection has said what it speaks",
+            seconds(ServerConfig::default().first_bytes_timeout),
+        ),
+        (
+            "time until the first message of a Play stream",
+            seconds(FIRST_MESSAGE_TIMEOUT),
+        ),
+        (
+            "time until the setup of a vector stream",
+            seconds(VECTOR_SETUP_TIMEOUT),
+        ),
+    ];
+    table(
+        ["limit of each client", "default"],
+        &rows.map(|(what, most)| [what.to_owned(), most]),
+    )
+}
+
+#[test]
+fn the_page_has_the_limits() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hosting.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    for table in [of_all(), of_each()] {
+        assert!(
+            page.contains(&format!("\n\n{table}\n")),
+            "docs/hosting.md should have:\n{table}"
+        );
+    }
+}
