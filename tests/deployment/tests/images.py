@@ -33,7 +33,10 @@ class Images:
             if shutil.which(program, path=f"{os.environ['PATH']}:/usr/sbin") is None:
                 pytest.skip(f"{program} is not installed")
         self._storage, self._cache = storage, cache
-        self._buildah = ["buildah", "--root", str(storage / "root"), "--runroot", str(storage / "run")]
+        # Temporary files include the caches of builds.
+        temporary = storage / "tmp"
+        temporary.mkdir()
+        self._buildah = ["env", f"TMPDIR={temporary}", "buildah", "--root", str(storage / "root"), "--runroot", str(storage / "run")]
 
     def close(self) -> None:
         """Deletes all images and containers."""
