@@ -15,20 +15,39 @@ const FORM = { includeDirs: [PROTO], keepCase: true, longs: Number, enums: Strin
 export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM)).chefshat.v1;
 
 const MAX_GAMES = 64; // Maximum number of games that a participant plays at a time.
-const MAX_FAILURES = 9; // Maximum number of consecutive connections without progress.
-const FINAL = ["UNAUTHENTICATED", "PERMISSION_DENIED", "INVALID_ARGUMENT", "UNIMPLEMENTED"].map((code) => grpc.status[code]); // Not retried.
-const KEEPALIVE = { "grpc.keepalive_time_ms": 3_000, "grpc.keepalive_timeout_ms": 5_000 }; // Finds a dead connection before a decision is lost.
+const MAX_FAILURES = 160; // Maximum number of consecutive connections without progress: together with the delays about ten minutes.
+const MAX_DELAY_MS = 5_000; // Maximum delay between two connections.
+const FINAL = [ // Not retried.
+  "INVALID_ARGUMENT", "NOT_FOUND", "ALREADY_EXISTS", "PERMISSION_DENIED", "FAILED_PRECONDITION", "OUT_OF_RANGE", "UNIMPLEMENTED", "UNAUTHENTICATED",
+].map((code) => grpc.status[code]);
+const CHANNEL = {
+  "grpc.keepalive_time_ms": 3_000, // Finds a dead connection before a decision is lost.
+  "grpc.keepalive_timeout_ms": 5_000,
+  "grpc.initial_reconnect_backoff_ms": 100, // Short: the delays between connections are the agent's own.
+  "grpc.max_reconnect_backoff_ms": 1_000,
+};
+
+let warned = false;
+
+/** Warns once if a token can be read on the way to another machine. */
+function warnOfUnencrypted(authority) {
+  const { hostname } = new URL(`http://${authority}`);
+  if (warned || /^(localhost|127(\.\d+){3}|\[::1\])$/.test(hostname)) return;
+  warned = true;
+  console.error(`warning: the token is sent unencrypted to ${hostname}; use https://${hostname}`);
+}
 
 /** Connects to `address`: host:port, or https:// for TLS with the authorities in the PEM file `ca` or Node's own. Sends `token` with every call. */
 function connect(Service, { address, token, ca }) {
   const [, scheme, authority] = /^(?:(https?):\/\/)?(.*?)\/*$/.exec(address);
+  if (token && scheme !== "https") warnOfUnencrypted(authority);
   const tls = () => grpc.credentials.createSsl(ca ? readFileSync(ca) : null);
   const start = (metadata, listener, next) => {
     if (token) metadata.set("authorization", `Bearer ${token.trim()}`);
     next(metadata, listener);
   };
   const interceptors = [(options, next) => new grpc.InterceptingCall(next(options), { start })];
-  return new Service(authority, scheme === "https" ? tls() : grpc.credentials.createInsecure(), { ...KEEPALIVE, interceptors });
+  return new Service(authority, scheme === "https" ? tls() : grpc.credentials.createInsecure(), { ...CHANNEL, interceptors });
 }
 
 /** Returns the legal actions of a mask: bit i%8 of byte i/8 is action i. */
@@ -77,11 +96,12 @@ function seatOf(ticket, about = {}) {
 /** Plays with the ticket of a seat, or of a tournament participant with all its seats, until the game or tournament is over. */
 async function playTicket(server, ticket) {
   const client = connect(protocol.PlayService, server);
+  const pause = server.pause ?? sleep;
   let [seats, tournament, participant] = [[seatOf(ticket)]];
   let [outcomes, lost] = [[], new Error("the server ended the stream")];
   try {
     for (let failures = 0; failures < MAX_FAILURES; failures += 1) {
-      await sleep(failures && 50 * 2 ** failures);
+      if (failures) await pause(Math.min(MAX_DELAY_MS, 50 * 2 ** failures) * (0.5 + 0.5 * Math.random()));
       const stream = client.Play().on("error", (error) => { lost = error; });
       const commands = seats.map(({ ticket, next }) => ({ attach: { ticket, from_sequence: next } }));
       if (tournament) commands.push({ attach: { ticket: tournament } }); // Last, so that the server does not attach its seats again.
@@ -130,7 +150,7 @@ async function joinTable({ code, tournament, name, games, ...server }) {
 
 /**
  * Joins, or resumes with a `ticket`, and plays to the end. Returns the seat and the standings; for a tournament the participant's number
- * and the outcome of each game. Throws an error if there is no result.
+ * and the outcome of each game. Throws an error if there is no result. `pause` waits for milliseconds; default: a timer.
  */
 export async function play({ ticket, ...way }) {
   const { participant, outcomes } = await playTicket(way, ticket ?? (await joinTable(way)));

@@ -138,6 +138,48 @@ test("a lost connection is replaced by one that resumes after the last event see
   assert.equal(server.remaining.length, 0);
 });
 
+test("a lost server is waited for, about ten minutes", async () => {
+  const lost = async (stream, read) => {
+    await read();
+    stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "stopping" });
+  };
+  const delays = [];
+  const pause = async (ms) => { delays.push(ms); };
+  const server = await serve(...Array(500).fill(lost));
+  await assert.rejects(play({ address: server.address, ticket: "a ticket", pause }), /stopping/);
+  assert.ok(delays.every((ms) => ms > 0 && ms <= 5_000));
+  const minutes = delays.reduce((sum, ms) => sum + ms) / 60_000;
+  assert.ok(minutes > 8 && minutes < 13, `${minutes} minutes`);
+
+  // Progress ends the outage: the next one has all its time.
+  delays.length = 0;
+  const works = async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached] });
+    stream.end();
+  };
+  const ends = async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  };
+  server.remaining.splice(0, Infinity, ...Array(100).fill(lost), works, ...Array(100).fill(lost), ends);
+  assert.deepEqual(await play({ address: server.address, ticket: "a ticket", pause }), { seat: 2, standings: STANDINGS });
+  assert.equal(server.remaining.length, 0);
+});
+
+for (const code of [
+  "INVALID_ARGUMENT", "NOT_FOUND", "ALREADY_EXISTS", "PERMISSION_DENIED", "FAILED_PRECONDITION", "OUT_OF_RANGE", "UNIMPLEMENTED", "UNAUTHENTICATED",
+]) {
+  test(`${code} is an error and does not cause a reconnection`, async () => {
+    const server = await serve(async (stream, read) => {
+      await read();
+      stream.emit("error", { code: grpc.status[code], details: "no" });
+    });
+    await assert.rejects(play({ address: server.address, ticket: "a ticket" }), /no/);
+    assert.equal(server.remaining.length, 0);
+  });
+}
+
 test("a refused decision is answered again, and the seat is taken back from its substitute", async () => {
   const heard = [];
   const server = await serve(async (stream, read) => {
@@ -463,4 +505,14 @@ test("the process reports errors and exits with 1", async () => {
   const misspelt = await run(["--adress", address]);
   assert.equal(misspelt.status, 1);
   assert.match(misspelt.err, /^agent: .*--adress/);
+});
+
+test("a token that others can read on the way is warned of once", async () => {
+  const { address } = await serve(); // Refuses the join code.
+  const port = address.split(":")[1];
+  const warning = "warning: the token is sent unencrypted to 0.0.0.0; use https://0.0.0.0\n";
+  for (const [host, token, said] of [["0.0.0.0", "secret", warning], ["0.0.0.0", "", ""], ["127.0.0.1", "secret", ""], ["localhost", "secret", ""]]) {
+    const { err } = await run(["--address", `${host}:${port}`, "--code", "WRONG"], { CHEFSHAT_TOKEN: token });
+    assert.equal(err, `${said}agent: no room has this join code\n`);
+  }
 });

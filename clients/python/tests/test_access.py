@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -132,6 +133,28 @@ def test_a_token_is_never_shown(guarded: FakeServer) -> None:
     shown = [server, str(server), client, vars(client), opened, opened.unary_unary("/a/b"), caught.value, caught.value.__cause__]
     opened.close()
     assert not any(SECRET in repr(thing) for thing in shown)
+
+
+@pytest.mark.parametrize("host", ["example.org", "192.0.2.1", "[2001:db8::1]"])
+def test_a_token_that_others_can_read_on_the_way_is_warned_of(host: str) -> None:
+    bare = host.strip("[]")
+    with pytest.warns(UserWarning, match=re.escape(f"the token is sent unencrypted to {bare}; use https://{bare}")):
+        channel(ServerAddress(f"http://{host}:50051", SECRET)).close()
+
+
+@pytest.mark.parametrize(
+    ("address", "token"),
+    [
+        ("https://example.org", SECRET),
+        ("localhost:50051", SECRET),
+        ("127.8.0.1:50051", SECRET),
+        ("http://[::1]:50051", SECRET),
+        ("example.org:50051", ""),
+    ],
+)
+def test_safe_connections_cause_no_warning(address: str, token: str, recwarn: pytest.WarningsRecorder) -> None:
+    channel(ServerAddress(address, token)).close()
+    assert not recwarn.list
 
 
 def test_servers_that_cannot_be_trusted(guarded: FakeServer, fake: FakeServer) -> None:

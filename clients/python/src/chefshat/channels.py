@@ -1,11 +1,14 @@
 """Opening channels: addresses, TLS, tokens, and the options of connections."""
 
+import ipaddress
 import os
 import ssl
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
+from urllib.parse import urlsplit
 
 import grpc
 import grpc.aio
@@ -87,7 +90,7 @@ def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = ()) -> g
         opened = grpc.secure_channel(where.authority, _credentials(server.ca), together)
     else:
         opened = grpc.insecure_channel(where.authority, together)
-    token = _token(server)
+    token = _token(server, where)
     return cast(grpc.Channel, _Authorized(opened, token)) if token else opened
 
 
@@ -98,17 +101,27 @@ def async_channel(server: ServerAddress) -> grpc.aio.Channel:
         opened = grpc.aio.secure_channel(where.authority, _credentials(server.ca), CHANNEL_OPTIONS)
     else:
         opened = grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
-    token = _token(server)
+    token = _token(server, where)
     return cast(grpc.aio.Channel, _Authorized(opened, token)) if token else opened
 
 
-def _token(server: ServerAddress) -> str:
-    """Returns the token to send; empty if there is none."""
+def _token(server: ServerAddress, where: Target) -> str:
+    """Returns the token to send; empty if there is none. Warns once if it can be read on the way to another machine."""
     token = os.environ.get(TOKEN, "") if server.token is None else server.token
     token = token.strip()
     if not (token.isascii() and token.isprintable()):
         raise _refused("TOKEN_REFUSED", "the token is malformed: copy it as `chefshat token create` printed it")
+    host = urlsplit(f"//{where.authority}").hostname or ""
+    if token and not where.tls and not _is_this_machine(host):
+        warnings.warn(f"the token is sent unencrypted to {host}; use https://{host}", stacklevel=1)
     return token
+
+
+def _is_this_machine(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _credentials(ca: Path | str | None) -> grpc.ChannelCredentials:
