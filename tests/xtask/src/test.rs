@@ -24,7 +24,8 @@ pub(crate) enum Part {
     Node,
     /// The page for people in clients/web, including browser tests.
     Web,
-    /// Backups, and the proxies and images of docker/, with agents in all languages and a browser.
+    /// Backups, the tournament of friends in docs/access.md, and the proxies and images of docker/,
+    /// with agents in all languages and a browser.
     Deployment,
 }
 

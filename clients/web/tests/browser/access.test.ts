@@ -2,8 +2,9 @@
 
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { DecisionSource } from "../../src/gen/chefshat/v1/event_pb";
+import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { byClicks, nextDecision, playOn, sitDown } from "./play";
-import { gameOf, newRoom, recordOf } from "./rooms";
+import { clientsOf, gameOf, newRoom, recordOf } from "./rooms";
 import { browser, person, Server, useStage } from "./stage";
 
 useStage();
@@ -60,6 +61,20 @@ test("a person plays a complete Shift with a link for players, while one with a 
   expect(own.map(({ source }) => source)).toEqual(Array<number>(taken).fill(DecisionSource.AGENT));
   expect(taken).toBeGreaterThan(3);
   expect([...player.faults, ...watcher.faults]).toEqual([]);
+});
+
+test("a link to a tournament lets a person take part", async () => {
+  const { tournaments } = clientsOf(closed);
+  const { tournament, joinCode } = await tournaments.createTournament({
+    settings: { name: "friday", format: TournamentFormat.SWISS, builtInAgents: ["greedy"] },
+  });
+  const { page, faults } = await person(browser);
+  await page.goto(`${closed.url}/join/${joinCode}#token=${await closed.tokenFor("player")}`);
+  await page.getByLabel("Your name").fill("Ana");
+  await page.getByRole("button", { name: "Join the tournament" }).click();
+  await page.getByText("You are taking part as Ana.").waitFor();
+  expect(page.url()).toContain(tournament?.tournamentId);
+  expect(faults).toEqual([]);
 });
 
 test("a token that is not enough is explained, in the language of the person", async () => {
