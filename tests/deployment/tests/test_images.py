@@ -51,7 +51,9 @@ def test_the_images_are_built_from_source(images: Images, base: str) -> None:
     # Some crates compile C.
     rust = images.base("rust", ["gcc", "libc6-dev"], {toolchain: "/usr/local"}, {})
     bases = {"NODE_BASE": base, "RUST_BASE": rust, "SERVER_BASE": base}
-    image = images.build("server", bases | {"PROFILE": os.environ.get("CHEFSHAT_PROFILE", "dist")})
+    # Debian's buildah finds the stage only if it is named here.
+    arguments = bases | {"BINARY": "build", "PROFILE": os.environ.get("CHEFSHAT_PROFILE", "dist")}
+    image = images.build("server", arguments)
     check(images, image, images.build("node-agent", bases))
 
 
