@@ -14,7 +14,7 @@ use tracing::{error, info};
 use crate::clock::since_epoch_ms;
 use crate::config::KeepGames;
 use crate::rooms::Rooms;
-use crate::store::{Keep, StoreError, StoreUsage};
+use crate::store::{DiskUsage, Keep, StoreError};
 use crate::tournaments::Tournaments;
 
 /// Games that are deleted in one commit: rooms wait for it.
@@ -53,8 +53,10 @@ pub struct Pruned {
 /// How much is stored.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Usage {
-    /// In the store.
-    pub store: StoreUsage,
+    /// The disk of the store.
+    pub disk: DiskUsage,
+    /// Number of finished games.
+    pub finished_games: u64,
     /// Bytes of the files of records.
     pub record_bytes: u64,
     /// Number of these files.
@@ -79,12 +81,13 @@ impl Retention {
     /// # Errors
     /// The store failed.
     pub async fn usage(&self) -> Result<Usage, StoreError> {
-        let store = self.rooms.store().usage().await?;
+        let finished_games = self.rooms.store().finished_games().await?;
         let folder = self.rooms.record_writer().data_dir().map(jsonl::folder_of);
         let looking = tokio::task::spawn_blocking(move || folder.map(|it| size_of(&it)));
         let (record_bytes, record_files) = looking.await.ok().flatten().unwrap_or_default();
         Ok(Usage {
-            store,
+            disk: self.rooms.store().disk().unwrap_or_default(),
+            finished_games,
             record_bytes,
             record_files,
         })
@@ -125,7 +128,7 @@ impl Retention {
             tokio::time::sleep(PAUSE).await;
         }
         let after = self.usage().await?;
-        let bytes = |usage: &Usage| usage.store.bytes + usage.record_bytes;
+        let bytes = |usage: &Usage| usage.disk.bytes + usage.record_bytes;
         pruned.freed_bytes = bytes(&before).saturating_sub(bytes(&after));
         if pruned.games > 0 {
             info!(

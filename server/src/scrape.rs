@@ -2,13 +2,16 @@
 //! when they are asked for: depths of queues, tournaments, disk and process.
 
 use std::fmt;
-use std::io;
-use std::path::Path;
 use std::sync::{Arc, Weak};
+use std::time::Duration;
 
 use axum::Router;
 use axum::routing::get;
+use axum::serve::Listener;
 use chefshat_tournament::{State, Tournament};
+use hyper::server::conn::http1;
+use hyper_util::rt::TokioIo;
+use hyper_util::service::TowerToHyperService;
 use procfs::process::{LimitValue, Process};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric};
@@ -18,24 +21,52 @@ use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Unit;
 use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
 
 use crate::metrics::Metrics;
 use crate::rooms::Rooms;
+use crate::store::DiskUsage;
 use crate::tournaments::Tournaments;
 
 /// The media type of the answers.
 const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
+/// Connections at a time; others wait.
+const MAX_CONNECTIONS: usize = 8;
+/// Longest time of a connection, which serves one request.
+const TIME_LIMIT: Duration = Duration::from_secs(10);
+
 /// Answers `GET /metrics` on a listener, without end.
-///
-/// # Errors
-/// The listener failed.
-pub async fn serve(listener: TcpListener, metrics: Arc<Metrics>) -> io::Result<()> {
+pub async fn serve(listener: TcpListener, metrics: Arc<Metrics>) {
+    serve_within(listener, metrics, MAX_CONNECTIONS, TIME_LIMIT).await;
+}
+
+async fn serve_within(
+    mut listener: TcpListener,
+    metrics: Arc<Metrics>,
+    max_connections: usize,
+    time_limit: Duration,
+) {
     let answer = move || {
         let metrics = Arc::clone(&metrics);
         async move { ([(http::header::CONTENT_TYPE, MEDIA_TYPE)], metrics.text()) }
     };
-    axum::serve(listener, Router::new().route("/metrics", get(answer))).await
+    let router = Router::new().route("/metrics", get(answer));
+    let places = Arc::new(Semaphore::new(max_connections));
+    // The semaphore is never closed.
+    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+        // After a failure it tries again.
+        let (stream, _) = Listener::accept(&mut listener).await;
+        let connection = http1::Builder::new().keep_alive(false).serve_connection(
+            TokioIo::new(stream),
+            TowerToHyperService::new(router.clone()),
+        );
+        tokio::spawn(async move {
+            // A client that fails or is too slow is disconnected.
+            let _ = tokio::time::timeout(time_limit, connection).await;
+            drop(place);
+        });
+    }
 }
 
 /// Adds what is read when it is asked for to the metrics of a server.
@@ -69,8 +100,8 @@ impl Collector for ServerState {
         to.gauge("draining", help, None, draining)?;
         queues(&rooms, &mut to)?;
         states(&tournaments, &mut to)?;
-        match rooms.record_writer().data_dir() {
-            Some(folder) => disk(folder, &mut to),
+        match rooms.store().disk() {
+            Some(usage) => disk(usage, &mut to),
             None => Ok(()),
         }
     }
@@ -105,20 +136,11 @@ fn states(tournaments: &Tournaments, to: &mut Encoder<'_, '_>) -> fmt::Result {
     to.gauges("tournaments", "Listed tournaments", "state", &labels, count)
 }
 
-fn disk(folder: &Path, to: &mut Encoder<'_, '_>) -> fmt::Result {
-    if let Ok(disk) = rustix::fs::statvfs(folder) {
-        let help = "Free space for the data directory";
-        to.gauge(
-            "disk_free",
-            help,
-            Some(&Unit::Bytes),
-            disk.f_bavail * disk.f_frsize,
-        )?;
-    }
-    let files = ["games.sqlite3", "games.sqlite3-wal"];
-    let sizes = files.map(|file| std::fs::metadata(folder.join(file)).map_or(0, |it| it.len()));
+fn disk(usage: DiskUsage, to: &mut Encoder<'_, '_>) -> fmt::Result {
+    let help = "Free space for the data directory";
+    to.gauge("disk_free", help, Some(&Unit::Bytes), usage.free_bytes)?;
     let help = "Size of the database and its write-ahead log";
-    to.gauge("database", help, Some(&Unit::Bytes), sizes.iter().sum())
+    to.gauge("database", help, Some(&Unit::Bytes), usage.bytes)
 }
 
 /// Reads the state of this process, where the system shows it.
@@ -190,5 +212,37 @@ impl Encoder<'_, '_> {
             ConstGauge::new(count).encode(encoder.encode_family(&labels)?)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{self, Read as _};
+
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::net::TcpStream;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_idle_connection_gives_its_place_to_a_waiting_one() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let limit = Duration::from_millis(20);
+        tokio::spawn(serve_within(listener, Arc::default(), 1, limit));
+        let mut idle = std::net::TcpStream::connect(address).expect("it listens");
+        idle.set_nonblocking(true).expect("a socket");
+        // Time limits may end this one, too, on a busy machine.
+        let mut answer = Vec::new();
+        while answer.is_empty() {
+            let mut waiting = TcpStream::connect(address).await.expect("it listens");
+            let request = b"GET /metrics HTTP/1.1\r\nHost: it\r\n\r\n";
+            waiting.write_all(request).await.expect("sent");
+            let _ = waiting.read_to_end(&mut answer).await;
+        }
+        let text = String::from_utf8(answer).expect("text");
+        assert!(text.starts_with("HTTP/1.1 200 OK"), "{text}");
+        let end = idle.read(&mut [0]).map_err(|error| error.kind());
+        assert_ne!(end, Err(io::ErrorKind::WouldBlock), "still open");
     }
 }

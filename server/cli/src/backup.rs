@@ -11,19 +11,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_record::atomic_file::sync_folder_of;
-use chefshat_server::store::{DatabaseCopy, check_copy, copy_database};
+use chefshat_record::jsonl::folder_of;
+use chefshat_server::store::{DATABASE_FILE, DatabaseCopy, LOCK_FILE, check_copy, copy_database};
 use clap::Args;
 use serde_json::json;
 
 use super::numbers::counted;
 use super::{CommandError, data_dir, say};
 
-/// The folder of records in a data directory.
-const RECORDS: &str = "records";
-/// The database, which SQLite copies, with what lies beside it while a server runs.
-const DATABASE: &str = "games.sqlite3";
-/// Locked while a server runs.
-const LOCK: &str = "games.lock";
 /// Ending of files that are being written.
 const PART: &str = "part";
 
@@ -69,7 +64,7 @@ impl Backup {
             .map_err(|error| at(parent, &error))?;
         // A record that is written later belongs to a game that the copy of the database may know
         // as unfinished.
-        let mut records = names(&source.join(RECORDS))?;
+        let mut records = names(&folder_of(&source))?;
         let copied = copy_database(&source, part.path()).await?;
         records.extend(
             copied
@@ -79,7 +74,7 @@ impl Backup {
         );
         let others = names(&source)?;
         copy_files(&source, part.path(), &others)?;
-        let records = copy_files(&source.join(RECORDS), &part.path().join(RECORDS), &records)?;
+        let records = copy_files(&folder_of(&source), &folder_of(part.path()), &records)?;
         // One call for any number of files.
         rustix::fs::sync();
         fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
@@ -111,26 +106,26 @@ impl Restore {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let (source, target) = (self.source, data_dir::name(self.data_dir)?);
         let copied = check_copy(&source).await?;
-        let in_the_way = names(&target)?.into_iter().next();
-        if in_the_way.is_some() || target.join(RECORDS).exists() {
-            let target = target.display();
+        if let Some(file) = first_entry(&target)? {
             return Err(format!(
-                "{target} is not empty; choose another folder with --data-dir, or move it away. Nothing was changed"
+                "{} is not empty: it has {}; choose another folder with --data-dir, or move it away. Nothing was changed",
+                target.display(),
+                file.display(),
             )
             .into());
         }
         copy_files(&source, &target, &names(&source)?)?;
-        let records = names(&source.join(RECORDS))?;
-        let records = copy_files(&source.join(RECORDS), &target.join(RECORDS), &records)?;
+        let records = names(&folder_of(&source))?;
+        let records = copy_files(&folder_of(&source), &folder_of(&target), &records)?;
         // Last, under its name only when complete: a directory without a database is refused by
         // another attempt, and used by no server.
-        let part = target.join(format!("{DATABASE}.{PART}"));
-        copy_file(&source.join(DATABASE), &part)?;
+        let part = target.join(format!("{DATABASE_FILE}.{PART}"));
+        copy_file(&source.join(DATABASE_FILE), &part)?;
         rustix::fs::sync();
-        let database = target.join(DATABASE);
+        let database = target.join(DATABASE_FILE);
         fs::rename(&part, &database).map_err(|error| at(&database, &error))?;
         sync_folder_of(&database).map_err(|error| at(&database, &error))?;
-        let folder = target.join(RECORDS);
+        let folder = folder_of(&target);
         let advice = format!(
             "; `chefshat verify {}` checks the records",
             folder.display()
@@ -167,6 +162,17 @@ fn report(
     Ok(ExitCode::SUCCESS)
 }
 
+/// Any file or folder in a folder, by name.
+fn first_entry(folder: &Path) -> Result<Option<OsString>, CommandError> {
+    let mut entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        entries => entries.map_err(|error| at(folder, &error))?,
+    };
+    let first = entries.next().transpose();
+    let first = first.map_err(|error| at(folder, &error))?;
+    Ok(first.map(|entry| entry.file_name()))
+}
+
 /// The files of a folder to copy one by one; none if it does not exist.
 fn names(folder: &Path) -> Result<BTreeSet<OsString>, CommandError> {
     let entries = match fs::read_dir(folder) {
@@ -179,7 +185,7 @@ fn names(folder: &Path) -> Result<BTreeSet<OsString>, CommandError> {
         let name = entry.file_name();
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
         let own = name.to_string_lossy();
-        let elsewhere = own.starts_with(DATABASE) || own == LOCK;
+        let elsewhere = own.starts_with(DATABASE_FILE) || own == LOCK_FILE;
         let unfinished = Path::new(&name).extension() == Some(OsStr::new(PART));
         if is_file && !elsewhere && !unfinished {
             names.insert(name);

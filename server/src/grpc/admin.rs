@@ -126,11 +126,11 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::GetStorageResponse>, Status> {
         let usage = self.retention.usage().await.map_err(failed)?;
         Ok(Response::new(v1::GetStorageResponse {
-            database_bytes: usage.store.bytes,
+            database_bytes: usage.disk.bytes,
             record_bytes: usage.record_bytes,
             record_files: usage.record_files,
-            free_bytes: usage.store.free_bytes,
-            finished_games: usage.store.finished_games,
+            free_bytes: usage.disk.free_bytes,
+            finished_games: usage.finished_games,
             open_rooms: self.rooms.open_count() as u64,
             connections: self.connections.clients().len() as u64,
         }))

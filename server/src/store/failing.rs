@@ -10,8 +10,7 @@ use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoreUsage,
-    StoredGame,
+    Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
 };
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
@@ -95,8 +94,8 @@ impl Store for FailingStore {
         self.inner.import(game, summary, lines)
     }
 
-    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
-        self.inner.usage()
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        self.inner.finished_games()
     }
 
     fn prunable(

@@ -9,9 +9,9 @@ use futures::future::{BoxFuture, pending, ready};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    Journal, Keep, Part, ResumableGame, Signed, Store, StoreError, StoreUsage, StoredGame,
-    matches_filter,
+    Journal, Keep, Part, ResumableGame, Signed, Store, StoreError, StoredGame, matches_filter,
 };
+use crate::clock::since_epoch_ms;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -40,6 +40,8 @@ struct Finished {
 #[derive(Debug)]
 struct FinishedGame {
     id: Id,
+    /// When it ended; of an imported game, when it was imported.
+    ended_at_ms: u64,
     summary: v1::RecordSummary,
     stored: StoredGame,
 }
@@ -141,6 +143,7 @@ impl Store for MemoryStore {
         if new {
             finished.insert(FinishedGame {
                 id: game,
+                ended_at_ms: since_epoch_ms(),
                 summary,
                 stored: StoredGame::Imported(lines),
             });
@@ -148,12 +151,8 @@ impl Store for MemoryStore {
         ready(Ok(new)).boxed()
     }
 
-    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
-        let usage = StoreUsage {
-            finished_games: lock(&self.finished).games.len() as u64,
-            ..StoreUsage::default()
-        };
-        ready(Ok(usage)).boxed()
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        ready(Ok(lock(&self.finished).games.len() as u64)).boxed()
     }
 
     fn prunable(
@@ -165,10 +164,12 @@ impl Store for MemoryStore {
         let finished = lock(&self.finished);
         let newest = usize::try_from(keep.newest.unwrap_or(1)).unwrap_or(usize::MAX);
         let old = finished.games.len().saturating_sub(newest.max(1));
-        let ended = |game: &FinishedGame| game.summary.ended_at_ms;
         let found = (finished.games.iter().take(old))
             .filter(|(number, _)| **number > after)
-            .filter(|(_, game)| keep.ended_since_ms.is_none_or(|since| ended(game) < since))
+            .filter(|(_, game)| {
+                keep.ended_since_ms
+                    .is_none_or(|since| game.ended_at_ms < since)
+            })
             .take(count)
             .map(|(number, game)| (*number, game.id))
             .collect();
@@ -257,6 +258,7 @@ impl Journal for MemoryJournal {
         if let Some(summary) = summary {
             lock(&self.finished).insert(FinishedGame {
                 id: self.header.game_id,
+                ended_at_ms: summary.ended_at_ms,
                 summary: *summary,
                 stored: StoredGame::Hosted(Arc::clone(&self.header), entries, signed.map(Arc::new)),
             });

@@ -17,8 +17,8 @@ use futures::future::{BoxFuture, ready};
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use sqlite::{
-    DatabaseCopy, ForgetError, Forgetting, Forgotten, OpenError, SqliteStore, check_copy,
-    copy_database,
+    DATABASE_FILE, DatabaseCopy, ForgetError, Forgetting, Forgotten, LOCK_FILE, OpenError,
+    SqliteStore, check_copy, copy_database,
 };
 
 use crate::metrics::StoreMetrics;
@@ -97,21 +97,19 @@ pub struct ResumableGame {
 /// Which finished games stay. All conditions that are set must allow the deletion of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Keep {
-    /// Those that ended at this time or later, milliseconds since the Unix epoch.
+    /// Those that ended or were imported at this time or later, milliseconds since the Unix epoch.
     pub ended_since_ms: Option<u64>,
-    /// The newest ones, this many.
+    /// The newest ones in the order of their ends or imports, this many.
     pub newest: Option<u64>,
 }
 
-/// How much a store takes.
+/// The disk of a store.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct StoreUsage {
-    /// Bytes on the disk.
+pub struct DiskUsage {
+    /// Bytes that the store takes.
     pub bytes: u64,
-    /// Bytes that are free on that disk.
+    /// Bytes that are free.
     pub free_bytes: u64,
-    /// Number of finished games.
-    pub finished_games: u64,
 }
 
 /// Stores games.
@@ -160,12 +158,14 @@ pub trait Store: Send + Sync + 'static {
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>>;
-    /// How much is stored.
-    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
-        ready(Ok(StoreUsage::default())).boxed()
+    /// Its disk; `None` if it has none, or if the system does not say.
+    fn disk(&self) -> Option<DiskUsage> {
+        None
     }
-    /// At most `count` finished games after a number that need not be kept, with their numbers,
-    /// oldest first. Never the newest game, nor one whose record is still to be written.
+    /// Number of finished games.
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
+    /// At most `count` finished games that need not be kept, by a number that orders them, after a
+    /// number. Never the newest game, nor one whose record is still to be written.
     /// A store that keeps everything returns none.
     fn prunable(
         &self,

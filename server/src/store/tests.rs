@@ -141,6 +141,81 @@ async fn a_signature_is_stored_with_the_end_of_its_game() {
     .await;
 }
 
+/// Ids of the games that need not be kept, as their first bytes.
+async fn prunable(store: &dyn Store, keep: Keep) -> Vec<u8> {
+    let found = store.prunable(keep, 0, 9).await.expect("readable");
+    found.into_iter().map(|(_, id)| id.0[0]).collect()
+}
+
+fn newest(count: u64) -> Keep {
+    Keep {
+        newest: Some(count),
+        ..Keep::default()
+    }
+}
+
+fn since(ended_since_ms: u64) -> Keep {
+    Keep {
+        ended_since_ms: Some(ended_since_ms),
+        ..Keep::default()
+    }
+}
+
+#[tokio::test]
+async fn the_newest_games_are_those_that_ended_last() {
+    with_each_store(async |store| {
+        let mut first = created(store, 1, Durability::Durable).await;
+        for game in [2, 3, 4] {
+            let mut journal = created(store, game, Durability::Durable).await;
+            finish(&mut journal, game).await;
+            store.mark_record_written(Id([game; 16])).await.expect("it");
+        }
+        finish(&mut first, 1).await;
+        store.mark_record_written(Id([1; 16])).await.expect("it");
+        assert_eq!(prunable(store, newest(1)).await, [2, 3, 4]);
+        assert_eq!(prunable(store, newest(2)).await, [2, 3]);
+        assert_eq!(prunable(store, newest(4)).await, [0; 0]);
+        // The newest game stays, because later ones are numbered after it.
+        assert_eq!(prunable(store, since(u64::MAX)).await, [2, 3, 4]);
+        assert_eq!(prunable(store, since(2_000)).await, [0; 0]);
+        let both = Keep {
+            newest: Some(3),
+            ..since(u64::MAX)
+        };
+        assert_eq!(prunable(store, both).await, [2]);
+
+        let found = store.prunable(newest(1), 0, 1).await.expect("readable");
+        let after = store.prunable(newest(1), found[0].0, 9).await;
+        assert_eq!(after.expect("readable").len(), 2, "{found:?}");
+        let deleted: Vec<Id> = [2, 3, 4].map(|game| Id([game; 16])).into();
+        store.delete(deleted).await.expect("committed");
+        let left = listed(store, 0).await;
+        assert_eq!(left, [("game 1".into(), 4)]);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn an_import_is_kept_from_the_time_of_its_import() {
+    with_each_store(async |store| {
+        let last_year = header(1, Durability::Durable);
+        let import = store.import(last_year.game_id, *summary(&last_year), Arc::from([]));
+        assert_eq!(import.await, Ok(true));
+        let mut newer = created(store, 2, Durability::Durable).await;
+        finish(&mut newer, 2).await;
+        store.mark_record_written(Id([2; 16])).await.expect("it");
+        if store.outlives_server() {
+            assert_eq!(prunable(store, newest(1)).await, [0; 0], "no record yet");
+            let written = store.mark_record_written(last_year.game_id);
+            written.await.expect("committed");
+        }
+        assert_eq!(prunable(store, newest(1)).await, [1]);
+        assert_eq!(prunable(store, since(3_000)).await, [0; 0], "just imported");
+        assert_eq!(prunable(store, since(u64::MAX)).await, [1]);
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
     with_each_store(async |store| {

@@ -78,6 +78,14 @@ def test_nothing_is_overwritten_and_damaged_copies_are_refused(server: GuardedSe
     onto = attempt("restore", backup, "--data-dir", data)
     assert onto.returncode == 1
     assert "is not empty" in onto.stderr
+    for name in ["games.sqlite3", "games.sqlite3-wal", "games.lock", "tokens.json.1.part", "any-other-file"]:
+        target = tmp_path / f"has-{name}"
+        target.mkdir()
+        (target / name).write_bytes(b"keep")
+        onto = attempt("restore", backup, "--data-dir", target)
+        assert onto.returncode == 1, name
+        assert f"it has {name}" in onto.stderr
+        assert (target / name).read_bytes() == b"keep"
 
     database = backup / "games.sqlite3"
     good = database.read_bytes()

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-/// Name of the database in the data directory.
-pub(super) const FILE: &str = "games.sqlite3";
+/// The file of the database in a data directory. Beside it lie files whose names begin with it.
+pub const FILE: &str = "games.sqlite3";
 /// How long to wait for a database that another program has locked.
 pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(10);
 

@@ -15,6 +15,7 @@ use sqlx::{Connection as _, Row as _};
 use super::errors::explain;
 use super::form::{self, Unreadable};
 use super::open::{self, Opened};
+use super::rows::with_own_rows;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
@@ -243,14 +244,10 @@ async fn journal_of(
     let number: i64 = game.get("number");
     let last_row: Option<i64> = game.get("last_row");
     let rows = sqlx::query(match last_row {
-        Some(_) => {
-            "WITH RECURSIVE own (row, entries, previous) AS (
-                 SELECT row, entries, previous FROM journal WHERE row = $1 AND game = $2
-                 UNION ALL
-                 SELECT journal.row, journal.entries, journal.previous FROM own JOIN journal ON journal.row = own.previous
-                 WHERE journal.row < own.row AND journal.game = $2)
-             SELECT row, entries FROM own ORDER BY row"
-        }
+        Some(_) => with_own_rows!(
+            "row = $1 AND game = $2",
+            "SELECT row, entries FROM journal WHERE row IN (SELECT row FROM own) ORDER BY row"
+        ),
         // The game is not over: the position of its last row is unknown.
         None => "SELECT row, entries FROM journal WHERE $1 IS NULL AND game = $2 ORDER BY row",
     })

@@ -27,11 +27,12 @@ use tokio::task::JoinHandle;
 use tracing::error;
 
 pub use backup::{DatabaseCopy, check_copy, copy_database};
+pub use errors::FILE as DATABASE_FILE;
 pub use forget::{ForgetError, Forgetting, Forgotten};
-pub use open::OpenError;
+pub use open::{LOCK_FILE, OpenError};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Part, ResumableGame, Store, StoreError, StoreUsage, StoredGame};
+use super::{DiskUsage, Journal, Part, ResumableGame, Store, StoreError, StoredGame};
 use crate::metrics::StoreMetrics;
 use crate::store::Keep;
 use chefshat_room::ids::Id;
@@ -77,7 +78,7 @@ impl SqliteStore {
         )
         .fetch_one(&opened.readers)
         .await
-        .map_err(|error| OpenError::Other(data_dir.join(errors::FILE), explain(&error)))?;
+        .map_err(|error| OpenError::Other(data_dir.join(DATABASE_FILE), explain(&error)))?;
         let (commands, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let codec = Codec::new();
@@ -210,21 +211,18 @@ impl Store for SqliteStore {
         .boxed()
     }
 
-    fn usage(&self) -> BoxFuture<'_, Result<StoreUsage, StoreError>> {
-        async move {
-            let files = ["", "-wal"].map(|ending| format!("{}{ending}", errors::FILE));
-            let bytes = (files.iter())
-                .filter_map(|file| self.data_dir.join(file).metadata().ok())
-                .map(|about| about.len())
-                .sum();
-            let free = rustix::fs::statvfs(&self.data_dir);
-            Ok(StoreUsage {
-                bytes,
-                free_bytes: free.map_or(0, |disk| disk.f_bavail * disk.f_frsize),
-                finished_games: self.reader.finished_games().await?,
-            })
-        }
-        .boxed()
+    fn disk(&self) -> Option<DiskUsage> {
+        let disk = rustix::fs::statvfs(&self.data_dir).ok()?;
+        let files = ["", "-wal"].map(|ending| format!("{DATABASE_FILE}{ending}"));
+        let sizes = files.map(|file| self.data_dir.join(file).metadata().map_or(0, |it| it.len()));
+        Some(DiskUsage {
+            bytes: sizes.iter().sum(),
+            free_bytes: disk.f_bavail * disk.f_frsize,
+        })
+    }
+
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        self.reader.finished_games().boxed()
     }
 
     fn prunable(

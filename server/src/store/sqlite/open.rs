@@ -13,10 +13,11 @@ use sqlx::sqlite::{
 use sqlx::{Connection as _, SqlSafeStr as _};
 
 use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
+use super::rows::with_own_rows;
 use crate::store::StoreError;
 
 /// The file that a server locks while it uses the data directory.
-const LOCK_FILE: &str = "games.lock";
+pub const LOCK_FILE: &str = "games.lock";
 /// Identifies our databases: `PRAGMA application_id` of the first migration.
 pub(super) const APPLICATION_ID: i64 = 0x4368_4874;
 /// Connections for reading.
@@ -24,7 +25,7 @@ const READERS: u32 = 4;
 /// Prepared statements per connection.
 const STATEMENTS: usize = 64;
 /// The migrations, oldest first. A released one never changes.
-const MIGRATIONS: [(i64, &str, &str); 4] = [
+const MIGRATIONS: [(i64, &str, &str); 5] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (
         2,
@@ -36,6 +37,11 @@ const MIGRATIONS: [(i64, &str, &str); 4] = [
         4,
         "signature",
         include_str!("migrations/0004_signature.sql"),
+    ),
+    (
+        5,
+        "import time",
+        include_str!("migrations/0005_import_time.sql"),
     ),
 ];
 
@@ -162,11 +168,10 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
         })?;
     // Games that were abandoned before the deal leave nothing behind.
     for forgotten in [
-        "WITH RECURSIVE forgotten (row) AS (
-             SELECT last_row FROM games WHERE state <> 0 AND summary IS NULL
-             UNION ALL
-             SELECT previous FROM forgotten JOIN journal USING (row))
-         DELETE FROM journal WHERE row IN forgotten",
+        with_own_rows!(
+            "(row, game) IN (SELECT last_row, number FROM games WHERE state <> 0 AND summary IS NULL)",
+            "DELETE FROM journal WHERE row IN (SELECT row FROM own)"
+        ),
         "DELETE FROM games WHERE state <> 0 AND summary IS NULL",
     ] {
         sqlx::query(forgotten)

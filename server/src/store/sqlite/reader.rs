@@ -261,7 +261,7 @@ impl Reader {
             .collect()
     }
 
-    /// Number of finished games.
+    /// See `Store::finished_games`.
     pub(super) async fn finished_games(&self) -> Result<u64, StoreError> {
         let count: i64 = sqlx::query_scalar("SELECT count(*) FROM games WHERE state <> 0")
             .fetch_one(&self.pool)
@@ -270,7 +270,7 @@ impl Reader {
         Ok(u64::try_from(count).unwrap_or_default())
     }
 
-    /// Finished games after a number that need not be kept.
+    /// See `Store::prunable`. Games without a record are none of the newest ones.
     pub(super) async fn prunable(
         &self,
         keep: Keep,
@@ -280,15 +280,14 @@ impl Reader {
         let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
         let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
             "SELECT number, game_id FROM games
-             WHERE state <> 0 AND (filed = 1 OR added = 1 OR summary IS NULL) AND number > $1
-               AND number < coalesce((SELECT number FROM games WHERE listed IS NOT NULL
-                                      ORDER BY number DESC LIMIT 1 OFFSET $2), 0) + 1
-               AND coalesce(ended_at_ms, created_at_ms, 0) < $3
-               AND number < (SELECT max(number) FROM games WHERE listed IS NOT NULL)
+             WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+               AND (summary IS NULL
+                    OR filed = 1 AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                                ORDER BY listed DESC LIMIT 1 OFFSET $2))
              ORDER BY number LIMIT $4",
         )
         .bind(integer(after))
-        .bind(integer(keep.newest.unwrap_or_default()))
+        .bind(integer(keep.newest.unwrap_or_default().max(1)))
         .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
         .bind(integer(count as u64))
         .fetch_all(&self.pool)

@@ -1,4 +1,4 @@
-//! Reads the journal of one game from its rows.
+//! The rows of one game's journal: finds them, and reads the journal from them.
 
 use sqlx::Row as _;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
@@ -8,6 +8,25 @@ use super::errors::explain;
 use super::form::{self, Unreadable};
 use crate::store::StoreError;
 use chefshat_room::journal::Entry;
+
+/// Prefixes a statement with `own (row, game, previous)`: the rows of a journal, found from the last
+/// one, which the condition `$last` selects, back to the first. A damaged link leads neither into
+/// another game nor around in a circle.
+macro_rules! with_own_rows {
+    ($last:literal, $statement:literal) => {
+        concat!(
+            "WITH RECURSIVE own (row, game, previous) AS (
+                 SELECT row, game, previous FROM journal WHERE ",
+            $last,
+            " UNION ALL
+                 SELECT journal.row, journal.game, journal.previous
+                 FROM own JOIN journal ON journal.row = own.previous
+                 WHERE journal.row < own.row AND journal.game = own.game) ",
+            $statement
+        )
+    };
+}
+pub(super) use with_own_rows;
 
 /// A decoded journal.
 #[derive(Default)]
@@ -39,15 +58,10 @@ pub(super) async fn journal(
     number: i64,
     last_row: Option<i64>,
 ) -> Result<Result<Read, Unreadable>, StoreError> {
-    let rows = sqlx::query(
-        "WITH RECURSIVE own (row, position, entries, previous) AS (
-             SELECT row, position, entries, previous FROM journal WHERE row = $1 AND game = $2
-             UNION ALL
-             SELECT journal.row, journal.position, journal.entries, journal.previous
-             FROM own JOIN journal ON journal.row = own.previous
-             WHERE journal.row < own.row AND journal.game = $2)
-         SELECT row, position, entries FROM own ORDER BY row",
-    )
+    let rows = sqlx::query(with_own_rows!(
+        "row = $1 AND game = $2",
+        "SELECT row, position, entries FROM journal WHERE row IN (SELECT row FROM own) ORDER BY row"
+    ))
     .bind(last_row)
     .bind(number)
     .fetch_all(pool)

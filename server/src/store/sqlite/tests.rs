@@ -20,7 +20,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore, form};
-use crate::store::{Part, Store, StoredGame};
+use crate::store::{Keep, Part, Store, StoredGame};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
@@ -415,52 +415,103 @@ async fn an_unreadable_game_is_left_unchanged_and_others_resume() {
     assert_eq!(games, [Id([3; 16])]);
 }
 
+/// Stores two finished games with [`entries`], whose rows alternate, and closes the database.
+async fn two_games(folder: &Path) -> [Arc<GameHeader>; 2] {
+    let store = opened(folder).await;
+    let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
+    let mut journals = Vec::new();
+    for header in &headers {
+        let journal = store.create(Arc::clone(header), Vec::new()).await;
+        journals.push(journal.expect("committed"));
+    }
+    for entry in entries() {
+        for journal in &mut journals {
+            let mut entry = vec![entry.clone()];
+            journal.append(&mut entry).await.expect("committed");
+        }
+    }
+    for (journal, header) in journals.iter_mut().zip(&headers) {
+        let finished = journal.finish(Some(summary(header)), None).await;
+        finished.expect("committed");
+    }
+    store.close().await;
+    headers
+}
+
+/// Executes a statement on a closed database.
+async fn edit(folder: &Path, statement: &'static str) {
+    let options = SqliteConnectOptions::new().filename(folder.join(super::errors::FILE));
+    let connection = SqliteConnection::connect_with(&options).await;
+    let mut connection = connection.expect("a connection");
+    connection.execute(statement).await.expect("executed");
+    connection.close().await.expect("closed");
+}
+
 #[tokio::test]
 async fn a_missing_part_of_a_finished_game_is_detected() {
-    let rows = i64::try_from(entries().len()).expect("few");
-    for missing in [0, rows / 2, rows - 1] {
+    for damage in [
+        "DELETE FROM journal WHERE game = 1 AND position = 0",
+        "DELETE FROM journal WHERE game = 1 AND position = 4",
+        "DELETE FROM journal WHERE row = (SELECT max(row) FROM journal WHERE game = 1)",
+    ] {
         let folder = tempfile::tempdir().expect("a folder");
-        let store = opened(folder.path()).await;
-        let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
-        let mut journals = Vec::new();
-        for header in &headers {
-            journals.push(
-                store
-                    .create(Arc::clone(header), Vec::new())
-                    .await
-                    .expect("committed"),
-            );
-        }
-        // The rows of the two games alternate.
-        for entry in entries() {
-            for journal in &mut journals {
-                let mut entry = vec![entry.clone()];
-                journal.append(&mut entry).await.expect("committed");
-            }
-        }
-        for (journal, header) in journals.iter_mut().zip(&headers) {
-            journal
-                .finish(Some(summary(header)), None)
-                .await
-                .expect("committed");
-        }
-        store.close().await;
-        drop(store);
-        let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
-        let mut connection = SqliteConnection::connect_with(&options)
-            .await
-            .expect("a connection");
-        sqlx::query("DELETE FROM journal WHERE game = 1 AND position = $1")
-            .bind(missing)
-            .execute(&mut connection)
-            .await
-            .expect("executed");
-        connection.close().await.expect("closed");
+        let headers = two_games(folder.path()).await;
+        edit(folder.path(), damage).await;
         let store = opened(folder.path()).await;
         let error = store.finished(headers[0].game_id).await.expect_err("a gap");
         assert!(error.to_string().contains("missing"), "{error}");
         let journal = finished_journal(&store, headers[1].game_id).await;
         assert_eq!(shown(&journal), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn deleting_a_damaged_game_deletes_no_row_of_another() {
+    for damage in [
+        "UPDATE journal SET previous = row - 1 WHERE game = 2",
+        // A circle.
+        "UPDATE journal SET previous = (SELECT max(row) FROM journal WHERE game = 2)
+         WHERE game = 2 AND position = 0",
+        "UPDATE games SET last_row = (SELECT max(row) FROM journal WHERE game = 1)
+         WHERE number = 2",
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [whole, damaged] = two_games(folder.path()).await;
+        edit(folder.path(), damage).await;
+        let store = opened(folder.path()).await;
+        let deleted = store.delete(vec![damaged.game_id]).await;
+        deleted.expect("committed");
+        assert!(matches!(store.finished(damaged.game_id).await, Ok(None)));
+        let journal = finished_journal(&store, whole.game_id).await;
+        assert_eq!(shown(&journal), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn an_import_of_an_earlier_version_is_kept_from_the_first_start_of_this_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let imported = header(1, Durability::Durable);
+    for game in [imported.game_id, Id([2; 16])] {
+        let import = store.import(game, *summary(&imported), Arc::from([])).await;
+        assert_eq!(import, Ok(true));
+        store.mark_record_written(game).await.expect("committed");
+    }
+    store.close().await;
+    drop(store);
+    edit(
+        folder.path(),
+        "UPDATE games SET ended_at_ms = 1; DELETE FROM _sqlx_migrations WHERE version > 4",
+    )
+    .await;
+    let store = opened(folder.path()).await;
+    for (ended_since_ms, prunable) in [(summary(&imported).ended_at_ms, 0), (u64::MAX, 1)] {
+        let keep = Keep {
+            ended_since_ms: Some(ended_since_ms),
+            ..Keep::default()
+        };
+        let found = store.prunable(keep, 0, 9).await.expect("readable");
+        assert_eq!(found.len(), prunable);
     }
 }
 

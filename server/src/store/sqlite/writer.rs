@@ -12,10 +12,11 @@ use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection as _, Executor as _};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
-use tracing::error;
+use tracing::{error, warn};
 
 use super::errors::explain;
 use super::form::{self, FORM};
+use super::rows::with_own_rows;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
@@ -158,6 +159,8 @@ pub(super) async fn run(
                 }),
         };
         metrics.committed(pending.len(), began.elapsed());
+        let deletes = |(order, _): &Pending| matches!(order, WriteCommand::Delete { .. });
+        let frees_pages = committed.is_ok() && pending.iter().any(deletes);
         for (index, (_, reply)) in pending.drain(..).enumerate() {
             let answer = match &committed {
                 Ok(taken) => taken
@@ -167,6 +170,9 @@ pub(super) async fn run(
             };
             // The room may have gone.
             let _ = reply.send(answer);
+        }
+        if frees_pages {
+            free_pages(&mut connection).await;
         }
     }
     // The write-ahead log is as safe as the database: closing only tidies up.
@@ -341,25 +347,25 @@ async fn write(
             .bind(row.entries.as_slice());
     }
     query.execute(&mut *connection).await?;
-    let deletes = |(order, _): &Pending| matches!(order, WriteCommand::Delete { .. });
-    if pending.iter().any(deletes) {
-        // Some pages at a time: rooms wait for it. The rest is used again.
-        let text = format!("PRAGMA incremental_vacuum({FREED_PAGES})");
-        connection.execute(AssertSqlSafe(text)).await?;
-    }
     Ok(taken)
 }
 
-/// Deletes a finished game. The rows of its journal are found from the last to the first.
+/// Gives unused pages back to the disk, some at a time: rooms wait for it. The rest is used again.
+async fn free_pages(connection: &mut SqliteConnection) {
+    let text = format!("PRAGMA incremental_vacuum({FREED_PAGES})");
+    if let Err(cause) = connection.execute(AssertSqlSafe(text)).await {
+        // It needs space in the write-ahead log. What was committed before is safe.
+        warn!(%cause, "the disk space of deleted games could not be given back");
+    }
+}
+
+/// Deletes a finished game.
 async fn delete(connection: &mut SqliteConnection, game: Id) -> sqlx::Result<()> {
     for text in [
-        "WITH RECURSIVE rows (row, previous) AS (
-             SELECT row, previous FROM journal
-             WHERE row = (SELECT last_row FROM games WHERE game_id = $1 AND state <> 0)
-             UNION ALL
-             SELECT journal.row, journal.previous FROM journal JOIN rows ON journal.row = rows.previous
-         )
-         DELETE FROM journal WHERE row IN (SELECT row FROM rows)",
+        with_own_rows!(
+            "(row, game) = (SELECT last_row, number FROM games WHERE game_id = $1 AND state <> 0)",
+            "DELETE FROM journal WHERE row IN (SELECT row FROM own)"
+        ),
         "DELETE FROM added_records WHERE game = (SELECT number FROM games WHERE game_id = $1 AND state <> 0)",
         "DELETE FROM participants WHERE game = (SELECT number FROM games WHERE game_id = $1 AND state <> 0)",
         "DELETE FROM games WHERE game_id = $1 AND state <> 0",
@@ -444,6 +450,11 @@ async fn summarise(
     summary: &v1::RecordSummary,
 ) -> sqlx::Result<()> {
     *last_listed += 1;
+    // How long an imported game is kept counts from its import.
+    let ended_at_ms = match summary.added {
+        true => since_epoch_ms(),
+        false => summary.ended_at_ms,
+    };
     sqlx::query(
         "UPDATE games SET state = $2, summary = $3, origin = $4, room_name = $5, created_at_ms = $6, ended_at_ms = $7,
                           listed = $8
@@ -455,7 +466,7 @@ async fn summarise(
     .bind(summary.origin)
     .bind(summary.room_name.as_str())
     .bind(i64::try_from(summary.created_at_ms).unwrap_or(i64::MAX))
-    .bind(i64::try_from(summary.ended_at_ms).unwrap_or(i64::MAX))
+    .bind(i64::try_from(ended_at_ms).unwrap_or(i64::MAX))
     .bind(*last_listed)
     .execute(&mut *connection)
     .await?;

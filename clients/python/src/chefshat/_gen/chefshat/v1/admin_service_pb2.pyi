@@ -312,8 +312,8 @@ Global___GetStorageResponse: _TypeAlias = GetStorageResponse  # noqa: Y015
 
 @_typing.final
 class PruneRecordsRequest(_message.Message):
-    """Requests the deletion of finished games: those that match all conditions that are set, at least
-    one. INVALID_ARGUMENT (PRUNE_REFUSED) if none is.
+    """Requests the deletion of finished games. At least one field must be set; a game is deleted only
+    if every set field allows it. INVALID_ARGUMENT (PRUNE_REFUSED) if none is set.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -321,9 +321,13 @@ class PruneRecordsRequest(_message.Message):
     ENDED_BEFORE_MS_FIELD_NUMBER: _builtins.int
     KEEP_FIELD_NUMBER: _builtins.int
     ended_before_ms: _builtins.int
-    """Only games that ended before this time, milliseconds since the Unix epoch; 0: whenever."""
+    """Only games that ended before this time, milliseconds since the Unix epoch; 0: no such condition.
+    For an imported game the time of its import counts.
+    """
     keep: _builtins.int
-    """Not the newest games, this many of them; 0: all but the newest."""
+    """Number of newest games to keep, in the order in which they ended or were imported; 0: no such
+    condition. The newest game is always kept.
+    """
     def __init__(
         self,
         *,

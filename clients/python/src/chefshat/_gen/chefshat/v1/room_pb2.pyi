@@ -434,9 +434,9 @@ class RoomPolicy(_message.Message):
     ONE_SEAT_PER_CLIENT_FIELD_NUMBER: _builtins.int
     VISIBILITY_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
-    """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. For a special
-    action, whoever holds the jokers: the longest time of any seat that participants can take, and
-    no bank.
+    """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. A
+    special action has the longest time of any seat that participants can take, for every holder of
+    the jokers, and no bank.
     """
     bank_ms: _builtins.int
     """The time bank: milliseconds that each seat may use beyond that in the game, 0..=86400000; by

@@ -80,7 +80,7 @@ class GetServerInfoResponse(_message.Message):
     """Whether the server is shutting down and refuses new rooms."""
     signing_key: _builtins.str
     """The public key that signs the server's records: "ed25519:" and 64 hexadecimal digits; empty if
-    it signs none, because it has no data folder. Ask it over a connection that you trust.
+    it signs none, because it has no data directory. Ask it over a connection that you trust.
     """
     @_builtins.property
     def presets(self) -> _containers.RepeatedCompositeFieldContainer[_rules_pb2.RuleSet]:

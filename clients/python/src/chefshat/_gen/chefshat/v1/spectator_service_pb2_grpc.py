@@ -51,8 +51,9 @@ class SpectatorServiceServicer:
         events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
         (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
         OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
-        `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
-        the spectator does not keep up: watch again from the event after the last one received.
+        `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
+        last one received.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

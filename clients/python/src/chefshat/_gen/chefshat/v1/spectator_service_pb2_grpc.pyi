@@ -38,8 +38,9 @@ class SpectatorServiceStub:
     events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
     (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
     OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
-    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
-    the spectator does not keep up: watch again from the event after the last one received.
+    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+    (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
+    last one received.
     """
 
 @_typing.type_check_only
@@ -52,8 +53,9 @@ class SpectatorServiceAsyncStub(SpectatorServiceStub):
     events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
     (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
     OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
-    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
-    the spectator does not keep up: watch again from the event after the last one received.
+    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+    (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
+    last one received.
     """
 
 class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -69,8 +71,9 @@ class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
         events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
         (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
         OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
-        `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
-        the spectator does not keep up: watch again from the event after the last one received.
+        `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
+        last one received.
         """
 
 def add_SpectatorServiceServicer_to_server(servicer: SpectatorServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
