@@ -9,13 +9,15 @@ use std::sync::Arc;
 
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use chefshat_record::signature::{PublicKey, SigningKey};
+use futures::future::Either;
 use tokio::sync::Semaphore;
 use tracing::error;
 
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert;
-use crate::store::Signed;
-use chefshat_room::journal::{Entry, GameHeader};
+use crate::limits::{Background, Key};
+use crate::store::{Journal, Signed};
+use chefshat_room::journal::GameHeader;
 
 /// The file of the key in a data directory.
 const FILE: &str = "signing-key";
@@ -84,7 +86,8 @@ fn create(path: &Path, seed: &[u8; 32]) -> Result<(), WriteError> {
     file.finish()
 }
 
-/// Signs games that end, a few at a time.
+/// Signs games that end, a few at a time. Those that nobody plays wait in the background, so that
+/// they delay the end of no other.
 #[derive(Clone)]
 pub struct Signer {
     key: Option<Arc<SigningKey>>,
@@ -105,25 +108,44 @@ impl Signer {
         self.key.as_ref().map(|key| key.public())
     }
 
-    /// Signs the record of a game that has ended.
-    pub async fn sign(&self, header: Arc<GameHeader>, journal: Vec<Entry>) -> Option<Signed> {
+    /// Signs the record of a game that has ended, in the background if given, charged to a caller.
+    /// A record that cannot be signed stays unsigned.
+    pub async fn sign(
+        &self,
+        header: Arc<GameHeader>,
+        journal: &mut dyn Journal,
+        background: Option<(&Background, Key)>,
+    ) -> Option<Signed> {
         let key = Arc::clone(self.key.as_ref()?);
-        // The semaphore is never closed; if it were, the record would merely not wait.
-        let _permit = self.permits.acquire().await.ok();
-        let signing = tokio::task::spawn_blocking(move || {
-            let lines = convert::record_lines(&header, &journal);
+        // Before the journal is read: a long one takes much memory.
+        let _right = match background {
+            Some((background, charged)) => Either::Left(background.slice(charged).await),
+            // The semaphore is never closed; if it were, the record would merely not wait.
+            None => Either::Right(self.permits.acquire().await.ok()),
+        };
+        let game = header.game_id;
+        let entries = match journal.entries().await {
+            Ok(entries) => entries,
+            Err(error) => {
+                error!(%game, %error, "a record could not be signed; it stays unsigned");
+                return None;
+            }
+        };
+        let signing = move || {
+            let lines = convert::record_lines(&header, &entries);
             Signed {
                 server_version: convert::SERVER_VERSION.to_owned(),
                 signature: key.sign(&lines),
             }
-        });
-        match signing.await {
-            Ok(signed) => Some(signed),
-            Err(error) => {
-                error!(%error, "a record could not be signed; it stays unsigned");
-                None
-            }
+        };
+        let signed = match background {
+            Some((background, _)) => background.run(signing).await,
+            None => tokio::task::spawn_blocking(signing).await.ok(),
+        };
+        if signed.is_none() {
+            error!(%game, "a record could not be signed; it stays unsigned");
         }
+        signed
     }
 }
 

@@ -920,11 +920,12 @@ impl Room {
         let summary = self.core.game().map(|_| convert::summary(&self.core));
         let has_record = summary.is_some();
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
-        let finished = match self.sign(has_record).await {
-            Ok(signed) => self.journal.finish(summary.map(Box::new), signed).await,
-            Err(error) => Err(error),
+        let signed = match has_record {
+            true => self.sign().await,
+            false => None,
         };
-        if let Err(error) = finished {
+        let finished = self.journal.finish(summary.map(Box::new), signed);
+        if let Err(error) = finished.await {
             self.fail(&error);
             return false;
         }
@@ -944,19 +945,13 @@ impl Room {
         true
     }
 
-    /// Signs the record of the game, if there is one and the server has a key.
-    async fn sign(&mut self, has_record: bool) -> Result<Option<Signed>, StoreError> {
-        let signer = &self.context.signer;
-        if !has_record || signer.public().is_none() {
-            return Ok(None);
-        }
-        // One long game of built-in agents after another.
-        let _slice = match self.core.is_built_in_only() {
-            true => Some(self.context.background.slice(self.context.owner).await),
-            false => None,
-        };
-        let entries = self.journal.entries().await?;
-        Ok(signer.sign(Arc::clone(self.core.header()), entries).await)
+    /// Signs the record of the game.
+    async fn sign(&mut self) -> Option<Signed> {
+        let background = self.core.is_built_in_only();
+        let background = background.then_some((&*self.context.background, self.context.owner));
+        let header = Arc::clone(self.core.header());
+        let journal = &mut *self.journal;
+        self.context.signer.sign(header, journal, background).await
     }
 
     /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that

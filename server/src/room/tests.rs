@@ -1,16 +1,17 @@
 //! The task of a room under tokio's paused clock, with streams that do not read.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
+use chefshat_record::signature::SigningKey;
 use futures::FutureExt as _;
 use futures::StreamExt as _;
-use futures::future::BoxFuture;
+use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
@@ -86,7 +87,7 @@ async fn room_with(
         None,
         change(journal),
         TaskContext {
-            signer: Signer::new(None),
+            signer: Signer::new(Some(Arc::new(SigningKey::from_seed(&[7; 32])))),
             record_writer: RecordWriter::new(
                 store.clone(),
                 None,
@@ -420,6 +421,60 @@ async fn check_streams_end_after_panic(at_once: bool) {
         assert_eq!(end, Some(StreamEnd::RoomGone));
     }
     assert!(room.describe().await.is_err());
+}
+
+/// A journal that may fail to read back, and reports whether its game ends with a signature.
+struct Observed {
+    readable: bool,
+    signed: Arc<OnceLock<bool>>,
+    journal: Box<dyn Journal>,
+}
+
+impl Journal for Observed {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.journal.append(entries)
+    }
+
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        match self.readable {
+            true => self.journal.entries(),
+            false => ready(Err(StoreError::Failed("no reader is free".into()))).boxed(),
+        }
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.signed.set(signed.is_some()).expect("one end");
+        self.journal.finish(summary, signed)
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_game_that_cannot_be_read_back_ends_unsigned() {
+    for readable in [true, false] {
+        let signed = Arc::new(OnceLock::new());
+        let room = room_with(Policy::default(), 1, |journal| {
+            Box::new(Observed {
+                readable,
+                signed: Arc::clone(&signed),
+                journal,
+            })
+        });
+        let room = room.await;
+        let mut seats = Vec::new();
+        for _ in 0..4 {
+            seats.push(take_seat(&room).await);
+        }
+        let reads = seats.iter_mut().map(|seat| read(&room, seat, true));
+        futures::future::join_all(reads).await;
+        assert_eq!(signed.get(), Some(&readable));
+    }
 }
 
 #[tokio::test(start_paused = true)]
