@@ -139,7 +139,7 @@ impl Export {
             Layout::Tables => gather(&lines).map(Game::Rows),
             Layout::ChefsHatGym => checked_info(&lines).and_then(|info| {
                 let sheet = lay_out(&lines, &info)?;
-                Ok(Game::Sheet(info, sheet))
+                Ok(Game::Sheet(Box::new(info), sheet))
             }),
         };
         game.map_err(|error| error.to_string())
@@ -179,7 +179,7 @@ impl Exported {
 /// A game to write.
 enum Game {
     Rows(GameRows),
-    Sheet(GameInfo, Sheet),
+    Sheet(Box<GameInfo>, Sheet),
 }
 
 impl Game {

@@ -30,6 +30,7 @@ mod event;
 mod exchange;
 mod game;
 mod ids;
+pub mod limits;
 mod mask;
 mod metrics;
 mod observation;

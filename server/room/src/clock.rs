@@ -163,7 +163,7 @@ impl Core {
     }
 
     /// Time for the open decision of a seat before its bank is used. A silent decision has the
-    /// longest time of any seat that participants can take, whoever takes it.
+    /// longest time of any seat that participants can take, for every seat.
     fn decision_time(&self, seat: Seat) -> Duration {
         match self.is_silent() {
             true => (self.all_seats())

@@ -2,6 +2,10 @@
 
 use std::time::Duration;
 
+pub use chefshat_engine::limits::{
+    MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_CONNECTION_EVENTS,
+};
+
 /// Before the game starts, a seat becomes free again if its ticket is not attached within this
 /// time.
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);
@@ -17,14 +21,8 @@ pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);
 /// How often the room checks whether the transport has received a request whose deadline would have
 /// passed.
 pub(crate) const RECHECK_INTERVAL: Duration = Duration::from_millis(20);
-/// Most annotations recorded per seat and game, bytes.
-pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
-/// Most annotations recorded per decision, bytes.
-pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
 /// Most expressions of one seat in one game.
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
-/// Most events of lost and new connections of one seat in one game. Later ones are not published.
-pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
 
 /// Most times that seats are taken in a room, including freed ones: each stays in its log.
 pub const MAX_SEATINGS: usize = 1_000;
@@ -33,9 +31,6 @@ pub const MAX_REPORTS: usize = 20_000;
 /// The game of a physical table is aborted if nothing is reported for this long, also while it is
 /// paused.
 pub const MAX_IDLE: Duration = Duration::from_secs(12 * 60 * 60);
-/// Invalid attempts at one decision after which the default is taken even if attempts are
-/// unlimited, so that records stay bounded.
-pub const MAX_ATTEMPTS: u32 = 10_000;
 /// Most changes of one game. A game that reaches this limit is aborted.
 pub const MAX_GAME_CHANGES: u64 = 2_000_000;
 /// Most decisions that built-in agents take before the room reads its mailbox again.

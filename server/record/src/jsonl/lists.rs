@@ -1,13 +1,12 @@
 //! Bounds on the lists of a line. An entry of a few bytes in a file can take a hundred in memory,
 //! so the length of the line alone does not bound it. The replay checks exact lengths.
 
+use chefshat_engine::limits::MAX_ATTEMPTS;
 use chefshat_engine::{MAX_FACES, MAX_JOKERS, MAX_SEATS};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 /// The most cards of a deck, and so of a hand.
 const MAX_CARDS: usize = MAX_FACES as usize * (MAX_FACES as usize + 1) / 2 + MAX_JOKERS as usize;
-/// The most invalid attempts per decision, after which a server takes the default.
-const MAX_ATTEMPTS: usize = 10_000;
 /// The most scores or keys of annotations; a server accepts no more.
 const MAX_ANNOTATIONS: usize = 1_024;
 /// The most parts a branched game may have taken over, one per branch before it.
@@ -65,7 +64,7 @@ fn of_decision(decision: &v1::DecisionRecord) -> Option<Excess> {
         (
             "invalidAttempts",
             decision.invalid_attempts.len(),
-            MAX_ATTEMPTS,
+            MAX_ATTEMPTS as usize,
         ),
         ("actionScores", scores, MAX_ANNOTATIONS),
         ("extra", extra, MAX_ANNOTATIONS),

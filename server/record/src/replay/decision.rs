@@ -1,5 +1,6 @@
 //! Checks a decision against the game before it: seat, legality, source and time.
 
+use chefshat_engine::limits::{MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS};
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Game, Mask, Seat};
 use chefshat_proto::v1::{self, DecisionSource as Source};
 use prost::Message;
@@ -7,13 +8,6 @@ use prost::Message;
 use super::difference::must_be;
 use super::header::Setup;
 use crate::convert::{action_id, decision_kind, has_real_cards, invalid_reward, seat_number};
-
-/// Invalid attempts before the default decision, even if the policy sets no limit.
-const MAX_ATTEMPTS: u32 = 10_000;
-/// Most annotations of one decision, bytes.
-pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
-/// Most annotations of one seat in one game, bytes.
-pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
 
 /// The state of a seat between its decisions.
 #[derive(Debug, Clone)]

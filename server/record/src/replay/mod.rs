@@ -14,7 +14,6 @@ mod seed;
 use chefshat_engine::{BySeat, Game};
 use chefshat_proto::v1::{self, record_line::Line};
 
-pub use decision::{MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME};
 use fault::Fault;
 pub use fault::ReplayError;
 use game::Replay;

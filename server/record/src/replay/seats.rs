@@ -1,15 +1,13 @@
 //! Checks the events of the room: seating, connections, substitution, expressions, and what was
 //! reported from a physical table. They do not affect the game.
 
+use chefshat_engine::limits::MAX_CONNECTION_EVENTS;
 use chefshat_engine::{RuleSet, Seat};
 use chefshat_proto::v1::{self, game_event::Kind};
 
 use super::decision::SeatClock;
 use super::difference::{difference, must_be};
 use crate::convert::{check_expression, seat_from_number};
-
-/// Most events of lost and new connections of one seat; later ones are not published.
-const MAX_CONNECTION_EVENTS: u32 = 1_000;
 
 /// The seats of a recorded room after the events so far.
 #[derive(Debug)]
