@@ -1,6 +1,7 @@
 //! What a server counts for its operator: the metrics that `scrape` serves to Prometheus. Counting
-//! takes an atomic operation or two and no lock. What can be read when it is asked for is not
-//! counted here but read by `scrape`. Labels have a fixed set of values: never names or ids.
+//! takes an atomic operation or two; only a refusal and a new stream take a lock. What can be read
+//! when it is asked for is not counted here but read by `scrape`. Labels have a fixed set of values:
+//! never names or ids.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};

@@ -42,8 +42,8 @@ impl RecordWriter {
         self.data_dir.as_deref()
     }
 
-    /// Queues the record of a finished game, charged to its creator, and marks it as written in the store. A record that
-    /// fails is tried again at the next start of the server.
+    /// Queues the record of a finished game, charged to its creator, and marks it as written in the
+    /// store. A record that fails is tried again at the next start of the server.
     pub fn write_record(&self, game: Id, charged: Key) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();

@@ -194,7 +194,7 @@ fn unknown_key(name: &str, settings: &[Arg]) -> String {
         Some((_, key)) => format!("did you mean {key}?"),
         None => "`chefshat config` prints all settings".to_owned(),
     };
-    format!("there is no setting {name:?}; {hint}")
+    format!("unknown setting {name:?}; {hint}")
 }
 
 /// A value of the file as the values of its flag, checked by the parser of the flag.
@@ -395,23 +395,23 @@ mod tests {
         for (text, expected) in [
             (
                 "max_rooms = 1",
-                "1: there is no setting \"max_rooms\"; did you mean max-rooms?",
+                "1: unknown setting \"max_rooms\"; did you mean max-rooms?",
             ),
             (
                 "\nlisten-on = \"a:1\"",
-                "2: there is no setting \"listen-on\"; did you mean listen?",
+                "2: unknown setting \"listen-on\"; did you mean listen?",
             ),
             (
                 "zzz = 1",
-                "1: there is no setting \"zzz\"; `chefshat config` prints all settings",
+                "1: unknown setting \"zzz\"; `chefshat config` prints all settings",
             ),
             (
                 "config = \"other.toml\"",
-                "1: there is no setting \"config\"; `chefshat config` prints all settings",
+                "1: unknown setting \"config\"; `chefshat config` prints all settings",
             ),
             (
                 "[serve]\nmax-rooms = 1",
-                "1: there is no setting \"serve\"; `chefshat config` prints all settings",
+                "1: unknown setting \"serve\"; `chefshat config` prints all settings",
             ),
             (
                 "grace = 1\nmax-rooms = 0",

@@ -49,7 +49,7 @@ impl KeyCommand {
         let folder = data_dir::name(show.data_dir)?;
         let Some(key) = key_of(&folder)? else {
             return Err(format!(
-                "there is no key in {} yet: a server creates it when it starts with this data directory",
+                "no signing key in {} yet: a server creates it when it starts with this data directory",
                 folder.display()
             )
             .into());

@@ -1,4 +1,6 @@
-//! Numbers in words: grouped digits, counts with their noun, places.
+//! Numbers in words: grouped digits, counts with their noun, places, and times with a unit.
+
+use std::time::Duration;
 
 /// A number with grouped thousands: `1,234,567`.
 pub(super) fn grouped(number: u64) -> String {
@@ -19,12 +21,15 @@ pub(super) fn counted(count: u64, what: &str) -> String {
     format!("{} {what}{plural}", grouped(count))
 }
 
-/// A number followed by its unit, such as `90d`, and the value of the unit; `None` for other texts.
-pub(super) fn with_unit(text: &str, units: &[(char, u64)]) -> Option<(u64, u64)> {
-    let letter = text.chars().next_back()?;
-    let (_, unit) = units.iter().find(|(known, _)| *known == letter)?;
-    let number = text.strip_suffix(letter)?.parse().ok()?;
-    Some((number, *unit))
+/// Parses a time such as 90d.
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
+    let units = [('s', 1), ('m', 60), ('h', 3_600), ('d', 86_400)];
+    let parsed = units.iter().find_map(|(unit, seconds)| {
+        let number: u32 = text.strip_suffix(*unit)?.parse().ok()?;
+        (number > 0).then(|| Duration::from_secs(u64::from(number) * seconds))
+    });
+    parsed
+        .ok_or_else(|| "use a number above 0 with s, m, h or d, such as 90m, 12h or 30d".to_owned())
 }
 
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
@@ -42,6 +47,33 @@ pub(super) fn ordinal(place: u32) -> String {
 #[cfg(test)]
 mod tests {
     use crate::numbers::*;
+
+    #[test]
+    fn times_have_a_unit() {
+        let table = [
+            ("45s", 45),
+            ("90m", 5_400),
+            ("12h", 43_200),
+            ("30d", 2_592_000),
+        ];
+        for (text, seconds) in table {
+            assert_eq!(duration(text), Ok(Duration::from_secs(seconds)), "{text}");
+        }
+        for wrong in [
+            "",
+            "d",
+            "90",
+            "0s",
+            "0d",
+            "-1d",
+            "1.5h",
+            "1w",
+            "9é",
+            "99999999999d",
+        ] {
+            assert!(duration(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn ordinals_have_english_suffixes() {

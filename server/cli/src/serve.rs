@@ -14,6 +14,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
 use super::listen::{self, Address};
+use super::numbers::duration;
 use super::{CommandError, data_dir, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::{KeepGames, ServerConfig};
@@ -50,7 +51,7 @@ pub(super) struct Settings {
     /// Keep games only in memory: no database, no records.
     #[arg(long, env = "CHEFSHAT_NO_RECORDS", value_parser = FalseyValueParser::new())]
     no_records: bool,
-    /// Let any client import records of games played elsewhere.
+    /// Let hosts import records of games played elsewhere.
     #[arg(long, env = "CHEFSHAT_ALLOW_IMPORT", value_parser = FalseyValueParser::new())]
     allow_import: bool,
     /// Maximum number of open rooms.
@@ -302,11 +303,7 @@ impl Serve {
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
             eprintln!("metrics at http://{address}/metrics");
             let metrics = Arc::clone(server.metrics());
-            tokio::spawn(async move {
-                if let Err(error) = scrape::serve(listener, metrics).await {
-                    tracing::error!(%error, "metrics are no longer served");
-                }
-            });
+            tokio::spawn(scrape::serve(listener, metrics));
         }
         if !web::is_built_in() {
             eprintln!("the web page is not built in; `cargo xtask web` builds it");
@@ -376,9 +373,9 @@ fn keep_games(text: &str) -> Result<KeepGames, String> {
     match text.parse() {
         Ok(0) => Err("keep at least one game".to_owned()),
         Ok(count) => Ok(KeepGames::Newest(count)),
-        Err(_) => super::records::prune::age(text)
-            .map(KeepGames::For)
-            .map_err(|_| "use a number of games, or a time such as 90d, 12h or 30m".to_owned()),
+        Err(_) => duration(text).map(KeepGames::For).map_err(|_| {
+            "use a number of games above 0, or a time such as 90d, 12h or 30m".to_owned()
+        }),
     }
 }
 
@@ -402,7 +399,17 @@ fn origin(text: &str) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::serve::origin;
+    use crate::serve::{keep_games, origin};
+
+    #[test]
+    fn at_least_one_game_is_kept() {
+        for good in ["1", "1000", "90d"] {
+            assert!(keep_games(good).is_ok(), "{good}");
+        }
+        for bad in ["", "0", "0d", "0s", "-1", "all"] {
+            assert!(keep_games(bad).is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn origins_are_as_browsers_send_them() {

@@ -3,16 +3,17 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use chefshat_room::ids::Id;
 use chefshat_server::access::{
     AccessToken, NewToken, Role, Scope, StoredToken, TokenFile, TokenId,
 };
+use chefshat_server::clock::since_epoch_ms;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
-use super::numbers::{counted, with_unit};
+use super::numbers::{counted, duration};
 use super::output::table;
 use super::{CommandError, data_dir, say};
 
@@ -53,7 +54,7 @@ struct Create {
     #[arg(long, default_value = "", hide_default_value = true, value_parser = label)]
     label: String,
     /// How long it is valid, such as 90m, 12h or 30d. Default: until it is revoked.
-    #[arg(long, value_name = "TIME", value_parser = lifetime)]
+    #[arg(long, value_name = "TIME", value_parser = duration)]
     expires: Option<Duration>,
     /// Make it valid for one room only.
     #[arg(long, value_name = "ROOM-ID", value_parser = id)]
@@ -153,13 +154,13 @@ impl List {
     fn run(self) -> Result<(), CommandError> {
         let file = TokenFile::of(&data_dir::name(self.place.data_dir)?);
         let tokens = file.read()?.unwrap_or_default();
-        let now_ms = now_ms();
+        let now_ms = since_epoch_ms();
         if self.place.json {
             let lines = tokens.iter().map(|token| line_of(token, now_ms));
             return say(json!({ "tokens": lines.collect::<Vec<_>>() }));
         }
         if tokens.is_empty() {
-            return say("there are no tokens");
+            return say("no tokens");
         }
         let mut text = String::new();
         let rows = tokens.iter().map(|token| {
@@ -183,16 +184,11 @@ impl Revoke {
     fn run(self) -> Result<(), CommandError> {
         let file = TokenFile::of(&data_dir::name(self.place.data_dir)?);
         // Before it is locked: locking creates a file.
-        let unknown = || {
-            format!(
-                "there is no token {} here; see `chefshat token list`",
-                self.id
-            )
-        };
+        let unknown = || format!("unknown token {}; see `chefshat token list`", self.id);
         file.read()?.ok_or_else(unknown)?;
         let revoked = file.revoke(self.id)?.ok_or_else(unknown)?;
         match self.place.json {
-            true => say(line_of(&revoked, now_ms()))?,
+            true => say(line_of(&revoked, since_epoch_ms()))?,
             false => say(format!("revoked {} ({})", revoked.id, revoked.role))?,
         }
         Ok(())
@@ -231,28 +227,9 @@ fn validity(token: &StoredToken, now_ms: u64) -> String {
     }
 }
 
-fn now_ms() -> u64 {
-    let time = SystemTime::now().duration_since(UNIX_EPOCH);
-    time.map_or(0, |time| {
-        u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
-    })
-}
-
 /// The page with a token in its fragment, which browsers send to no server.
 fn link(page: &str, token: &AccessToken) -> String {
     format!("{page}#token={}", token.to_text())
-}
-
-/// Parses a time such as 30d.
-fn lifetime(text: &str) -> Result<Duration, String> {
-    let wrong = || "use a number with s, m, h or d, such as 90m, 12h or 30d".to_owned();
-    let units = [('s', 1), ('m', 60), ('h', 3_600), ('d', 86_400)];
-    match with_unit(text, &units) {
-        Some((number @ 1.., seconds)) if u32::try_from(number).is_ok() => {
-            Ok(Duration::from_secs(number * seconds))
-        }
-        _ => Err(wrong()),
-    }
 }
 
 fn label(text: &str) -> Result<String, String> {
@@ -273,25 +250,5 @@ fn page(text: &str) -> Result<String, String> {
     match is_web && !text.contains(['#', ' ']) {
         true => Ok(text.to_owned()),
         false => Err("use the address of a page, such as https://chef.example.org".to_owned()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lifetime_has_a_unit() {
-        for (text, seconds) in [
-            ("45s", 45),
-            ("90m", 5_400),
-            ("12h", 43_200),
-            ("30d", 2_592_000),
-        ] {
-            assert_eq!(lifetime(text), Ok(Duration::from_secs(seconds)), "{text}");
-        }
-        for wrong in ["", "d", "0d", "30", "-1d", "1.5h", "30 d", "30ä"] {
-            assert!(lifetime(wrong).is_err(), "{wrong}");
-        }
     }
 }

@@ -86,7 +86,7 @@ pub enum SpectateError {
     Full,
     /// A snapshot of a delayed room would reveal its present state.
     SnapshotDelayed,
-    /// The requested events are no longer there; the position of the first one that is.
+    /// The requested events have been dropped; the position of the first one that is there.
     EventsGone(usize),
 }
 

@@ -282,7 +282,7 @@ impl Subscriber {
         }
     }
 
-    /// Ends the stream because the server stops, which a seat is told first.
+    /// Ends the stream because the server stops; sends a seat the reason first.
     pub fn stop(&mut self) {
         if !self.ended {
             self.detach(v1::DetachReason::ServerStopping);

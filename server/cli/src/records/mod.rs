@@ -1,9 +1,9 @@
-//! `chefshat records`: lists, downloads, imports and deletes records of a server. `chefshat verify` checks a
-//! downloaded record; a server verifies an imported one.
+//! `chefshat records`: lists, downloads, imports and deletes records of a server. `chefshat verify`
+//! checks a downloaded record; a server verifies an imported one.
 
 mod filter;
 mod list;
-pub(super) mod prune;
+mod prune;
 mod transfer;
 
 use std::process::ExitCode;

@@ -1,18 +1,16 @@
 //! `chefshat records prune`: deletes old games of a running server with their records.
 
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use chefshat_client::v1;
+use chefshat_server::clock::since_epoch_ms;
 use clap::Args;
 use serde_json::json;
 
 use super::super::connect::ServerArg;
-use super::super::numbers::{counted, with_unit};
+use super::super::numbers::{counted, duration};
 use super::super::{CommandError, admin, say};
-
-/// Seconds of a day.
-const DAY: u64 = 24 * 60 * 60;
 
 /// Delete finished games with their records from a running server, oldest first, and give the disk
 /// space back. Needs a token with the role admin. This cannot be undone.
@@ -25,7 +23,7 @@ pub(super) struct Prune {
     #[command(flatten)]
     server: ServerArg,
     /// Only games that ended longer ago than this: days (90d), hours (12h) or minutes (30m).
-    #[arg(long, value_name = "TIME", value_parser = age, required_unless_present = "keep")]
+    #[arg(long, value_name = "TIME", value_parser = duration, required_unless_present = "keep")]
     older_than: Option<Duration>,
     /// Keep the newest games, this many.
     #[arg(long, value_name = "GAMES", value_parser = clap::value_parser!(u64).range(1..))]
@@ -37,12 +35,12 @@ pub(super) struct Prune {
 
 impl Prune {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH)?;
-        let ended_before = self.older_than.map(|age| now.saturating_sub(age));
+        let ended_before_ms = |age: Duration| {
+            let age_ms = u64::try_from(age.as_millis()).unwrap_or(u64::MAX);
+            since_epoch_ms().saturating_sub(age_ms)
+        };
         let request = v1::PruneRecordsRequest {
-            ended_before_ms: ended_before.map_or(0, |time| {
-                u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
-            }),
+            ended_before_ms: self.older_than.map_or(0, ended_before_ms),
             keep: self.keep.unwrap_or_default(),
         };
         let mut service = admin::service(&self.server).await?;
@@ -57,39 +55,5 @@ impl Prune {
             ))?,
         }
         Ok(ExitCode::SUCCESS)
-    }
-}
-
-/// A time such as 90d.
-pub(crate) fn age(text: &str) -> Result<Duration, String> {
-    let wrong =
-        || format!("{text:?} is not a time; use days, hours or minutes, such as 90d, 12h or 30m");
-    let units = [('d', DAY), ('h', 60 * 60), ('m', 60)];
-    with_unit(text, &units)
-        .and_then(|(number, seconds)| number.checked_mul(seconds))
-        .map(Duration::from_secs)
-        .ok_or_else(wrong)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_have_a_unit() {
-        assert_eq!(age("90d"), Ok(Duration::from_secs(90 * DAY)));
-        assert_eq!(age("12h"), Ok(Duration::from_secs(12 * 60 * 60)));
-        for bad in [
-            "",
-            "d",
-            "90",
-            "-1d",
-            "1w",
-            "1.5d",
-            "99999999999999999999d",
-            "9é",
-        ] {
-            assert!(age(bad).is_err(), "{bad}");
-        }
     }
 }

@@ -94,7 +94,7 @@ fn a_server_uses_the_file_and_refuses_a_wrong_one() {
     typed(&format!("room create --server {url}")).assert_failed("TOO_MANY_ROOMS");
 
     fs::write(&file, "# rooms\nmax_rooms = 1\n").unwrap();
-    let expected = format!("{path}:2: there is no setting \"max_rooms\"; did you mean max-rooms?");
+    let expected = format!("{path}:2: unknown setting \"max_rooms\"; did you mean max-rooms?");
     chefshat(&["serve", "--config", path]).assert_failed(&expected);
     let missing = folder.path().join("missing.toml");
     chefshat(&["config", "--config", missing.to_str().unwrap()]).assert_failed("cannot read");

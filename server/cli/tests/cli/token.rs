@@ -12,9 +12,7 @@ fn a_token_is_created_listed_and_revoked() {
         all.extend(["--data-dir", dir]);
         chefshat(&all)
     };
-    token(&["list"])
-        .clean()
-        .assert_says(&["there are no tokens"]);
+    token(&["list"]).clean().assert_says(&["no tokens"]);
     let created = token(&[
         "create",
         "--role",
@@ -59,7 +57,7 @@ fn a_token_is_created_listed_and_revoked() {
         (Some(id), Some("host"))
     );
     token(&["revoke", id]).clean().assert_says(&["revoked", id]);
-    token(&["revoke", id]).assert_refused("there is no token");
+    token(&["revoke", id]).assert_refused("unknown token");
     token(&["create", "--role", "king"]).assert_refused("use spectator, player, host or admin");
     token(&["create", "--role", "host", "--expires", "30"]).assert_refused("90m, 12h or 30d");
 }
