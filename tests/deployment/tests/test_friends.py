@@ -143,6 +143,7 @@ def test_a_tournament_of_friends_is_played_as_written(machines: list[Machine]) -
 
     server.values["1a2b3c4d"] = player.split("_")[1]
     assert "friends" in server.type(revoke)
+    give_up_at = time.monotonic() + PATIENCE_S
     with chefshat.Client(url, token=player, ca=server.folder / "ca.pem") as client:
         while refusal(client.action_table) != "TOKEN_UNKNOWN":
             assert time.monotonic() < give_up_at
