@@ -36,7 +36,8 @@ class Images:
         # Temporary files include the caches of builds.
         temporary = storage / "tmp"
         temporary.mkdir()
-        self._buildah = ["env", f"TMPDIR={temporary}", "buildah", "--root", str(storage / "root"), "--runroot", str(storage / "run")]
+        self._buildah = ["env", f"TMPDIR={temporary}", "buildah"]
+        self._buildah += ["--root", str(storage / "root"), "--runroot", str(storage / "run")]
 
     def close(self) -> None:
         """Deletes all images and containers."""
