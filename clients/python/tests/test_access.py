@@ -73,6 +73,41 @@ def test_the_real_server_with_tls_and_tokens(real_binary: Path, tmp_path: Path, 
         assert play(ServerAddress(address, token, AUTHORITY), chefshat.RandomAgent(1)).finished
 
 
+@pytest.mark.server
+def test_what_is_private_is_shown_with_a_secret_of_it(real_address: str) -> None:
+    rules = pb.RuleSet(target_shifts=1)
+    with chefshat.Client(real_address) as stranger:
+        created = stranger.create_room(rules=rules, seats=["random"] * 4, visibility=pb.VISIBILITY_PRIVATE)
+        room = created.room
+        assert room.policy.visibility == pb.VISIBILITY_PRIVATE
+        settings = pb.TournamentSettings(name="cup", format=pb.TOURNAMENT_FORMAT_KNOCKOUT, rules=rules)
+        cup = stranger.create_tournament(settings, visibility=pb.VISIBILITY_PRIVATE)
+        assert not settings.HasField("policy")
+        tournament_id = cup.tournament.tournament_id
+        for unknown in (
+            lambda: stranger.get_room(room.room_id),
+            lambda: list(stranger.watch(room.room_id)),
+            lambda: list(stranger.record(room.game_id)),
+            lambda: stranger.get_tournament(tournament_id),
+        ):
+            with pytest.raises(ChefsHatError, match="_UNKNOWN"):
+                unknown()
+        assert room.room_id not in [listed.room_id for listed in stranger.list_rooms()]
+    secrets = [created.owner_token, cup.owner_token]
+    with chefshat.Client(real_address, secrets=secrets) as owner:
+        assert list(owner.watch(room.room_id))
+        assert list(owner.record(room.game_id))
+        assert room.game_id in [listed.game_id for listed in owner.records()]
+        assert owner.get_tournament(tournament_id).tournament_id == tournament_id
+        owner.close_tournament(tournament_id, cup.owner_token)
+
+    async def run() -> None:
+        async with aio.Client(ServerAddress(real_address, secrets=(created.owner_token,))) as owner:
+            assert (await owner.get_room(room.room_id)).game_id == room.game_id
+
+    asyncio.run(run())
+
+
 def test_token_and_authorities_come_from_the_environment(
     guarded: FakeServer, play: Player, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,6 +208,9 @@ def test_unusable_files_and_tokens_are_refused(tmp_path: Path) -> None:
         chefshat.Client("https://localhost", ca=tmp_path / "missing.pem")
     with pytest.raises(ChefsHatError, match="TOKEN_REFUSED") as caught:
         chefshat.Client("localhost:1", token="two\nlines")
+    assert "lines" not in str(caught.value)
+    with pytest.raises(ChefsHatError, match="SECRETS_REFUSED") as caught:
+        chefshat.Client("localhost:1", secrets=["two\nlines"])
     assert "lines" not in str(caught.value)
 
 

@@ -322,6 +322,7 @@ def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
         client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
         client.create_room(hands=HANDS, durability=pb.DURABILITY_EPHEMERAL)
         client.create_room(policy=slow, durability=pb.DURABILITY_EPHEMERAL)
+        client.create_room(policy=slow, visibility=pb.VISIBILITY_PRIVATE)
         client.create_room(policy=slow)
         with pytest.raises(ValueError, match="not both"):
             client.create_room(branch=POINT, hands=HANDS)
@@ -331,7 +332,7 @@ def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
             await client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
 
     asyncio.run(run())
-    branched, scripted, slow_ephemeral, plain, branched_too = fake.created
+    branched, scripted, slow_ephemeral, private, plain, branched_too = fake.created
     assert len(branched.request_id) == 32
     assert branched.request_id != branched_too.request_id, "each call draws its own"
     branched_too.request_id = branched.request_id
@@ -343,5 +344,6 @@ def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
     assert scripted.scripted == HANDS
     assert scripted.policy == pb.RoomPolicy(durability=pb.DURABILITY_EPHEMERAL)
     assert slow_ephemeral.policy == pb.RoomPolicy(pace_ms=500, durability=pb.DURABILITY_EPHEMERAL)
+    assert private.policy == pb.RoomPolicy(pace_ms=500, visibility=pb.VISIBILITY_PRIVATE)
     assert plain.policy == slow == pb.RoomPolicy(pace_ms=500)
     assert plain.WhichOneof("start") is None

@@ -70,6 +70,17 @@ impl ServerArg {
         })
     }
 
+    /// [`connect`](Self::connect), showing secrets with every call.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect); a file is unreadable.
+    pub(super) async fn connect_with(&self, secrets: &SecretArgs) -> Result<Client, CommandError> {
+        let shown: Vec<_> = (secrets.tickets.iter().cloned())
+            .chain(secrets.owner.given()?)
+            .collect();
+        Ok(self.connect().await?.with_secrets(shown)?)
+    }
+
     /// Connects with retries for [`PATIENCE`], for servers and clients that are started together.
     ///
     /// # Errors
@@ -101,6 +112,68 @@ impl ServerArg {
             }
             sleep(PAUSE).await;
         }
+    }
+}
+
+/// The proof of who created a room or tournament.
+#[derive(Clone, Default, Args)]
+pub(super) struct OwnerArgs {
+    /// The owner token, printed by `create`.
+    #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
+    owner_token: Option<String>,
+    /// File with the owner token, written by `create --owner-file`.
+    #[arg(long, value_name = "FILE")]
+    owner_file: Option<PathBuf>,
+}
+
+impl OwnerArgs {
+    /// The owner token, if there is one; the file has priority over the environment.
+    fn given(&self) -> Result<Option<String>, CommandError> {
+        match &self.owner_file {
+            Some(file) => std::fs::read_to_string(file)
+                .map(|text| Some(text.trim().to_owned()))
+                .map_err(|error| format!("--owner-file: {}: {error}", file.display()).into()),
+            None => Ok(self.owner_token.clone()),
+        }
+    }
+
+    /// The owner token.
+    ///
+    /// # Errors
+    /// There is none, or the file is unreadable.
+    pub(super) fn token(&self) -> Result<String, CommandError> {
+        let token = self.given()?;
+        token.ok_or_else(|| "give --owner-token or --owner-file".into())
+    }
+}
+
+/// Leaves out the secret.
+impl fmt::Debug for OwnerArgs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("OwnerArgs").field(&self.owner_file).finish()
+    }
+}
+
+/// Secrets that show unlisted and private rooms, tournaments and records.
+#[derive(Clone, Default, Args)]
+#[command(next_help_heading = "Unlisted and private")]
+pub(super) struct SecretArgs {
+    /// Ticket of a seat, a place in a tournament or a physical table. Repeatable.
+    #[arg(
+        long = "ticket",
+        value_name = "TICKET",
+        env = "CHEFSHAT_TICKET",
+        hide_env_values = true
+    )]
+    tickets: Vec<String>,
+    #[command(flatten)]
+    owner: OwnerArgs,
+}
+
+/// Leaves out the secrets.
+impl fmt::Debug for SecretArgs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} tickets, {:?}", self.tickets.len(), self.owner)
     }
 }
 

@@ -47,6 +47,28 @@ pub(super) struct PolicyArgs {
     /// What the game survives. Default: durable.
     #[arg(long)]
     durability: Option<DurabilityArg>,
+    /// Who sees it, with the records of its games. Default: public.
+    #[arg(long, value_name = "WHO")]
+    visibility: Option<VisibilityArg>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum VisibilityArg {
+    /// Everybody.
+    Public,
+    /// It is in no list, but anyone who knows its id sees it.
+    Unlisted,
+    /// Only those who have a ticket or the owner token.
+    Private,
+}
+
+/// What a line about something that is not public ends with.
+pub(super) fn visibility_mark(visibility: v1::Visibility) -> &'static str {
+    match visibility {
+        v1::Visibility::Unspecified | v1::Visibility::Public => "",
+        v1::Visibility::Unlisted => "  (unlisted)",
+        v1::Visibility::Private => "  (private)",
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -76,6 +98,13 @@ impl PolicyArgs {
             }
             .into(),
             clocks: self.clocks.clone(),
+            visibility: match self.visibility {
+                None => v1::Visibility::Unspecified,
+                Some(VisibilityArg::Public) => v1::Visibility::Public,
+                Some(VisibilityArg::Unlisted) => v1::Visibility::Unlisted,
+                Some(VisibilityArg::Private) => v1::Visibility::Private,
+            }
+            .into(),
             ..v1::RoomPolicy::default()
         }
     }
@@ -134,6 +163,18 @@ mod tests {
             ("--durability ephemeral", v1::Durability::Ephemeral),
         ] {
             assert_eq!(policy(flags).durability(), expected);
+        }
+    }
+
+    #[test]
+    fn visibility_is_a_choice() {
+        for (flags, expected) in [
+            ("", v1::Visibility::Unspecified),
+            ("--visibility public", v1::Visibility::Public),
+            ("--visibility unlisted", v1::Visibility::Unlisted),
+            ("--visibility private", v1::Visibility::Private),
+        ] {
+            assert_eq!(policy(flags).visibility(), expected);
         }
     }
 

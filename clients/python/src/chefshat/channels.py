@@ -20,6 +20,8 @@ TOKEN = "CHEFSHAT_TOKEN"
 #: Environment variable that may name a file of certificate authorities.
 CA = "CHEFSHAT_CA"
 
+# Metadata that shows an owner token or a ticket.
+_SECRET = "chefshat-secret"
 # First line of each certificate in a PEM file.
 _CERTIFICATE = b"-----BEGIN CERTIFICATE-----"
 
@@ -48,21 +50,28 @@ class ServerAddress:
         address: "host:port", "http://host:port" or, for TLS, "https://host:port".
         token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set; empty: none.
         ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
+        secrets: owner tokens and tickets, at most 16, sent with every call: they show private rooms and tournaments, unlisted ones
+            in lists, and their records.
     """
 
     address: str
     # Left out of the representation, which may be logged.
     token: str | None = field(default=None, repr=False)
     ca: Path | str | None = None
+    secrets: tuple[str, ...] = field(default=(), repr=False)
 
     def __str__(self) -> str:
         return self.address
 
 
-def server_address(address: str | ServerAddress, token: str | None = None, ca: Path | str | None = None) -> ServerAddress:
-    """Adds a token and authorities to an address, where they are not None."""
+def server_address(
+    address: str | ServerAddress, token: str | None = None, ca: Path | str | None = None, secrets: Sequence[str] = ()
+) -> ServerAddress:
+    """Adds a token, authorities and secrets to an address, where they are set."""
     server = address if isinstance(address, ServerAddress) else ServerAddress(address)
-    return ServerAddress(server.address, server.token if token is None else token, server.ca if ca is None else ca)
+    return ServerAddress(
+        server.address, server.token if token is None else token, server.ca if ca is None else ca, server.secrets + tuple(secrets)
+    )
 
 
 class Target(NamedTuple):
@@ -90,8 +99,8 @@ def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = ()) -> g
         opened = grpc.secure_channel(where.authority, _credentials(server.ca), together)
     else:
         opened = grpc.insecure_channel(where.authority, together)
-    token = _token(server, where)
-    return cast(grpc.Channel, _Authorized(opened, token)) if token else opened
+    metadata = _metadata(server, where)
+    return cast(grpc.Channel, _WithMetadata(opened, metadata)) if metadata else opened
 
 
 def async_channel(server: ServerAddress) -> grpc.aio.Channel:
@@ -101,12 +110,15 @@ def async_channel(server: ServerAddress) -> grpc.aio.Channel:
         opened = grpc.aio.secure_channel(where.authority, _credentials(server.ca), CHANNEL_OPTIONS)
     else:
         opened = grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
-    token = _token(server, where)
-    return cast(grpc.aio.Channel, _Authorized(opened, token)) if token else opened
+    metadata = _metadata(server, where)
+    return cast(grpc.aio.Channel, _WithMetadata(opened, metadata)) if metadata else opened
 
 
-def _token(server: ServerAddress, where: Target) -> str:
-    """Returns the token to send; empty if there is none. Warns once if it can be read on the way to another machine."""
+def _metadata(server: ServerAddress, where: Target) -> tuple[tuple[str, str], ...]:
+    """Returns the token and the secrets to send with every call.
+
+    Warns once if a token can be read on the way to another machine.
+    """
     token = os.environ.get(TOKEN, "") if server.token is None else server.token
     token = token.strip()
     if not (token.isascii() and token.isprintable()):
@@ -114,7 +126,11 @@ def _token(server: ServerAddress, where: Target) -> str:
     host = urlsplit(f"//{where.authority}").hostname or ""
     if token and not where.tls and not _is_this_machine(host):
         warnings.warn(f"the token is sent unencrypted to {host}; use https://{host}", stacklevel=1)
-    return token
+    secrets = [secret.strip() for secret in server.secrets]
+    if not all(secret.isalnum() and secret.isascii() for secret in secrets):
+        raise _refused("SECRETS_REFUSED", "a secret is malformed: give owner tokens and tickets as the server returned them")
+    authorization = (("authorization", f"Bearer {token}"),) if token else ()
+    return (*authorization, *((_SECRET, secret) for secret in secrets))
 
 
 def _is_this_machine(host: str) -> bool:
@@ -145,32 +161,32 @@ def _refused(reason: str, message: str) -> ChefsHatError:
     return ChefsHatError(reason, message, code=grpc.StatusCode.INVALID_ARGUMENT)
 
 
-class _Authorized:
-    """A channel that sends a token with every call.
+class _WithMetadata:
+    """A channel that sends metadata with every call.
 
     Unlike interceptors it leaves the call objects of asyncio as they are, and unlike call credentials it does not need TLS.
     """
 
-    def __init__(self, opened: grpc.Channel | grpc.aio.Channel, token: str) -> None:
+    def __init__(self, opened: grpc.Channel | grpc.aio.Channel, metadata: tuple[tuple[str, str], ...]) -> None:
         self._channel = opened
-        self._metadata = (("authorization", f"Bearer {token}"),)
+        self._metadata = metadata
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the channel has.
         return getattr(self._channel, name)
 
     def unary_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_token(self._channel.unary_unary(*arguments, **options))
+        return self._with_metadata(self._channel.unary_unary(*arguments, **options))
 
     def unary_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_token(self._channel.unary_stream(*arguments, **options))
+        return self._with_metadata(self._channel.unary_stream(*arguments, **options))
 
     def stream_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_token(self._channel.stream_unary(*arguments, **options))
+        return self._with_metadata(self._channel.stream_unary(*arguments, **options))
 
     def stream_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_token(self._channel.stream_stream(*arguments, **options))
+        return self._with_metadata(self._channel.stream_stream(*arguments, **options))
 
-    def _with_token(self, method: Callable[..., object]) -> Callable[..., object]:
+    def _with_metadata(self, method: Callable[..., object]) -> Callable[..., object]:
         def call(*inputs: object) -> object:
             return method(*inputs, metadata=self._metadata)
 

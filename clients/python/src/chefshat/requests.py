@@ -56,6 +56,7 @@ def create_room(
     branch: pb.BranchPoint | None,
     hands: pb.ScriptedShift | None,
     durability: pb.Durability.ValueType | None,
+    visibility: pb.Visibility.ValueType | None,
     physical: bool,
 ) -> pb.CreateRoomRequest:
     """Builds the request to create a room."""
@@ -63,11 +64,14 @@ def create_room(
         raise ValueError("a game begins from a record (branch) or with given hands (hands), not both")
     if isinstance(rules, str):
         rules = pb.RuleSet(preset=rules)
-    if durability is not None:
+    if durability is not None or visibility is not None:
         # Copies the policy, which the caller may use for other rooms.
         asked = pb.RoomPolicy()
         asked.MergeFrom(policy or asked)
-        asked.durability = durability
+        if durability is not None:
+            asked.durability = durability
+        if visibility is not None:
+            asked.visibility = visibility
         policy = asked
     configs = [seat_config(seat) for seat in seats]
     return pb.CreateRoomRequest(
@@ -80,6 +84,14 @@ def create_room(
         scripted=hands,
         physical=physical,
     )
+
+
+def create_tournament(settings: pb.TournamentSettings, visibility: pb.Visibility.ValueType | None) -> pb.CreateTournamentRequest:
+    """Builds the request to create a tournament."""
+    request = pb.CreateTournamentRequest(settings=settings)
+    if visibility is not None:
+        request.settings.policy.visibility = visibility
+    return request
 
 
 def join_tournament(

@@ -11,9 +11,10 @@ import { SpectatorService } from "../gen/chefshat/v1/spectator_service_pb";
 import { TableService } from "../gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../gen/chefshat/v1/tournament_service_pb";
 import { repeat } from "./repeat";
+import { showSecrets } from "./secrets";
 import { authorize } from "./token";
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat, authorize] });
+const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat, authorize, showSecrets] });
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);

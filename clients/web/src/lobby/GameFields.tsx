@@ -148,6 +148,23 @@ export function FaultFields(props: GameProps & { agents: string[]; children?: Co
   );
 }
 
+/** Who sees the room or tournament. */
+export function VisibilityField({ form, change }: GameProps) {
+  const words = t().lobby.make.visibility;
+  const choices = ["public", "unlisted", "private"] as const;
+  return (
+    <div class={css.fields}>
+      <SelectField
+        label={words.label}
+        hint={words.hints[form.visibility]}
+        value={form.visibility}
+        options={choices.map((value) => ({ value, label: words.names[value] }))}
+        onPick={(visibility) => change({ visibility })}
+      />
+    </div>
+  );
+}
+
 /** Who may watch, and what spectators see. */
 export function WatchFields(props: GameProps) {
   const { form, change } = props;

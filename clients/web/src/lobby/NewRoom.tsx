@@ -7,7 +7,7 @@ import { SelectField } from "../parts/Field";
 import { navigate } from "../router";
 import { FormFrame, FormPage, FormPart } from "./FormPage";
 import { type FieldFaults, useFormState } from "./form-state";
-import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
+import { ClockFields, FaultFields, RuleFields, VisibilityField, WatchFields, wordsOfProblems } from "./GameFields";
 import { gameProblems } from "./game-form";
 import { type FieldName, newForm, physicalProblems, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
@@ -62,6 +62,9 @@ function RoomFormView({ offered }: { offered: Offered }) {
     <FormFrame state={state} words={words} first={<SeatFields {...parts} agents={offered.agents} />} folded={folded}>
       <FormPart title={words.clock}>
         <ClockFields {...parts} />
+      </FormPart>
+      <FormPart title={words.visibility.title}>
+        <VisibilityField {...parts} />
       </FormPart>
     </FormFrame>
   );

@@ -7,7 +7,7 @@ import { ButtonLink } from "../parts/Button";
 import { StateChip } from "../parts/StateChip";
 import { pathOf } from "../router";
 import css from "./RoomCard.module.css";
-import { clockOfPeople, isOpen } from "./rooms";
+import { clockOfPeople, isOpen, visibilityWords } from "./rooms";
 import { Seats } from "./Seats";
 import { heldSeat, hostedRoom } from "./seat";
 
@@ -99,5 +99,5 @@ export function rulesInShort(room: Room): string {
   }
   if (room.origin === GameOrigin.PHYSICAL) parts.push(t().attend.room.realCards);
   if (room.tournamentId) parts.push(words.ofTournament);
-  return parts.join(" · ");
+  return [...parts, ...visibilityWords(room.policy)].join(" · ");
 }

@@ -3,12 +3,15 @@
 // GameFields.tsx. The server validates rules and times; this module only finds obvious mistakes.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import type { RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
+import { type RoomPolicySchema, Visibility } from "../gen/chefshat/v1/room_pb";
 import { Opening, PassScope, type RuleSet, type RuleSetSchema } from "../gen/chefshat/v1/rules_pb";
 import { type Bounds, LARGEST, type NumberProblem, pointsProblem, secondsProblem, wholeProblem } from "./problems";
 
 /** The choice of a clock. */
 export type ClockChoice = "noHurry" | "relaxed" | "brisk" | "own";
+
+/** The choice of who sees the room or tournament. */
+export type VisibilityChoice = "public" | "unlisted" | "private";
 
 /** Milliseconds of each clock: per decision, and for all decisions of a seat beyond that. */
 export const CLOCKS: Record<Exclude<ClockChoice, "own">, { decisionTimeMs: number; bankMs: number }> = {
@@ -46,6 +49,7 @@ export interface GameForm {
   spectators: boolean;
   spectatorDelay: string;
   spectatorsSeeHands: boolean;
+  visibility: VisibilityChoice;
 }
 
 /** Names of the fields. */
@@ -77,6 +81,7 @@ export function newGame(): GameForm {
     spectators: true,
     spectatorDelay: "0",
     spectatorsSeeHands: false,
+    visibility: "public",
   };
 }
 
@@ -176,8 +181,15 @@ export function policyOf(form: GameForm) {
     spectators: form.spectators,
     spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
     spectatorsSeeHands: form.spectators && form.spectatorsSeeHands,
+    visibility: VISIBILITIES[form.visibility],
   } satisfies MessageInitShape<typeof RoomPolicySchema>;
 }
+
+const VISIBILITIES = {
+  public: Visibility.PUBLIC,
+  unlisted: Visibility.UNLISTED,
+  private: Visibility.PRIVATE,
+};
 
 /** The fields by their names in the protocol. */
 export const GAME_FIELDS: Record<string, GameField> = {
@@ -197,6 +209,7 @@ export const GAME_FIELDS: Record<string, GameField> = {
   max_timeouts: "maxTimeouts",
   spectator_delay_decisions: "spectatorDelay",
   spectators_see_hands: "spectatorsSeeHands",
+  visibility: "visibility",
 };
 
 /** Converts typed seconds to milliseconds. */

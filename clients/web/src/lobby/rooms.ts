@@ -2,7 +2,15 @@
 
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import type { AskPage } from "../api/pages";
-import { type Participant, ParticipantKind, type Room, type RoomPolicy, RoomState } from "../gen/chefshat/v1/room_pb";
+import {
+  type Participant,
+  ParticipantKind,
+  type Room,
+  type RoomPolicy,
+  RoomState,
+  Visibility,
+} from "../gen/chefshat/v1/room_pb";
+import { t } from "../i18n";
 
 /** Requests the rooms in a state, newest first. Aborted rooms are left out. */
 export function roomsIn(state: RoomState): AskPage<Room> {
@@ -45,4 +53,11 @@ export function clockOfPeople(policy: RoomPolicy): { decisionTimeMs: number; ban
 /** A participant's display name: its own, else that of the built-in agent. */
 export function nameOf(participant: Participant): string {
   return participant.name || participant.builtInAgent;
+}
+
+/** Who sees a room or tournament, if not everybody: nothing or one word. */
+export function visibilityWords(policy: RoomPolicy | undefined): string[] {
+  const words = t().lobby.rooms;
+  if (policy?.visibility === Visibility.UNLISTED) return [words.unlisted];
+  return policy?.visibility === Visibility.PRIVATE ? [words.private] : [];
 }

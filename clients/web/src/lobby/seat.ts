@@ -4,6 +4,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
 import { rememberFinished } from "../experiment/study";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
@@ -80,6 +81,7 @@ export async function takeSeat(code: string, name: string, seat?: number): Promi
   const room = saidRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
   remember(`seat.${room.roomId}`, JSON.stringify(held));
+  keepSecret(held.ticket, room.gameId);
   remember(CODE + canonical(code), room.roomId);
   remember("name", name.trim());
   return room;
@@ -93,6 +95,7 @@ export async function createRoom(
   const room = saidRoom(made.room);
   const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken };
   remember(`hosted.${room.roomId}`, JSON.stringify(hosted));
+  keepSecret(hosted.ownerToken, room.gameId);
   if (made.tableTicket !== "") keepTableTicket(room.roomId, made.tableTicket);
   return { room, joinCode: made.joinCode };
 }

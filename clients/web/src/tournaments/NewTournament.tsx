@@ -6,7 +6,15 @@ import { t } from "../i18n";
 import { FormFrame, FormPage, FormPart } from "../lobby/FormPage";
 import formCss from "../lobby/FormPage.module.css";
 import { useFormState } from "../lobby/form-state";
-import { ClockFields, FaultFields, RuleFields, Typed, WatchFields, wordsOfProblem } from "../lobby/GameFields";
+import {
+  ClockFields,
+  FaultFields,
+  RuleFields,
+  Typed,
+  VisibilityField,
+  WatchFields,
+  wordsOfProblem,
+} from "../lobby/GameFields";
 import type { NumberProblem } from "../lobby/problems";
 import { CheckField, SelectField } from "../parts/Field";
 import { navigate } from "../router";
@@ -61,6 +69,9 @@ function TournamentFormView({ offered }: { offered: Offered }) {
       </FormPart>
       <FormPart title={t().lobby.make.clock}>
         <Clocks {...parts} />
+      </FormPart>
+      <FormPart title={t().lobby.make.visibility.title}>
+        <VisibilityField {...parts} />
       </FormPart>
     </FormFrame>
   );

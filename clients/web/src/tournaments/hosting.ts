@@ -3,6 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
 import type { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
@@ -31,6 +32,7 @@ export async function createTournament(settings: MessageInitShape<typeof Tournam
   if (!tournament) throw new Error("the server did not say which tournament it is");
   const hosted: HostedTournament = { joinCode, ownerToken };
   remember(`organised.${tournament.tournamentId}`, JSON.stringify(hosted));
+  keepSecret(ownerToken);
   return tournament.tournamentId;
 }
 

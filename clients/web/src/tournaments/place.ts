@@ -1,6 +1,7 @@
 // Joining a tournament, and the place that this device stores. Playing is in participation.ts.
 
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { keepSecret } from "../api/secrets";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "../lobby/seat";
 import { recallObject, remember } from "../store";
@@ -30,6 +31,7 @@ export async function takePlace(tournamentId: string, code: string, name: string
   const id = joined.tournament?.tournamentId ?? tournamentId;
   const held: HeldPlace = { ticket: joined.ticket, participant: joined.participant, name: name.trim() };
   remember(`tournament.${id}`, JSON.stringify(held));
+  keepSecret(held.ticket);
   remember("name", held.name);
   return id;
 }

@@ -3,7 +3,7 @@
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { type Tournament, TournamentDeals, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { dateLocale, t } from "../i18n";
-import { clockOfPeople } from "../lobby/rooms";
+import { clockOfPeople, visibilityWords } from "../lobby/rooms";
 import { StateChip } from "../parts/StateChip";
 
 /** The state of a tournament. */
@@ -28,7 +28,7 @@ export function inShort(tournament: Tournament): string {
   if (tournament.participants.length > 0) parts.push(words.participants(tournament.participants.length));
   if (tournament.state === TournamentState.PLAYING) parts.push(words.roundOf(tournament.round, tournament.rounds));
   if (tournament.state !== TournamentState.OPEN) parts.push(words.gamesOver(tournament.gamesOver, tournament.games));
-  return parts.join(" · ");
+  return [...parts, ...visibilityWords(tournament.settings?.policy)].join(" · ");
 }
 
 /** When it was created, which tells apart tournaments of the same name. */

@@ -212,3 +212,36 @@ test("language and theme are chosen and stored", async () => {
   expect(await page.locator("html").getAttribute("lang")).toBe("it");
   expect(await page.locator("html").getAttribute("data-theme")).toBe("dark");
 });
+
+test("a private game is found and replayed by the one who created it alone", async () => {
+  const host = await person(browser);
+  await host.page.goto(`${server.url}/new`);
+  await host.page.getByLabel("Name of the room").fill("Behind closed doors");
+  await host.page.getByLabel("Seat 0").selectOption("built-in random");
+  await host.page.getByLabel("Visible to").selectOption({ label: "Only participants" });
+  await host.page.getByText("Nobody else can find it").waitFor();
+  await host.page.getByLabel("Delay of built-in agents").fill("0");
+  await host.page.getByRole("button", { name: "Create the room" }).click();
+  await host.page.waitForURL(/\/rooms\/[0-9a-f]{32}/);
+  const room = host.page.url();
+
+  await host.page.goto(server.url);
+  const card = host.page.locator('[data-part~="room-card"]').filter({ hasText: "Behind closed doors" });
+  await card.getByText("private").waitFor();
+  await card.getByRole("link", { name: "Replay" }).click();
+  await host.page.waitForURL(/\/replay\//);
+  await host.page.locator('[data-part~="replay-bar"]').waitFor();
+
+  const stranger = await person(browser);
+  await stranger.page.goto(server.url);
+  await stranger.page.getByRole("heading", { name: "Create a room" }).waitFor();
+  const answers = [
+    [room, "This room no longer exists."],
+    [host.page.url(), "The server has no record of this game."],
+  ];
+  for (const [address = "", words = ""] of answers) {
+    expect(await stranger.page.getByText("Behind closed doors").count()).toBe(0);
+    await stranger.page.goto(address);
+    await stranger.page.getByText(words).waitFor();
+  }
+});

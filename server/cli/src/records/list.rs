@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use chefshat_client::v1;
 use clap::Args;
 
-use super::super::connect::ServerArg;
+use super::super::connect::{SecretArgs, ServerArg};
+use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages};
 use super::filter::FilterArgs;
 use crate::narration::{abort_reason, clean};
@@ -19,6 +20,8 @@ pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
+    secrets: SecretArgs,
+    #[command(flatten)]
     filter: FilterArgs,
     /// List the newest record first.
     #[arg(long)]
@@ -30,7 +33,7 @@ pub(super) struct List {
 
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let filter = self.filter.message();
         let fetch = async |page_token| {
             let request = v1::ListRecordsRequest {
@@ -78,11 +81,12 @@ pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
         reason => format!("  aborted: {}", abort_reason(reason)),
     };
     format!(
-        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}{why}",
+        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}{why}{}",
         clean(&summary.game_id, 32),
         summary.shifts,
         summary.decisions,
         players.join(", "),
+        visibility_mark(summary.visibility()),
     )
 }
 

@@ -13,7 +13,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use prost::Message as _;
 
-use super::super::connect::ServerArg;
+use super::super::connect::{SecretArgs, ServerArg};
 use super::super::{CommandError, progress, say};
 use super::filter::FilterArgs;
 use super::list::in_a_line;
@@ -34,6 +34,8 @@ pub(super) struct Get {
     game_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// File to write. Default: standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -48,6 +50,8 @@ pub(super) struct Get {
 pub(super) struct Stream {
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     #[command(flatten)]
     filter: FilterArgs,
     /// Directory to write to, one file GAME-ID.jsonl per record. Default: standard output, one
@@ -73,7 +77,7 @@ pub(super) struct Import {
 
 impl Get {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let lines = client.record(self.game_id).await?;
         match &self.out {
             Some(file) => jsonl::write(file, &lines)?,
@@ -85,7 +89,7 @@ impl Get {
 
 impl Stream {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let request = v1::StreamRecordsRequest {
             filter: Some(self.filter.message()),
         };

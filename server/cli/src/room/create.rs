@@ -50,6 +50,10 @@ pub(super) struct Create {
     /// Write the join code to this file, readable only by its owner; waits for the server to start.
     #[arg(long, value_name = "FILE")]
     code_file: Option<PathBuf>,
+    /// Write the owner token to this file, readable only by its owner; `close` and commands that
+    /// show a private room read it.
+    #[arg(long, value_name = "FILE")]
+    owner_file: Option<PathBuf>,
     /// Print the room with its secrets as a JSON line.
     #[arg(long)]
     json: bool,
@@ -89,12 +93,18 @@ impl Create {
         let code_file = (self.code_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
+        let owner_file = (self.owner_file.as_deref())
+            .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
+            .transpose()?;
         let created = client.create_room(request).await.map_err(refused)?;
         let room = created
             .room
             .ok_or("the server did not return the created room")?;
-        let written = code_file.map_or(Ok(()), |file| file.write(&created.join_code));
         let (code, owner) = (created.join_code, created.owner_token);
+        let written = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
+            Some(file) => file.write(secret),
+            None => Ok(()),
+        });
         let table = self.physical.then(|| Table {
             link: attendant_link(self.server.url(), &room.room_id, &created.table_ticket),
             ticket: created.table_ticket,
@@ -127,7 +137,7 @@ impl Create {
             }
         }
         // Last, so that the secrets are printed even if this fails.
-        written?;
+        written.into_iter().collect::<Result<Vec<()>, _>>()?;
         Ok(ExitCode::SUCCESS)
     }
 

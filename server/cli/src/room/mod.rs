@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::connect::ServerArg;
+use super::connect::{OwnerArgs, ServerArg};
 use super::{CommandError, say};
 
 /// Create, list, watch and close rooms of a server.
@@ -46,9 +46,8 @@ struct Close {
     /// ID of the room.
     #[arg(value_name = "ROOM-ID")]
     room_id: String,
-    /// The secret printed by `room create`.
-    #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
-    owner_token: String,
+    #[command(flatten)]
+    owner: OwnerArgs,
     #[command(flatten)]
     server: ServerArg,
     /// Print the room as a JSON line.
@@ -70,8 +69,8 @@ impl RoomCommand {
 
 impl Close {
     async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
-        let room = client.close_room(self.room_id, self.owner_token).await?;
+        let (token, client) = (self.owner.token()?, self.server.connect().await?);
+        let room = client.close_room(self.room_id, token).await?;
         if self.json {
             say(serde_json::json!({"event": "closed", "room": room}))?;
         } else {

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
-use super::super::connect::ServerArg;
+use super::super::connect::{SecretArgs, ServerArg};
+use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages, say};
 use crate::kind::kind_name;
 use crate::narration::{abort_reason, clean};
@@ -16,6 +17,8 @@ use crate::narration::{abort_reason, clean};
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Only rooms in this state.
     #[arg(long)]
     state: Option<StateArg>,
@@ -33,6 +36,8 @@ pub(super) struct Show {
     room_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Print the room as a JSON line.
     #[arg(long)]
     json: bool,
@@ -48,7 +53,7 @@ enum StateArg {
 
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let state = match self.state {
             None => v1::RoomState::Unspecified,
             Some(StateArg::Waiting) => v1::RoomState::Waiting,
@@ -71,7 +76,7 @@ impl List {
 
 impl Show {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let room = client.get_room(self.room_id).await?;
         if self.json {
             say(serde_json::to_string(&room)?)?;
@@ -108,9 +113,11 @@ fn in_a_line(room: &v1::Room) -> String {
         v1::GameOrigin::Physical => "  (real cards)",
         _ => "",
     };
+    let policy = room.policy.clone().unwrap_or_default();
     let line = format!(
-        "{}  {state:<8}  {taken}/{seats} seats  {name}{beginning}",
-        room.room_id
+        "{}  {state:<8}  {taken}/{seats} seats  {name}{beginning}{}",
+        room.room_id,
+        visibility_mark(policy.visibility()),
     );
     line.trim_end().to_owned()
 }
@@ -141,6 +148,11 @@ fn in_full(room: &v1::Room) -> String {
     let policy = room.policy.clone().unwrap_or_default();
     if policy.durability() == v1::Durability::Ephemeral {
         out.push_str("store in memory; the game is lost when the server stops\n");
+    }
+    match policy.visibility() {
+        v1::Visibility::Unspecified | v1::Visibility::Public => {}
+        v1::Visibility::Unlisted => out.push_str("seen  by anyone who knows its id\n"),
+        v1::Visibility::Private => out.push_str("seen  by those who have a ticket of it\n"),
     }
     for seat in &room.seats {
         out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));

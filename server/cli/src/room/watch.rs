@@ -8,7 +8,7 @@ use chefshat_client::{Backoff, Error};
 use clap::Args;
 
 use super::super::CommandError;
-use super::super::connect::{PATIENCE, ServerArg};
+use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
 use super::show::beginning;
 use crate::narration::{Narrator, clean, heading};
 
@@ -24,6 +24,8 @@ pub(super) struct Watch {
     room_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Print each event as a JSON line.
     #[arg(long)]
     json: bool,
@@ -31,7 +33,7 @@ pub(super) struct Watch {
 
 impl Watch {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let room = client.get_room(self.room_id.as_str()).await?;
         let mut out = anstream::stdout();
         if !self.json {

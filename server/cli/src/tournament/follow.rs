@@ -9,7 +9,7 @@ use chefshat_client::{Backoff, v1};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::super::connect::{PATIENCE, ServerArg};
+use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
 use super::super::{CommandError, progress, say};
 use super::tables::{self, Field};
 use super::words::{is_over, state};
@@ -35,6 +35,8 @@ pub(super) struct Follow {
     tournament_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Print each change as a JSON line.
     #[arg(long)]
     json: bool,
@@ -42,7 +44,7 @@ pub(super) struct Follow {
 
 impl Follow {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let mut follower = client
             .follow_tournament(self.tournament_id)
             .with_backoff(Backoff {

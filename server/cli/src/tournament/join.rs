@@ -78,6 +78,8 @@ impl Join {
                 json: self.json,
             }
         };
+        // The tournament may be private.
+        let client = client.with_secrets([&ticket])?;
         let played = client.play_tournament(ticket, make).await;
         let outcomes = played.map_err(|error| format!("the place was lost: {error}"))?;
         match place {

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use chefshat_client::{Client, v1};
 use clap::Args;
 
-use super::super::connect::ServerArg;
+use super::super::connect::{SecretArgs, ServerArg};
 use super::super::numbers::{counted, ordinal};
+use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages, say};
 use super::words::{StateArg, format_name, state};
 use crate::narration::clean;
@@ -21,6 +22,8 @@ const GAMES_PAGE: u32 = 500;
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Only tournaments in this state.
     #[arg(long)]
     state: Option<StateArg>,
@@ -42,6 +45,8 @@ pub(super) struct Games {
     tournament_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Only games of this round, from 1.
     #[arg(long, value_name = "ROUND")]
     round: Option<u32>,
@@ -52,7 +57,7 @@ pub(super) struct Games {
 
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let state = (self.state).map_or(v1::TournamentState::Unspecified, StateArg::state);
         let fetch = async |page_token| {
             let request = v1::ListTournamentsRequest {
@@ -69,7 +74,7 @@ impl List {
 
 impl Games {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let participants = client
             .tournament(self.tournament_id.as_str())
             .await?
@@ -130,13 +135,15 @@ fn record_of(game: &v1::TournamentGame) -> Option<String> {
 fn in_a_line(tournament: &v1::Tournament) -> String {
     let settings = tournament.settings.clone().unwrap_or_default();
     let games = counted(tournament.games.into(), "game");
+    let policy = settings.policy.clone().unwrap_or_default();
     format!(
-        "{}  {:<8}  {:<11}  {} of {games}  {}",
+        "{}  {:<8}  {:<11}  {} of {games}  {}{}",
         clean(&tournament.tournament_id, 40),
         state(tournament.state()),
         format_name(settings.format()),
         tournament.games_over,
         clean(&settings.name, 40),
+        visibility_mark(policy.visibility()),
     )
 }
 

@@ -1,14 +1,13 @@
 //! Commands for the owner of a tournament: `chefshat tournament start` and `close`, `add` for a
 //! participant at a physical table, and `table` for the secrets of such a table.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::kind::KindArg;
 use chefshat_client::v1;
 use clap::Args;
 
-use super::super::connect::{ServerArg, attendant_link};
+use super::super::connect::{OwnerArgs, ServerArg, attendant_link};
 use super::super::{CommandError, say};
 use super::words::state;
 
@@ -18,17 +17,8 @@ pub(super) struct Owned {
     /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
-    /// The secret printed by `tournament create`.
-    #[arg(
-        long,
-        env = "CHEFSHAT_OWNER_TOKEN",
-        hide_env_values = true,
-        required_unless_present = "owner_file"
-    )]
-    owner_token: Option<String>,
-    /// File with the secret, written by `tournament create`.
-    #[arg(long, value_name = "FILE")]
-    owner_file: Option<PathBuf>,
+    #[command(flatten)]
+    owner: OwnerArgs,
     #[command(flatten)]
     server: ServerArg,
     /// Print the result as a JSON line.
@@ -69,7 +59,10 @@ pub(super) struct Table {
 
 impl Add {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owned.token()?, self.owned.server.connect().await?);
+        let (token, client) = (
+            self.owned.owner.token()?,
+            self.owned.server.connect().await?,
+        );
         let request = v1::AddTableParticipantRequest {
             tournament_id: self.owned.tournament_id.clone(),
             owner_token: token,
@@ -92,7 +85,10 @@ impl Add {
 
 impl Table {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owned.token()?, self.owned.server.connect().await?);
+        let (token, client) = (
+            self.owned.owner.token()?,
+            self.owned.server.connect().await?,
+        );
         let table = client
             .physical_table(self.owned.tournament_id.as_str(), token, self.game)
             .await?;
@@ -116,7 +112,7 @@ impl Table {
 impl Owned {
     /// Starts the tournament with the participants who have joined.
     pub(super) async fn start(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.token()?, self.server.connect().await?);
+        let (token, client) = (self.owner.token()?, self.server.connect().await?);
         let tournament = client
             .start_tournament(self.tournament_id.as_str(), token)
             .await?;
@@ -125,22 +121,11 @@ impl Owned {
 
     /// Closes the tournament.
     pub(super) async fn close(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.token()?, self.server.connect().await?);
+        let (token, client) = (self.owner.token()?, self.server.connect().await?);
         let tournament = client
             .close_tournament(self.tournament_id.as_str(), token)
             .await?;
         self.print("closed", &tournament)
-    }
-
-    /// The owner token; the file has priority over the environment.
-    fn token(&self) -> Result<String, CommandError> {
-        match (&self.owner_file, &self.owner_token) {
-            (Some(file), _) => std::fs::read_to_string(file)
-                .map(|text| text.trim().to_owned())
-                .map_err(|error| format!("--owner-file: {}: {error}", file.display()).into()),
-            (None, Some(token)) => Ok(token.clone()),
-            (None, None) => Err("give --owner-token or --owner-file".into()),
-        }
     }
 
     fn print(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use chefshat_client::v1;
 use clap::Args;
 
-use super::super::connect::ServerArg;
+use super::super::connect::{SecretArgs, ServerArg};
 use super::super::numbers::counted;
 use super::super::output::{heading, line};
 use super::super::{CommandError, say};
@@ -32,6 +32,8 @@ pub(super) struct Results {
     tournament_id: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
     /// Print the results as a JSON line.
     #[arg(long)]
     json: bool,
@@ -46,7 +48,7 @@ pub(super) struct Results {
 
 impl Results {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let client = self.server.connect().await?;
+        let client = self.server.connect_with(&self.secrets).await?;
         let results = client
             .tournament_results(self.tournament_id.as_str())
             .await?;

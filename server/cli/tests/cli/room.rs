@@ -153,3 +153,35 @@ fn a_missing_server_is_reported() {
     ended.assert_failed(&url);
     ended.assert_failed("chefshat serve");
 }
+
+#[test]
+fn a_private_room_is_shown_with_its_owner_token() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let owner = folder.path().join("owner");
+    let owner = format!("--owner-file {}", owner.display());
+    let seats = "--seat random --seat random --seat random --seat random";
+    let create =
+        format!("room create --visibility private {seats} --target-shifts 1 {owner} --json");
+    let made = run(&url, &create).json();
+    let room_id = made["room"]["roomId"].as_str().unwrap();
+    let game_id = made["room"]["gameId"].as_str().unwrap();
+
+    for command in ["show", "watch"] {
+        let command = format!("room {command} {room_id}");
+        run(&url, &command).assert_failed("ROOM_UNKNOWN");
+        run(&url, &format!("{command} {owner}")).well();
+    }
+    let get = format!("records get {game_id}");
+    run(&url, &get).assert_failed("GAME_UNKNOWN");
+    let record = run(&url, &format!("{get} {owner}")).well();
+    record.assert_says(&["VISIBILITY_PRIVATE"]);
+    for (list, nothing) in [
+        ("room list", "no rooms\n"),
+        ("records list", "no records\n"),
+    ] {
+        assert_eq!(run(&url, list).stdout, nothing);
+        run(&url, &format!("{list} {owner}")).assert_says(&["(private)"]);
+    }
+    run(&url, &format!("room close {room_id} {owner}")).well();
+}

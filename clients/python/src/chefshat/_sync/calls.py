@@ -47,6 +47,7 @@ class Calls(ABC):
         *,
         token: str | None = None,
         ca: Path | str | None = None,
+        secrets: Sequence[str] = (),
         backoff: Backoff | None = None,
     ) -> None:
         """Sets the server.
@@ -55,9 +56,11 @@ class Calls(ABC):
             address: "host:port", "http://host:port" or, for TLS, "https://host:port".
             token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
             ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
+            secrets: owner tokens and tickets, at most 16, shown with every call: with them private rooms and tournaments can be
+                read and watched, lists contain unlisted and private ones, and so do lists of records.
             backoff: delays between connection attempts while playing or watching.
         """
-        self._channel = channel(server_address(address, token, ca))
+        self._channel = channel(server_address(address, token, ca, secrets))
         self._backoff = backoff or Backoff()
         self._rng = random.Random()
         self._rooms = RoomServiceStub(self._channel)
@@ -89,6 +92,7 @@ class Calls(ABC):
         branch: pb.BranchPoint | None = None,
         hands: pb.ScriptedShift | None = None,
         durability: pb.Durability.ValueType | None = None,
+        visibility: pb.Visibility.ValueType | None = None,
         physical: bool = False,
     ) -> pb.CreateRoomResponse:
         """Creates a room.
@@ -102,12 +106,13 @@ class Calls(ABC):
             branch: the point of a recorded game to continue from, under the rules of that game (leave out `rules`).
             hands: the hands of the first Shift, instead of a deal.
             durability: what the game survives, overriding the policy; default: a restart of the server.
+            visibility: who sees the room and its record, overriding the policy; default: everybody. See `secrets` of the client.
             physical: the cards are real: nothing is dealt, and what happens at the table is reported (`report`).
 
         Returns:
             The room, its join code, the token that closes it and, if it is physical, the ticket of its table.
         """
-        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability, physical)
+        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability, visibility, physical)
         return called(self._rooms.CreateRoom, request)
 
     def join_room(
@@ -235,16 +240,20 @@ class Calls(ABC):
             failures += 1
             self._wait(failures, error)
 
-    def create_tournament(self, settings: pb.TournamentSettings) -> pb.CreateTournamentResponse:
+    def create_tournament(
+        self, settings: pb.TournamentSettings, *, visibility: pb.Visibility.ValueType | None = None
+    ) -> pb.CreateTournamentResponse:
         """Creates a tournament.
 
         Args:
             settings: a name and a format are required; other unset fields take their defaults.
+            visibility: who sees the tournament and its games, overriding the policy; default: everybody.
 
         Returns:
             The tournament, its join code, and the token that starts and closes it.
         """
-        return called(self._tournaments.CreateTournament, pb.CreateTournamentRequest(settings=settings))
+        request = requests.create_tournament(settings, visibility)
+        return called(self._tournaments.CreateTournament, request)
 
     def join_tournament(
         self,

@@ -47,6 +47,8 @@ export const lobby = {
     shifts: (shifts: number) => plural(shifts, { one: "# Shift", other: "# Shifts" }),
     decisionTime: (ms: number) => `${time(ms)} per decision`,
     ofTournament: "in a tournament",
+    unlisted: "unlisted",
+    private: "private",
   },
   seats: {
     free: "free",
@@ -192,6 +194,16 @@ export const lobby = {
       substitute: "Substitute",
       abort: "The game is aborted when",
       aborts: { allLost: "all participants are gone", anyLost: "one participant is gone", never: "never" },
+    },
+    visibility: {
+      title: "Who sees it",
+      label: "Visible to",
+      names: { public: "Everybody", unlisted: "Anyone with the link", private: "Only participants" },
+      hints: {
+        public: "It is in the lists of this server, with its records.",
+        unlisted: "It is in no list, but anyone with its link can watch it and see its records.",
+        private: "You, and anyone who joins with the invitation. Nobody else can find it, watch it or see its records.",
+      },
     },
     watch: {
       allowed: "Spectators may watch",

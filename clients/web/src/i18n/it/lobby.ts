@@ -48,6 +48,8 @@ export const lobby: Texts["lobby"] = {
     shifts: (shifts) => plural(shifts, { one: "# Shift", other: "# Shift" }),
     decisionTime: (ms) => `${time(ms)} per decisione`,
     ofTournament: "in un torneo",
+    unlisted: "non in elenco",
+    private: "su invito",
   },
   seats: {
     free: "libero",
@@ -196,6 +198,16 @@ export const lobby: Texts["lobby"] = {
         allLost: "tutti i partecipanti se ne sono andati",
         anyLost: "un partecipante se n’è andato",
         never: "mai",
+      },
+    },
+    visibility: {
+      title: "Visibilità",
+      label: "Visibile a",
+      names: { public: "Tutti", unlisted: "Chiunque abbia il link", private: "Solo i partecipanti" },
+      hints: {
+        public: "Compare negli elenchi di questo server, con le sue registrazioni.",
+        unlisted: "Non compare in nessun elenco, ma chi ha il link può guardare e vedere le registrazioni.",
+        private: "Tu e chi entra con l'invito. Nessun altro può trovare, guardare o vedere le registrazioni.",
       },
     },
     watch: {

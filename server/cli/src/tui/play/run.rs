@@ -44,6 +44,8 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
         ticket,
         game,
     } = taken;
+    // The room or tournament may be private.
+    let client = client.with_secrets([&ticket])?;
     let (sender, mut heard) = mpsc::channel(HEARD);
     let (orders, for_server) = mpsc::channel(ORDERS);
     let entropy = random_entropy();

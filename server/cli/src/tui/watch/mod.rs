@@ -18,7 +18,7 @@ use clap::Args;
 use tokio::sync::mpsc;
 
 use crate::CommandError;
-use crate::connect::{PATIENCE, ServerArg};
+use crate::connect::{PATIENCE, SecretArgs, ServerArg};
 use crate::narration::view::GameView;
 use crate::tui::screen::{Screen, Wake, missing};
 use crate::tui::theme::Theme;
@@ -42,6 +42,8 @@ pub(crate) struct Watch {
     what: String,
     #[command(flatten)]
     server: ServerArg,
+    #[command(flatten)]
+    secrets: SecretArgs,
 }
 
 impl Watch {
@@ -62,7 +64,7 @@ impl Watch {
             })?;
             (reel, None)
         } else {
-            let client = self.server.connect().await?;
+            let client = self.server.connect_with(&self.secrets).await?;
             self.of_server(&client).await?
         };
         show(reel, live).await

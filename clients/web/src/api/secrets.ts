@@ -1,0 +1,69 @@
+// The owner tokens and tickets that this device has received. Calls about a room, a tournament or a
+// record show those that may belong to it, and lists the newest ones: what is unlisted or private is
+// shown only then. They stay after the end of a game, for its record.
+
+import type { Message } from "@bufbuild/protobuf";
+import type { Interceptor } from "@connectrpc/connect";
+import { recallObject, remember } from "../store";
+
+const HEADER = "chefshat-secret";
+const STORED = "secrets";
+/** Most secrets that the server accepts with a call. */
+const MAX_SHOWN = 16;
+/** Most secrets that are stored; older ones are dropped. */
+const MAX_STORED = 200;
+
+/** Stores a secret, with the game that it shows if that is known. */
+export function keepSecret(secret: string, gameId = ""): void {
+  const others = kept().filter((other) => other.secret !== secret);
+  remember(STORED, JSON.stringify({ kept: [{ secret, gameId }, ...others].slice(0, MAX_STORED) }));
+}
+
+/** Shows secrets with each call that they may be needed for. */
+export const showSecrets: Interceptor = (next) => async (request) => {
+  const show = (message: object) => {
+    for (const secret of secretsFor(request.method.name, message)) request.header.append(HEADER, secret);
+  };
+  if (!request.stream) {
+    show(request.message);
+    return next(request);
+  }
+  // The page calls no method with a stream of requests: there is one message.
+  const messages: Message[] = [];
+  for await (const message of request.message) messages.push(message);
+  messages.forEach(show);
+  return next({ ...request, message: again(messages) });
+};
+
+async function* again<Item>(items: readonly Item[]): AsyncIterable<Item> {
+  yield* items;
+}
+
+/** The secrets to show with a call, the most likely ones first. */
+export function secretsFor(method: string, message: object): string[] {
+  const { roomId = "", tournamentId = "", gameId = "" }: Partial<Record<string, unknown>> = { ...message };
+  const asked = [roomId, tournamentId, gameId].filter((id) => typeof id === "string" && id !== "");
+  if (asked.length === 0 && !method.startsWith("List")) return [];
+  const all = kept();
+  // A secret begins with the id of its room or tournament.
+  const own = all.filter(({ secret, gameId: game }) => asked.includes(secret.slice(0, 32)) || asked.includes(game));
+  // The room or game may belong to a tournament, of which the page knows nothing at this point.
+  const others = all.filter((other) => !own.includes(other));
+  return [...own, ...others].slice(0, MAX_SHOWN).map(({ secret }) => secret);
+}
+
+interface Kept {
+  secret: string;
+  gameId: string;
+}
+
+function kept(): Kept[] {
+  const stored = recallObject(STORED, ({ kept: all }) => (Array.isArray(all) ? (all as unknown[]) : null));
+  return (stored ?? []).flatMap((one) => {
+    const { secret, gameId }: Partial<Record<string, unknown>> = { ...(one as object) };
+    // Another version may have stored something else, which the server would refuse.
+    return typeof secret === "string" && /^[0-9a-f]{96}$/.test(secret)
+      ? [{ secret, gameId: typeof gameId === "string" ? gameId : "" }]
+      : [];
+  });
+}
