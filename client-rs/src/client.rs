@@ -21,7 +21,8 @@ pub struct Client {
 }
 
 impl Client {
-    /// Connects to a server at `https://host`, `http://host:port` or `host:port`, without a token.
+    /// Connects to a server at `https://host`, `http://host:port` or `host:port`, without a token:
+    /// environment variables are not read ([`ConnectOptions::from_env`] does).
     ///
     /// # Errors
     /// `ADDRESS_REFUSED` for another scheme, or `http://` without a port; `CONNECT_FAILED` if no

@@ -2,8 +2,10 @@
 
 use std::error::Error as _;
 use std::fmt;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::Once;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -39,7 +41,7 @@ const PEM_CERTIFICATE: &[u8] = b"-----BEGIN CERTIFICATE-----";
 #[derive(Clone, Default)]
 pub struct ConnectOptions {
     /// Token sent with every call, from `chefshat token create`. Over `http://` it is readable on
-    /// the way.
+    /// the way: for a server elsewhere, a warning on standard error says so once.
     pub token: Option<String>,
     /// PEM file of the certificate authorities to trust with `https://`, instead of the system's.
     pub ca: Option<PathBuf>,
@@ -152,6 +154,14 @@ pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Conne
         Some("http") => endpoint,
         _ => return Err(Error::address(url, "the scheme is unknown")),
     };
+    if authorization.is_some()
+        && let Some(host) = unencrypted(endpoint.uri())
+    {
+        static WARNING: Once = Once::new();
+        WARNING.call_once(|| {
+            eprintln!("WARNING: the token is sent unencrypted to {host}; use https://{host}");
+        });
+    }
     let channel = endpoint
         .connect_timeout(CONNECT_TIMEOUT)
         .tcp_nodelay(true)
@@ -173,6 +183,18 @@ pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Conne
         authorization,
         secrets: Arc::default(),
     })
+}
+
+/// The host, if what is sent to this address can be read on the way: it is not this machine, and
+/// there is no TLS.
+fn unencrypted(address: &http::Uri) -> Option<&str> {
+    let host = address.host()?;
+    let plain = host.trim_start_matches('[').trim_end_matches(']');
+    let is_loopback = plain.parse::<IpAddr>().map_or_else(
+        |_| plain.eq_ignore_ascii_case("localhost"),
+        |ip| ip.to_canonical().is_loopback(),
+    );
+    (address.scheme_str() != Some("https") && !is_loopback).then_some(host)
 }
 
 /// The authorities of a PEM file, or those of the system.
@@ -204,4 +226,25 @@ fn is_tls(error: &tonic::transport::Error) -> bool {
         cause = error.source();
     }
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_to_another_machine_without_tls_is_unencrypted() {
+        for (address, host) in [
+            ("http://example.org:50051", Some("example.org")),
+            ("http://192.0.2.1:50051", Some("192.0.2.1")),
+            ("http://[2001:db8::1]:50051", Some("[2001:db8::1]")),
+            ("https://example.org", None),
+            ("http://localhost:50051", None),
+            ("http://127.8.0.1:50051", None),
+            ("http://[::1]:50051", None),
+        ] {
+            let address = http::Uri::from_static(address);
+            assert_eq!(unencrypted(&address), host, "{address}");
+        }
+    }
 }

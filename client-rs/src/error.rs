@@ -141,7 +141,7 @@ impl From<Status> for Error {
             .as_ref()
             .is_some_and(|info| info.reason == "TOKEN_MISSING")
         {
-            message += "; give it with --token, CHEFSHAT_TOKEN or `ConnectOptions`";
+            message += "; give it with --token or CHEFSHAT_TOKEN, in Rust with `ConnectOptions`";
         }
         let (reason, metadata) = match info {
             Some(info) => (Some(info.reason), info.metadata.into_iter().collect()),

@@ -18,7 +18,8 @@ const MIB: f64 = 1024.0 * 1024.0;
 /// stored. Needs a token with the role admin.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  chefshat token create --role admin\n  \
-                  chefshat admin clients --token TOKEN\n  \
+                  export CHEFSHAT_TOKEN=chefshat_...\n  \
+                  chefshat admin clients\n  \
                   chefshat admin disconnect 17\n  \
                   chefshat admin close room 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n  \
                   chefshat admin storage --json")]

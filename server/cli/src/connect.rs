@@ -27,7 +27,8 @@ pub(super) struct ServerArg {
         default_value = "http://127.0.0.1:50051"
     )]
     server: String,
-    /// Token of the server's operator, from `chefshat token create`.
+    /// Token of the server's operator, from `chefshat token create`. CHEFSHAT_TOKEN does the same and
+    /// does not show in lists of processes.
     #[arg(long, env = "CHEFSHAT_TOKEN", hide_env_values = true)]
     token: Option<String>,
     /// PEM file of the certificate authorities to trust, instead of the system's.

@@ -86,8 +86,9 @@ pub(super) struct Settings {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
-    /// Name of a host under which an open server on a loopback address may be reached, besides
-    /// localhost and addresses; for a proxy that passes it on. Repeatable.
+    /// Answer only requests for localhost, an address or this name of a host, so that no web page
+    /// reaches the server under a name of its own. Repeatable. Default: an open server on a loopback
+    /// address answers only for localhost and addresses, others for any name.
     #[arg(
         long = "allow-host",
         env = "CHEFSHAT_ALLOW_HOST",
@@ -186,7 +187,7 @@ impl Settings {
             return Err("--access tokens needs a data directory, which has the tokens; leave --no-records out".into());
         }
         let mode = Access::open(&settings, data_dir)?.mode();
-        if mode == Mode::Open && !address.is_local() {
+        if mode == Mode::Open && !address.is_loopback() {
             if settings.mode.is_none() {
                 return Err(format!(
                     "refusing to listen on {address} without tokens: anyone who reaches it could create rooms; create a token with \
@@ -254,6 +255,7 @@ impl Serve {
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
         let grace = settings.grace;
+        let allowed_hosts = without_empty(settings.allowed_hosts);
         let signing_key = data_dir.as_deref().map(key_or_new).transpose()?;
         let config = ServerConfig {
             data_dir,
@@ -268,16 +270,14 @@ impl Serve {
             built_in_decisions_per_second: settings.built_in_rate,
             vector_threads: settings.vector_threads,
             allow_import: settings.allow_import,
-            allowed_hosts: is_local.then_some(settings.allowed_hosts),
+            allowed_hosts: (is_local || !allowed_hosts.is_empty()).then_some(allowed_hosts),
             trusted_proxies: TrustedProxies::new(settings.trusted_proxies),
             access,
             max_connection_age: (tls.is_some() && settings.connection_age > 0)
                 .then(|| Duration::from_secs(settings.connection_age)),
             tls,
             grace: Duration::from_secs(settings.grace),
-            allowed_origins: (settings.allowed_origins.into_iter())
-                .filter(|origin| !origin.is_empty())
-                .collect(),
+            allowed_origins: without_empty(settings.allowed_origins),
             ..ServerConfig::default()
         };
         let server = Server::restored(config, store).await?;
@@ -377,6 +377,12 @@ fn keep_games(text: &str) -> Result<KeepGames, String> {
             "use a number of games above 0, or a time such as 90d, 12h or 30m".to_owned()
         }),
     }
+}
+
+/// The values of a setting; an empty variable has none.
+fn without_empty(mut values: Vec<String>) -> Vec<String> {
+    values.retain(|value| !value.is_empty());
+    values
 }
 
 /// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means

@@ -21,7 +21,7 @@ const MAX_BUILT_IN: usize = 1024;
 /// Create a tournament and print how to take part.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  chefshat tournament create --name cup --format knockout --built-in greedy*4 --start-when 16\n  \
+    after_help = "Examples:\n  chefshat tournament create --name cup --format knockout --built-in 'greedy*4' --start-when 16\n  \
                   chefshat tournament create --name league --format round_robin --deals same --games-per-pairing 4 --code-file ./join-code\n  \
                   chefshat tournament create --name mixed --format swiss --rounds 5 --target-shifts 3 \\\n    \
                   --clock human:60000:300000 --clock robot:30000 --no-show-time-ms 300000 --owner-file ./owner\n\n\

@@ -22,7 +22,7 @@ use super::CommandError;
 /// Create, join and follow tournaments, and show their results.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  chefshat tournament create --name cup --format swiss --built-in greedy*4 --start-when 12\n  \
+    after_help = "Examples:\n  chefshat tournament create --name cup --format swiss --built-in 'greedy*4' --start-when 12\n  \
                   chefshat tournament join --agent greedy --name Gustav --code BCDF2345\n  \
                   chefshat tournament follow TOURNAMENT-ID\n  chefshat tournament results TOURNAMENT-ID --csv standings.csv"
 )]

@@ -1,7 +1,7 @@
 //! Commands that connect: TLS with a private authority, tokens, and what is said when they are
 //! missing.
 
-use super::run::{chefshat, fixture, run, serve_with};
+use super::run::{chefshat, fixture, run, serve_with, typed};
 
 #[test]
 fn commands_connect_with_tls_and_a_token() {
@@ -30,4 +30,17 @@ fn commands_connect_with_tls_and_a_token() {
     assert!(!refused.stderr.contains(&unknown), "{refused:?}");
     run(&url, &format!("room list --token {token}")).assert_failed("CHEFSHAT_CA");
     run(&url, "room list --ca no-such-file").assert_failed("no-such-file");
+}
+
+#[test]
+fn a_token_that_others_can_read_on_the_way_is_warned_of() {
+    // Nobody listens there: the warning comes before the connection.
+    let list = |address: &str| typed(&format!("room list --token t --server {address}")).stderr;
+    let warning = "the token is sent unencrypted to 0.0.0.0; use https://0.0.0.0";
+    let elsewhere = list("http://0.0.0.0:1");
+    assert_eq!(elsewhere.matches(warning).count(), 1, "{elsewhere}");
+    for safe in ["http://127.0.0.1:1", "https://0.0.0.0:1"] {
+        let said = list(safe);
+        assert!(!said.contains("unencrypted"), "{said}");
+    }
 }

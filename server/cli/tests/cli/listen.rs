@@ -1,6 +1,7 @@
 //! The sockets of `chefshat serve` other than an address and port: a unix socket, one that systemd
 //! opens; and the unit for systemd.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::net::{UnixDatagram, UnixStream};
 use std::path::{Path, PathBuf};
@@ -34,6 +35,7 @@ fn serve_at(path: &Path) -> Command {
     let mut command = program();
     command.args(["serve", "--json", "--no-records", "--listen"]);
     command.arg(format!("unix:{}", path.display()));
+    command.args(["--access", "open"]);
     command
 }
 
@@ -46,17 +48,40 @@ fn a_server_listens_on_a_unix_socket_again_and_again() {
         let (_server, listening) = start(&mut serve_at(&path));
         let expected = format!("unix:{}", path.display());
         assert_eq!(listening["address"], expected.as_str());
-        let mut client = UnixStream::connect(&path).unwrap();
-        let request = "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
-        client.write_all(request.as_bytes()).unwrap();
-        let mut answer = String::new();
-        client.read_to_string(&mut answer).unwrap();
+        let answer = answer(&path, "localhost");
         assert!(answer.starts_with("HTTP/1.1 "), "{answer}");
 
         let other = Ended::of(serve_at(&path).output().unwrap());
         other.assert_failed("choose another path with --listen");
     }
     typed("serve --listen unix:").assert_refused("add a path");
+    let unsaid = format!("serve --no-records --listen unix:{}", path.display());
+    std::fs::remove_file(&path).unwrap();
+    typed(&unsaid).assert_failed("say --access open");
+}
+
+/// The answer of a server to a request for the page of a host.
+fn answer(path: &Path, host: &str) -> String {
+    let mut client = UnixStream::connect(path).unwrap();
+    let request = format!("GET / HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+    client.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    client.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[test]
+fn beyond_loopback_hosts_are_checked_if_some_are_named() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("chefshat.sock");
+    for (named, is_checked) in [("", false), ("chef.example.org", true)] {
+        let mut command = serve_at(&path);
+        let (_server, _) = start(command.env("CHEFSHAT_ALLOW_HOST", named));
+        let is_refused = |host: &str| answer(&path, host).contains("--allow-host");
+        assert_eq!(is_refused("other.example.org"), is_checked, "{named}");
+        assert!(!is_refused("chef.example.org"), "{named}");
+        assert!(!is_refused("127.0.0.1"), "{named}");
+    }
 }
 
 #[test]
@@ -97,4 +122,122 @@ fn the_unit_for_systemd_is_valid() {
         return;
     };
     Ended::of(output).clean();
+}
+
+#[test]
+fn the_unit_for_systemd_allows_every_system_call_of_a_server() {
+    let name = "the_unit_for_systemd_allows_every_system_call_of_a_server";
+    let Some(groups) = groups_of_system_calls() else {
+        eprintln!("SKIPPED {name}: systemd-analyze is not installed");
+        return;
+    };
+    let tried = Command::new("strace")
+        .args(["-o", "/dev/null", "true"])
+        .output();
+    if !tried.is_ok_and(|output| output.status.success()) {
+        eprintln!("SKIPPED {name}: strace is not installed or not allowed");
+        return;
+    }
+    let unit = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docker/systemd/chefshat.service");
+    let unit = std::fs::read_to_string(unit).unwrap();
+    let mut allowed = BTreeSet::new();
+    for line in unit.lines() {
+        let Some(filter) = line.strip_prefix("SystemCallFilter=") else {
+            continue;
+        };
+        match filter.strip_prefix('~') {
+            Some(denied) => members(&groups, denied).iter().for_each(|call| {
+                allowed.remove(call);
+            }),
+            None => allowed.extend(members(&groups, filter)),
+        }
+    }
+    // SQLite hands files to the owner of the database only where it runs as root.
+    if rustix::process::geteuid().is_root() {
+        allowed.insert("fchown");
+    }
+
+    let folder = TempDir::new().unwrap();
+    let log = folder.path().join("strace.log");
+    let mut command = Command::new("strace");
+    command
+        .args(["-f", "-qq", "-o"])
+        .arg(&log)
+        .arg(env!("CARGO_BIN_EXE_chefshat"));
+    command.args([
+        "serve",
+        "--json",
+        "--listen",
+        "127.0.0.1:0",
+        "--until-stdin-closes",
+    ]);
+    command.arg("--data-dir").arg(folder.path().join("data"));
+    command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let (mut server, listening) = start(&mut command);
+    let url = format!("http://{}", listening["address"].as_str().unwrap());
+    let game = "room create --seat greedy --seat greedy --seat greedy --seat greedy";
+    run(&url, game).well();
+    drop(server.0.stdin.take());
+    assert!(server.0.wait().unwrap().success());
+
+    let log = std::fs::read_to_string(log).unwrap();
+    // "1234 openat(AT_FDCWD, …"; what is resumed or a signal has another form.
+    let used: BTreeSet<&str> = (log.lines())
+        .filter_map(|line| line.split_once(' ')?.1.trim_start().split_once('('))
+        .map(|(call, _)| call)
+        .filter(|call| {
+            call.chars()
+                .all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
+        })
+        .collect();
+    // The server lowers the priority of its background threads, so the log is complete.
+    assert!(used.contains("setpriority"), "{used:?}");
+    let denied: Vec<_> = used.difference(&allowed).collect();
+    assert!(denied.is_empty(), "the unit denies {denied:?}");
+}
+
+/// The groups of system calls of systemd, by their names; `None`: it is not installed.
+fn groups_of_system_calls() -> Option<BTreeMap<String, BTreeSet<String>>> {
+    let output = Command::new("systemd-analyze")
+        .args(["--no-pager", "syscall-filter"])
+        .output()
+        .ok()?;
+    let text = Ended::of(output).well().stdout;
+    let mut groups = BTreeMap::<String, BTreeSet<String>>::new();
+    let mut group = String::new();
+    for line in text.lines() {
+        match line.strip_prefix(' ').map(str::trim) {
+            None => group = line.trim().to_owned(),
+            Some(comment) if comment.starts_with('#') => {}
+            Some(member) => {
+                groups
+                    .entry(group.clone())
+                    .or_default()
+                    .insert(member.to_owned());
+            }
+        }
+    }
+    Some(groups)
+}
+
+/// The system calls of a filter, which names groups and calls.
+fn members<'a>(
+    groups: &'a BTreeMap<String, BTreeSet<String>>,
+    filter: &'a str,
+) -> BTreeSet<&'a str> {
+    let mut found = BTreeSet::new();
+    let mut open: Vec<&str> = filter.split_whitespace().collect();
+    while let Some(name) = open.pop() {
+        match groups.get(name) {
+            Some(members) => open.extend(members.iter().map(String::as_str)),
+            None => {
+                assert!(!name.starts_with('@'), "systemd has no {name}");
+                found.insert(name);
+            }
+        }
+    }
+    found
 }
