@@ -55,7 +55,7 @@ class JoinOptions:
 
 
 def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False, default: str | None = None) -> None:
-    """Adds --address (and other `flags` for the same), --token and --ca. A required address may come from the environment."""
+    """Adds --address (and other `flags` for the same), --token, --ca, --secret. A required address may be in the environment."""
     what = "the server" if required or default else "a running server"
     unless = f" (default: {default})" if default else ""
     if required:
@@ -81,11 +81,18 @@ def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: b
         metavar="FILE",
         help=f"PEM file of the certificate authorities to trust with https:// (default: that of {CA}, or else the system's)",
     )
+    parser.add_argument(
+        "--secret",
+        action="append",
+        default=[],
+        metavar="SECRET",
+        help="an owner token or a ticket, to find and watch what is unlisted or private; repeatable",
+    )
 
 
 def server_of(options: argparse.Namespace) -> ServerAddress:
     """Returns the server that the options name."""
-    return ServerAddress(options.address, options.token, options.ca)
+    return ServerAddress(options.address, options.token, options.ca, tuple(options.secret))
 
 
 def server_if_any(options: argparse.Namespace) -> ServerAddress | None:

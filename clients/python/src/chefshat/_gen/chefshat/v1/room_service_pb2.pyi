@@ -109,7 +109,9 @@ class CreateRoomResponse(_message.Message):
     join_code: _builtins.str
     """The join code: what participants need to join."""
     owner_token: _builtins.str
-    """Secret that authorises the room's creator, for CloseRoom."""
+    """Secret that authorises the room's creator, for CloseRoom. It shows a room that is not public, and
+    the complete record of its game (`Visibility`).
+    """
     table_ticket: _builtins.str
     """Of a physical room: secret that authorises reports about its table and following it
     (TableService). Empty for other rooms.
@@ -302,7 +304,8 @@ class JoinRoomResponse(_message.Message):
     seat: _builtins.int
     """The seat."""
     ticket: _builtins.str
-    """Secret that authorises attaching and acting for this seat. Valid as long as the room exists.
+    """Secret that authorises attaching and acting for this seat. Valid as long as the room exists; it
+    shows a room that is not public, and its record, as long as that exists (`Visibility`).
     Before the game starts, a seat that was never attached is freed after two minutes.
     """
     @_builtins.property
