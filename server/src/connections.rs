@@ -24,7 +24,7 @@ use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::{debug, warn};
 
 use crate::access::TokenId;
-use crate::limits::{Held, Key, Places, Shares};
+use crate::limits::{Held, Key, LogPace, Places, Shares};
 use crate::metrics::{Counted, Metrics};
 use crate::proxies::TrustedProxies;
 
@@ -32,8 +32,6 @@ use crate::proxies::TrustedProxies;
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// File descriptors that connections leave for databases, records and everything else.
 const RESERVED_DESCRIPTORS: usize = 128;
-/// Shortest time between two lines in the log about refused connections.
-const LOG_INTERVAL: Duration = Duration::from_secs(60);
 /// Bytes after which the protocol of a connection is known: the preface of HTTP/2 and the header of
 /// its first frame. No request of HTTP/1.1 is shorter, and its headers have a time limit, too.
 const FIRST_BYTES: usize = 33;
@@ -114,7 +112,7 @@ pub struct Connections {
     clients: Mutex<BTreeMap<u64, Weak<Client>>>,
     next: AtomicU64,
     metrics: Arc<Metrics>,
-    refused_at: Mutex<Option<Instant>>,
+    logged: LogPace,
 }
 
 impl Connections {
@@ -137,7 +135,7 @@ impl Connections {
             clients: Mutex::default(),
             next: AtomicU64::new(1),
             metrics,
-            refused_at: Mutex::default(),
+            logged: LogPace::new(1),
         })
     }
 
@@ -174,9 +172,10 @@ impl Connections {
 
     /// Admits a new connection, unless there are too many.
     fn admit(self: &Arc<Self>, address: Option<SocketAddr>) -> Option<Arc<Client>> {
-        let key = match address.map(|address| address.ip()) {
-            Some(address) if self.trusted_proxies.contains(address) => Key::Proxies,
-            address => Key::of_address(address),
+        let peer = address.map(|address| address.ip());
+        let key = match self.trusted_proxies.contains(peer) {
+            true => Key::Proxies,
+            false => Key::of_address(peer),
         };
         let Some(place) = self.places.try_take(key) else {
             self.refuse("TOO_MANY_CONNECTIONS", &format_args!("{address:?}"));
@@ -204,10 +203,7 @@ impl Connections {
     /// Counts a refused connection, and logs it unless another was logged just before.
     fn refuse(&self, reason: &'static str, cause: &dyn std::fmt::Display) {
         self.metrics.refused(reason);
-        let now = Instant::now();
-        let mut refused_at = (self.refused_at.lock()).expect("nothing panics under this lock");
-        if refused_at.is_none_or(|before| now > before + LOG_INTERVAL) {
-            *refused_at = Some(now);
+        if self.logged.admits() {
             let open = self.places.taken();
             warn!(reason, %cause, open, "connections are refused");
         }
@@ -242,7 +238,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// The client that sent a request; `None` for connections without an address.
+    /// The client that sent a request; `None` if it did not come by a socket of the server.
     pub fn of(extensions: &http::Extensions) -> Option<&Arc<Self>> {
         extensions.get()
     }
@@ -292,6 +288,14 @@ impl Client {
     pub fn close(&self) {
         self.closing.store(true, Release);
         self.waker.wake();
+    }
+
+    /// Fails once the connection is to be closed.
+    fn open(&self) -> io::Result<()> {
+        match self.closing.load(Acquire) {
+            true => Err(io::ErrorKind::ConnectionAborted.into()),
+            false => Ok(()),
+        }
     }
 
     fn oldest_answer(&self) -> Option<Instant> {
@@ -466,9 +470,7 @@ impl AsyncRead for Connection {
         }
         if read.is_pending() {
             self.client.waker.register(context.waker());
-            if self.client.closing.load(Acquire) {
-                return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
-            }
+            self.client.open()?;
         }
         read
     }
@@ -480,10 +482,14 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
+        self.client.open()?;
         Pin::new(&mut self.stream).poll_write(context, bytes)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        // Some connections are only written to, for as long as what was read is not used up.
+        self.client.waker.register(context.waker());
+        self.client.open()?;
         Pin::new(&mut self.stream).poll_flush(context)
     }
 
@@ -496,6 +502,7 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
+        self.client.open()?;
         Pin::new(&mut self.stream).poll_write_vectored(context, bytes)
     }
 
@@ -582,7 +589,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_trusted_proxy_may_have_all_connections() {
-        let network = crate::proxies::network("127.0.0.0/8").expect("a network");
+        let network = "127.0.0.0/8".parse().expect("a network");
         let limits = Limits {
             trusted_proxies: TrustedProxies::new([network]),
             ..limits(4, Duration::from_secs(60))

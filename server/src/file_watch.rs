@@ -10,28 +10,51 @@ type Mark = Option<(Option<SystemTime>, u64, u64)>;
 /// Files that are looked at from time to time.
 #[derive(Debug)]
 pub struct FileWatch {
-    files: Vec<(PathBuf, Mark)>,
+    paths: Vec<PathBuf>,
+    /// As they were when they were read.
+    read: Vec<Mark>,
+    /// As they were when they could not be read.
+    failed: Option<Vec<Mark>>,
 }
 
 impl FileWatch {
     /// Watches these files, which may not exist.
-    pub fn of<'a>(files: impl IntoIterator<Item = &'a Path>) -> Self {
-        let marked = |path: &'a Path| (path.to_path_buf(), mark(path));
+    pub fn of<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
+        let paths: Vec<_> = paths.into_iter().map(Path::to_path_buf).collect();
         Self {
-            files: files.into_iter().map(marked).collect(),
+            read: marks(&paths),
+            paths,
+            failed: None,
         }
     }
 
-    /// Whether any of the files has changed since the last look.
-    pub fn has_changed(&mut self) -> bool {
-        let mut changed = false;
-        for (path, known) in &mut self.files {
-            let now = mark(path);
-            changed |= now != *known;
-            *known = now;
+    /// Runs `read` if any of the files has changed since it last succeeded. It fails silently if it
+    /// failed before and nothing has changed since.
+    ///
+    /// # Errors
+    /// `read` failed for the first time.
+    pub fn read_changed<E>(&mut self, read: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
+        let marks = marks(&self.paths);
+        if marks == self.read {
+            return Ok(());
         }
-        changed
+        match read() {
+            Ok(()) => {
+                self.read = marks;
+                self.failed = None;
+                Ok(())
+            }
+            Err(_) if self.failed.as_ref() == Some(&marks) => Ok(()),
+            Err(error) => {
+                self.failed = Some(marks);
+                Err(error)
+            }
+        }
     }
+}
+
+fn marks(paths: &[PathBuf]) -> Vec<Mark> {
+    paths.iter().map(|path| mark(path)).collect()
 }
 
 fn mark(path: &Path) -> Mark {
@@ -47,20 +70,44 @@ fn mark(path: &Path) -> Mark {
 mod tests {
     use super::*;
 
+    /// Whether a watch reads its files, and `result` is what that gives.
+    fn reads(watch: &mut FileWatch, result: Result<(), ()>) -> (bool, Result<(), ()>) {
+        let mut read = false;
+        let result = watch.read_changed(|| {
+            read = true;
+            result
+        });
+        (read, result)
+    }
+
     #[test]
-    fn a_file_that_is_made_replaced_or_removed_has_changed() {
+    fn a_file_that_is_made_replaced_or_removed_is_read_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let (path, other) = (folder.path().join("a"), folder.path().join("b"));
         let mut watch = FileWatch::of([path.as_path()]);
-        assert!(!watch.has_changed());
+        assert!(!reads(&mut watch, Ok(())).0);
         std::fs::write(&path, "1").expect("written");
-        assert!(watch.has_changed());
-        assert!(!watch.has_changed());
+        assert!(reads(&mut watch, Ok(())).0);
+        assert!(!reads(&mut watch, Ok(())).0);
         std::fs::write(&other, "2").expect("written");
         std::fs::rename(&other, &path).expect("renamed");
-        assert!(watch.has_changed());
+        assert!(reads(&mut watch, Ok(())).0);
         std::fs::remove_file(&path).expect("removed");
-        assert!(watch.has_changed());
-        assert!(!watch.has_changed());
+        assert!(reads(&mut watch, Ok(())).0);
+        assert!(!reads(&mut watch, Ok(())).0);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_tried_again_and_reported_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a");
+        let mut watch = FileWatch::of([path.as_path()]);
+        std::fs::write(&path, "1").expect("written");
+        assert_eq!(reads(&mut watch, Err(())), (true, Err(())));
+        assert_eq!(reads(&mut watch, Err(())), (true, Ok(())));
+        std::fs::write(&path, "12").expect("written");
+        assert_eq!(reads(&mut watch, Err(())), (true, Err(())));
+        assert_eq!(reads(&mut watch, Ok(())), (true, Ok(())));
+        assert_eq!(reads(&mut watch, Ok(())), (false, Ok(())));
     }
 }

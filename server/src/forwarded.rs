@@ -54,8 +54,7 @@ where
     }
 
     fn call(&mut self, mut request: Request<B>) -> Self::Future {
-        let by_proxy = peer_address(request.extensions())
-            .is_some_and(|address| self.trusted.contains(address));
+        let by_proxy = (self.trusted).contains(peer_address(request.extensions()));
         if by_proxy && let Some(client) = self.trusted.client(request.headers()) {
             request.extensions_mut().insert(ForwardedClient(client));
         }
@@ -73,15 +72,16 @@ mod tests {
     use tower::{ServiceBuilder, service_fn};
 
     use super::*;
-    use crate::proxies::{FORWARDED_FOR, network};
+    use crate::proxies::{FORWARDED_FOR, TrustedProxy};
 
-    /// The address that the services see for a request of `peer` with these headers.
-    fn seen(peer: &str, headers: &[&str]) -> String {
-        let trusted = ["10.0.0.0/8", "192.0.2.7", "fd00::/8"].map(|text| network(text).unwrap());
+    /// The address that the services see for a request of `peer`, an address or a unix socket, with
+    /// these headers.
+    fn seen(trusted: &[&str], peer: &str, headers: &[&str]) -> String {
+        let trusted = trusted.iter().map(|text| text.parse().expect("a proxy"));
         let layer = ForwardedLayer::new(TrustedProxies::new(trusted));
         let mut services = ServiceBuilder::new().layer(layer).service(service_fn(
             |request: Request<()>| async move {
-                Ok::<_, Infallible>(peer_address(request.extensions()).unwrap())
+                Ok::<_, Infallible>(peer_address(request.extensions()))
             },
         ));
         let mut request = Request::new(());
@@ -89,12 +89,15 @@ mod tests {
             let line = line.parse().unwrap();
             request.headers_mut().append(FORWARDED_FOR, line);
         }
-        request.extensions_mut().insert(TcpConnectInfo {
-            local_addr: None,
-            remote_addr: Some(SocketAddr::new(peer.parse().unwrap(), 1)),
-        });
+        if peer != "unix" {
+            request.extensions_mut().insert(TcpConnectInfo {
+                local_addr: None,
+                remote_addr: Some(SocketAddr::new(peer.parse().unwrap(), 1)),
+            });
+        }
         let answer = services.call(request).now_or_never().expect("ready");
-        answer.expect("infallible").to_string()
+        let address = answer.expect("infallible");
+        address.map_or("unix".to_owned(), |address| address.to_string())
     }
 
     #[test]
@@ -118,18 +121,23 @@ mod tests {
             // A stranger.
             ("198.51.100.9", &["10.0.0.1"], "198.51.100.9"),
             ("192.0.2.8", &["1.1.1.1"], "192.0.2.8"),
+            ("unix", &["1.1.1.1"], "unix"),
         ] {
-            assert_eq!(seen(peer, headers), client, "{peer} {headers:?}");
+            let trusted = ["10.0.0.0/8", "192.0.2.7", "fd00::/8"];
+            let seen = seen(&trusted, peer, headers);
+            assert_eq!(seen, client, "{peer} {headers:?}");
         }
+        assert_eq!(seen(&["unix"], "unix", &["1.1.1.1"]), "1.1.1.1");
+        assert_eq!(seen(&["unix"], "127.0.0.1", &["1.1.1.1"]), "127.0.0.1");
     }
 
     #[test]
-    fn networks_are_addresses_with_or_without_a_prefix() {
-        for good in ["127.0.0.1", "10.0.0.0/8", "::1", "fd00::/8"] {
-            assert!(network(good).is_ok(), "{good}");
+    fn a_proxy_is_an_address_a_network_or_the_unix_socket() {
+        for good in ["127.0.0.1", "10.0.0.0/8", "::1", "fd00::/8", "unix"] {
+            assert!(good.parse::<TrustedProxy>().is_ok(), "{good}");
         }
         for bad in ["", "localhost", "10.0.0.0/33", "10.0.0", "*"] {
-            assert!(network(bad).is_err(), "{bad}");
+            assert!(bad.parse::<TrustedProxy>().is_err(), "{bad}");
         }
     }
 }

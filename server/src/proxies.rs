@@ -11,20 +11,33 @@ pub use ipnet::IpNet;
 /// The header in which proxies list the addresses they forward for, the nearest last.
 pub(crate) const FORWARDED_FOR: &str = "x-forwarded-for";
 
-/// The networks of the proxies that are trusted to name their clients.
+/// Where a proxy connects from that is trusted to name its clients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrustedProxy {
+    /// An address in this network.
+    Network(IpNet),
+    /// The unix socket of the server.
+    UnixSocket,
+}
+
+/// The proxies that are trusted to name their clients.
 #[derive(Debug, Clone, Default)]
-pub struct TrustedProxies(Arc<[IpNet]>);
+pub struct TrustedProxies(Arc<[TrustedProxy]>);
 
 impl TrustedProxies {
-    /// Trusts the proxies in these networks.
-    pub fn new(networks: impl IntoIterator<Item = IpNet>) -> Self {
-        Self(networks.into_iter().collect())
+    /// Trusts these proxies.
+    pub fn new(proxies: impl IntoIterator<Item = TrustedProxy>) -> Self {
+        Self(proxies.into_iter().collect())
     }
 
-    /// Whether this is the address of a trusted proxy.
-    pub fn contains(&self, address: IpAddr) -> bool {
-        let address = address.to_canonical();
-        self.0.iter().any(|network| network.contains(&address))
+    /// Whether this is the address of a trusted proxy; `None` is that of all peers at a unix socket.
+    pub fn contains(&self, address: Option<IpAddr>) -> bool {
+        let address = address.map(|address| address.to_canonical());
+        self.0.iter().any(|proxy| match (proxy, address) {
+            (TrustedProxy::Network(network), Some(address)) => network.contains(&address),
+            (TrustedProxy::UnixSocket, None) => true,
+            _ => false,
+        })
     }
 
     /// The client for which trusted proxies forward: the last address that is not theirs. Stops at
@@ -37,7 +50,7 @@ impl TrustedProxies {
                 return nearest;
             };
             nearest = Some(address);
-            if !self.contains(address) {
+            if !self.contains(Some(address)) {
                 return nearest;
             }
         }
@@ -53,13 +66,19 @@ fn parse(entry: &[u8]) -> Option<IpAddr> {
     Some(address.to_canonical())
 }
 
-/// A network, such as 10.0.0.0/8, or a single address.
-///
-/// # Errors
-/// The text is neither.
-pub fn network(text: &str) -> Result<IpNet, String> {
-    let single = || IpAddr::from_str(text).map(IpNet::from);
-    text.parse()
-        .or_else(|_| single())
-        .map_err(|_| "use an address or a network, for example 127.0.0.1 or 10.0.0.0/8".to_owned())
+impl FromStr for TrustedProxy {
+    type Err = String;
+
+    /// Reads an address, a network such as 10.0.0.0/8, or `unix`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "unix" {
+            return Ok(Self::UnixSocket);
+        }
+        let single = || IpAddr::from_str(text).map(IpNet::from);
+        let network = text.parse().or_else(|_| single());
+        network.map(Self::Network).map_err(|_| {
+            "use an address or a network, for example 127.0.0.1 or 10.0.0.0/8, or unix for the server's unix socket"
+                .to_owned()
+        })
+    }
 }

@@ -17,7 +17,7 @@ use tokio_util::task::TaskTracker;
 use tonic::service::Routes;
 use tonic::transport;
 use tonic::transport::server::Connected;
-use tower_http::cors::{AllowOrigin, Any, CorsLayer};
+use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
@@ -246,7 +246,10 @@ impl Server {
             .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
-            .layer(grpc::AccessLayer::new(Arc::clone(&access)))
+            .layer(grpc::AccessLayer::new(
+                Arc::clone(&access),
+                Arc::clone(&calls),
+            ))
             .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
@@ -380,7 +383,7 @@ fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<
 fn cors(origins: &[String]) -> Result<CorsLayer, ServeError> {
     let layer = CorsLayer::new()
         .allow_methods([http::Method::POST])
-        .allow_headers(Any)
+        .allow_headers(AllowHeaders::mirror_request())
         .expose_headers(
             ["grpc-status", "grpc-message", "grpc-status-details-bin"].map(HeaderName::from_static),
         );

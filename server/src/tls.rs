@@ -5,7 +5,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -130,6 +130,7 @@ fn unreadable(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
 #[derive(Debug)]
 pub struct Tls {
     files: TlsFiles,
+    watch: Mutex<FileWatch>,
     current: ArcSwap<ServerConfig>,
 }
 
@@ -139,27 +140,29 @@ impl Tls {
     /// # Errors
     /// They cannot be used.
     pub fn open(files: TlsFiles) -> Result<Arc<Self>, TlsError> {
+        // Watched before they are read: a later change is noticed.
+        let watch = Mutex::new(FileWatch::of(files.paths()));
         let current = ArcSwap::new(files.read()?);
-        Ok(Arc::new(Self { files, current }))
+        Ok(Arc::new(Self {
+            files,
+            watch,
+            current,
+        }))
     }
 
     /// Reads the files again whenever they change, until it is dropped. If they cannot be used, the
     /// certificate stays as it was.
     pub async fn follow(self: Arc<Self>) {
-        let mut watch = FileWatch::of(self.files.paths());
-        // They may have changed since the server read them.
-        let mut changed = true;
         loop {
             sleep(INTERVAL).await;
-            changed |= watch.has_changed();
-            if std::mem::take(&mut changed) {
-                match self.files.read() {
-                    Ok(config) => {
-                        self.current.store(config);
-                        info!("the certificate was read again");
-                    }
-                    Err(error) => error!(%error, "the certificate stays as it was"),
-                }
+            let mut watch = (self.watch.lock()).expect("no code that holds this lock can panic");
+            let read = watch.read_changed(|| {
+                self.current.store(self.files.read()?);
+                info!("the certificate was read again");
+                Ok::<_, TlsError>(())
+            });
+            if let Err(error) = read {
+                error!(%error, "the certificate stays as it was");
             }
         }
     }

@@ -19,7 +19,7 @@ use super::{CommandError, data_dir, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::config::{KeepGames, ServerConfig};
 use chefshat_server::limits::Shares;
-use chefshat_server::proxies::{IpNet, TrustedProxies, network};
+use chefshat_server::proxies::{TrustedProxies, TrustedProxy};
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::signing::key_or_new;
@@ -101,16 +101,16 @@ pub(super) struct Settings {
     #[cfg(feature = "otlp")]
     #[arg(long, env = "CHEFSHAT_OTLP_ENDPOINT", value_name = "URL")]
     pub(super) otlp_endpoint: Option<String>,
-    /// Proxy in front of the server, an address or a network such as 10.0.0.0/8, that names its
-    /// clients in x-forwarded-for. Limits and logs then see the clients. Repeatable.
+    /// Proxy in front of the server that names its clients in x-forwarded-for: an address, a network
+    /// such as 10.0.0.0/8, or unix for the server's unix socket. Limits and logs then see the
+    /// clients. Repeatable.
     #[arg(
         long = "trusted-proxy",
         env = "CHEFSHAT_TRUSTED_PROXY",
-        value_name = "CIDR",
-        value_delimiter = ',',
-        value_parser = network
+        value_name = "CIDR|unix",
+        value_delimiter = ','
     )]
-    trusted_proxies: Vec<IpNet>,
+    trusted_proxies: Vec<TrustedProxy>,
     /// Whether calls need a token (see `chefshat token`): open or tokens. Default: tokens if the data
     /// directory has any. An open server is refused on addresses that others reach, unless this
     /// says open.

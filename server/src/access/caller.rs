@@ -80,15 +80,6 @@ impl fmt::Display for Scope {
     }
 }
 
-/// What clients are told apart by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Client {
-    /// The token that they send.
-    Token(TokenId),
-    /// The address that they connect from.
-    Address(IpAddr),
-}
-
 /// Who sent a request.
 #[derive(Debug, Clone, Default)]
 pub struct Caller {
@@ -109,12 +100,6 @@ impl Caller {
     /// may do nothing.
     pub fn of(extensions: &http::Extensions) -> Self {
         extensions.get().cloned().unwrap_or_default()
-    }
-
-    /// The client: its token, or else its address; `None` if it has neither.
-    pub fn client(&self) -> Option<Client> {
-        let token = self.token.map(Client::Token);
-        token.or(self.address.map(Client::Address))
     }
 
     /// Whether its scope includes a room. `tournament` is the tournament that the room belongs to.

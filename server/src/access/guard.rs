@@ -217,19 +217,18 @@ impl Access {
         authorization: Option<&[u8]>,
         address: Option<IpAddr>,
     ) -> Result<Granted, Refusal> {
-        let granted = match self.identify(authorization, address) {
-            Ok(granted) => granted,
-            // A call that needs no role needs no valid token either.
-            Err(_) if call.role == Role::Anyone => self.without_token(address),
-            Err(refusal) => return Err(refusal),
-        };
-        let caller = &granted.caller;
         let required = match call.reads_records {
             true => call.role.max(self.records),
             false => call.role,
         };
-        Refusal::of_role(caller, required)?;
-        match caller.scope {
+        let granted = match self.identify(authorization, address) {
+            Ok(granted) => granted,
+            // What needs no token needs no valid token either.
+            Err(_) if required <= self.role_without_token() => self.without_token(address),
+            Err(refusal) => return Err(refusal),
+        };
+        Refusal::of_role(&granted.caller, required)?;
+        match granted.caller.scope {
             Some(scope) if call.scoped == Scoped::Refused => Err(Refusal::OutOfScope { scope }),
             _ => Ok(granted),
         }
@@ -264,11 +263,16 @@ impl Access {
         if token.is_expired(since_epoch_ms()) {
             return Some(Err(Refusal::TokenExpired));
         }
+        // A token takes nothing away, unless it is limited to something.
+        let role = match token.scope {
+            None => token.role.max(self.role_without_token()),
+            Some(_) => token.role,
+        };
         Some(Ok(Granted {
             caller: Caller {
                 address,
                 token: Some(token.id),
-                role: token.role,
+                role,
                 scope: token.scope,
                 secrets: Secrets::default(),
             },
@@ -310,20 +314,16 @@ impl Access {
         let Some(Followed { file, watch }) = &self.file else {
             return;
         };
-        // Held while reading: whoever waits for it finds the tokens read.
-        let mut watch = watch
-            .lock()
-            .expect("no code that holds this lock can panic");
-        if !watch.has_changed() {
-            return;
-        }
-        match file.read() {
-            Ok(tokens) => {
-                let tokens = tokens.unwrap_or_default();
-                debug!(tokens = tokens.len(), "tokens read again");
-                self.replace(tokens);
-            }
-            Err(error) => error!(%error, "the tokens stay as they were"),
+        // Held while reading: a caller that waits for it finds the tokens read.
+        let mut watch = (watch.lock()).expect("no code that holds this lock can panic");
+        let read = watch.read_changed(|| {
+            let tokens = file.read()?.unwrap_or_default();
+            debug!(tokens = tokens.len(), "tokens read again");
+            self.replace(tokens);
+            Ok::<_, TokenFileError>(())
+        });
+        if let Err(error) = read {
+            error!(%error, "the tokens stay as they were");
         }
     }
 

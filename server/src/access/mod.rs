@@ -12,7 +12,7 @@ mod guard;
 mod secrets;
 mod token;
 
-pub use caller::{Caller, Client, Role, Scope};
+pub use caller::{Caller, Role, Scope};
 pub use calls::{CALLS, Call, Scoped};
 pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};

@@ -2,8 +2,6 @@
 //! request, or puts the [`Caller`] into its extensions. A call or stream ends with the token that
 //! authorised it.
 
-use std::future::{Ready, ready};
-use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -19,25 +17,36 @@ use tonic::{Code, Status};
 use tower::{Layer, Service};
 use tracing::info;
 
+use super::limits::refuse;
 use super::status::status;
 use crate::access::{
     Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
 };
 use crate::connections::peer_address;
+use crate::limits::{CallLimits, LogPace};
 
 /// Where the services of this project are.
 const OWN_PACKAGE: &str = "/chefshat.";
+
+/// Refused calls that are logged in a minute.
+const LOGGED: u32 = 60;
 
 /// Puts the decision about each request in front of the services.
 #[derive(Debug, Clone)]
 pub struct AccessLayer {
     access: Arc<Access>,
+    limits: Arc<CallLimits>,
+    logged: Arc<LogPace>,
 }
 
 impl AccessLayer {
-    /// Creates a layer that asks `access`.
-    pub fn new(access: Arc<Access>) -> Self {
-        Self { access }
+    /// Creates a layer that asks `access`. Refusals count as calls in `limits`.
+    pub fn new(access: Arc<Access>, limits: Arc<CallLimits>) -> Self {
+        Self {
+            access,
+            limits,
+            logged: Arc::new(LogPace::new(LOGGED)),
+        }
     }
 }
 
@@ -46,7 +55,7 @@ impl<S> Layer<S> for AccessLayer {
 
     fn layer(&self, services: S) -> Self::Service {
         WithAccess {
-            access: Arc::clone(&self.access),
+            layer: self.clone(),
             services,
         }
     }
@@ -55,7 +64,7 @@ impl<S> Layer<S> for AccessLayer {
 /// The services with the decision in front of them.
 #[derive(Debug, Clone)]
 pub struct WithAccess<S> {
-    access: Arc<Access>,
+    layer: AccessLayer,
     services: S,
 }
 
@@ -76,9 +85,12 @@ impl<S> WithAccess<S> {
         };
         let authorization = request.headers().get(header::AUTHORIZATION);
         let authorization = authorization.map(|value| value.as_bytes());
-        let checked = self.access.check(call, authorization, address);
+        let checked = self.layer.access.check(call, authorization, address);
         let mut granted = checked.map_err(|refusal| {
-            log(path, address, refusal);
+            if self.layer.logged.admits() {
+                let address = address.map(tracing::field::display);
+                info!(call = path, address, ?refusal, "a call was refused");
+            }
             refused(refusal)
         })?;
         let secrets = request.headers().get_all(SECRET_HEADER).into_iter();
@@ -88,42 +100,41 @@ impl<S> WithAccess<S> {
     }
 }
 
-fn log(path: &str, address: Option<IpAddr>, refusal: Refusal) {
-    let address = address.map(tracing::field::display);
-    info!(call = path, address, ?refusal, "a call was refused");
-}
-
-impl<S, B> Service<Request<B>> for WithAccess<S>
+impl<S> Service<Request<Body>> for WithAccess<S>
 where
-    S: Service<Request<B>, Response = Response<Body>>,
+    S: Service<Request<Body>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
     type Response = Response<Body>;
     type Error = S::Error;
-    type Future = Either<
-        Ready<Result<Self::Response, Self::Error>>,
-        Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>,
-    >;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
 
     fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
         self.services.poll_ready(context)
     }
 
-    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
         let granted = match self.decide(&request) {
             Ok(granted) => granted,
-            Err(status) => return Either::Left(ready(Ok(status.into_http()))),
+            Err(status) => {
+                let limits = &self.layer.limits;
+                return Either::Right(refuse(limits, request.extensions(), status));
+            }
         };
         // They have served: nothing behind this layer needs them, or could log them.
         request.headers_mut().remove(header::AUTHORIZATION);
         request.headers_mut().remove(SECRET_HEADER);
         request.extensions_mut().insert(granted.caller);
-        let answering = self.services.call(request);
-        Either::Right(match granted.ended {
-            None => Either::Left(answering),
-            Some(ended) => Either::Right(Box::pin(until_ended(answering, ended))),
-        })
+        match granted.ended {
+            None => Either::Left(self.services.call(request)),
+            Some(ended) => {
+                // A client that does not read its answers keeps the answering side from ending.
+                let request = request.map(|body| EndingBody::of(body, &ended, Side::Request));
+                let answering = self.services.call(request);
+                Either::Right(Box::pin(until_ended(answering, ended)))
+            }
+        }
     }
 }
 
@@ -134,26 +145,43 @@ async fn until_ended<E>(
 ) -> Result<Response<Body>, E> {
     tokio::select! {
         () = ended.signal().cancelled() => Ok(refused(ended.refusal()).into_http()),
-        response = answering => Ok(response?.map(|body| {
-            // The body of a finished call has nothing left to end.
-            match body.is_end_stream() {
-                true => body,
-                false => Body::new(EndingBody {
-                    body: Some(body),
-                    signalled: Box::pin(ended.signal().clone().cancelled_owned()),
-                    ended,
-                }),
-            }
-        })),
+        response = answering => {
+            Ok(response?.map(|body| EndingBody::of(body, &ended, Side::Response)))
+        }
     }
 }
 
-/// A body that ends with a status once its token does.
+/// A body that ends once its token does.
 struct EndingBody {
     /// `None` after the end.
     body: Option<Body>,
+    side: Side,
     signalled: Pin<Box<WaitForCancellationFutureOwned>>,
     ended: Ended,
+}
+
+/// Which body of a call.
+#[derive(Debug, Clone, Copy)]
+enum Side {
+    /// What the client sends. Ends with an error.
+    Request,
+    /// What the client receives. Ends with a status.
+    Response,
+}
+
+impl EndingBody {
+    fn of(body: Body, ended: &Ended, side: Side) -> Body {
+        // The body of a finished call has nothing left to end.
+        match body.is_end_stream() {
+            true => body,
+            false => Body::new(Self {
+                body: Some(body),
+                side,
+                signalled: Box::pin(ended.signal().clone().cancelled_owned()),
+                ended: ended.clone(),
+            }),
+        }
+    }
 }
 
 impl HttpBody for EndingBody {
@@ -179,9 +207,15 @@ impl HttpBody for EndingBody {
             Poll::Pending => Poll::Pending,
             Poll::Ready(()) => {
                 this.body = None;
-                let mut trailers = HeaderMap::new();
-                let written = refused(this.ended.refusal()).add_header(&mut trailers);
-                Poll::Ready(Some(written.map(|()| Frame::trailers(trailers))))
+                let status = refused(this.ended.refusal());
+                Poll::Ready(Some(match this.side {
+                    Side::Request => Err(status),
+                    Side::Response => {
+                        let mut trailers = HeaderMap::new();
+                        let written = status.add_header(&mut trailers);
+                        written.map(|()| Frame::trailers(trailers))
+                    }
+                }))
             }
         }
     }
@@ -241,5 +275,64 @@ pub(super) fn refused(refusal: Refusal) -> Status {
             format!("the token is valid for {scope} only"),
             [("scope", &scope.to_string())],
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use futures::{FutureExt as _, stream};
+    use http_body_util::{BodyExt as _, StreamBody};
+    use tokio::sync::oneshot;
+    use tower::service_fn;
+
+    use super::*;
+    use crate::access::{AccessSettings, NewToken, Role, TokenFile};
+    use crate::limits::Shares;
+
+    /// A stream of a client that sends nothing and reads nothing.
+    #[tokio::test(start_paused = true)]
+    async fn what_a_client_sends_ends_with_its_token_even_if_it_reads_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let tokens = TokenFile::of(folder.path());
+        let token = tokens.create(NewToken {
+            role: Role::Player,
+            label: String::new(),
+            lifetime: None,
+            scope: None,
+        });
+        let token = token.expect("written");
+        let data_dir = folder.path().to_path_buf();
+        let access = Access::open(&AccessSettings::default(), Some(&data_dir)).expect("readable");
+        let access = Arc::new(access);
+        tokio::spawn(Arc::clone(&access).follow());
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let (sender, read) = oneshot::channel();
+        let mut sender = Some(sender);
+        let reading = service_fn(move |request: Request<Body>| {
+            let sender = sender.take().expect("one call");
+            tokio::spawn(
+                async move { sender.send(request.into_body().collect().await.map(|_| ())) },
+            );
+            async {
+                let body = Body::new(StreamBody::new(stream::pending::<
+                    Result<Frame<Bytes>, Status>,
+                >()));
+                Ok::<_, Infallible>(Response::new(body))
+            }
+        });
+        let mut service = AccessLayer::new(access, limits).layer(reading);
+        let silent = stream::pending::<Result<Frame<Bytes>, Status>>();
+        let request = Request::post("/chefshat.v1.PlayService/Play")
+            .header("authorization", format!("Bearer {}", token.to_text()))
+            .body(Body::new(StreamBody::new(silent)))
+            .expect("a request");
+        let _unread = service.call(request).await.expect("infallible");
+        let mut read = read.shared();
+        assert!((&mut read).now_or_never().is_none());
+        tokens.revoke(token.id).expect("written");
+        let ended = read.await.expect("read").expect_err("it ends");
+        assert_eq!(ended.code(), Code::Unauthenticated);
     }
 }

@@ -28,6 +28,55 @@ pub(super) fn charged(extensions: &http::Extensions) -> Key {
     }
 }
 
+/// The client that sent a request, unless a proxy did: its connection belongs to many callers.
+fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
+    let address = peer_address(extensions);
+    let is_own = |client: &&Arc<Client>| {
+        client.address.map(|address| address.ip().to_canonical()) == address
+    };
+    Client::of(extensions).filter(is_own)
+}
+
+/// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
+/// ignores so many refusals is disconnected.
+fn too_many_waiting(client: Option<&Arc<Client>>) -> Status {
+    if let Some(client) = client {
+        client.close();
+    }
+    status(
+        Code::ResourceExhausted,
+        "TOO_MANY_WAITING_CALLS",
+        "too many calls wait; the connection is closed",
+        [],
+    )
+}
+
+/// Refuses a call that its caller may not make. It counts as a call: a caller that made too many
+/// waits for the refusal.
+pub(super) fn refuse<E: Send + 'static>(
+    limits: &CallLimits,
+    extensions: &http::Extensions,
+    status: Status,
+) -> BoxFuture<'static, Result<Response<Body>, E>> {
+    let key = charged(extensions);
+    let wait = limits.charge_refused(key);
+    let refusal = move || Ok(status.into_http());
+    if wait.is_zero() {
+        return Box::pin(async move { refusal() });
+    }
+    match limits.place_to_wait(key) {
+        None => {
+            let status = too_many_waiting(own_client(extensions));
+            Box::pin(async move { Ok(status.into_http()) })
+        }
+        Some(waiting) => Box::pin(async move {
+            let _waiting = waiting;
+            tokio::time::sleep(wait).await;
+            refusal()
+        }),
+    }
+}
+
 /// Puts the limits in front of the services.
 #[derive(Debug, Clone)]
 pub struct LimitsLayer {
@@ -76,12 +125,7 @@ where
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
         let key = charged(request.extensions());
-        // The connection of a proxy belongs to many callers.
-        let address = peer_address(request.extensions());
-        let is_own = |client: &&Arc<Client>| {
-            client.address.map(|address| address.ip().to_canonical()) == address
-        };
-        let client = Client::of(request.extensions()).filter(is_own).cloned();
+        let client = own_client(request.extensions()).cloned();
         let caller: Option<&Caller> = request.extensions().get();
         let token = caller.and_then(|caller| caller.token);
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
@@ -100,16 +144,7 @@ where
             return Box::pin(async move { Ok(place.keep(answering.await?)) });
         }
         let Some(waiting) = self.limits.place_to_wait(key) else {
-            // Refusing costs work as well: a caller that ignores so many refusals is cut off.
-            if let Some(client) = &place.client {
-                client.close();
-            }
-            let status = status(
-                Code::ResourceExhausted,
-                "TOO_MANY_WAITING_CALLS",
-                "too many calls wait; the connection is closed",
-                [],
-            );
+            let status = too_many_waiting(place.client.as_ref());
             return Box::pin(async move { Ok(status.into_http()) });
         };
         // The clone that is ready serves this call.

@@ -210,7 +210,7 @@ impl RoomService for RoomCalls {
                 kind,
                 seat: request.seat,
                 request_id,
-                client: caller.client(),
+                client: Some(key),
             })
             .await
             .map_err(Refusal::from)?

@@ -32,7 +32,7 @@ pub const COST_OF_BUILT_IN_GAME: u64 = 100;
 pub const COST_OF_TOURNAMENT: u64 = 100;
 /// Longest time that a call waits until its caller may make another one.
 pub(super) const MAX_WAIT: Duration = Duration::from_secs(5);
-/// How long a refusal takes: whoever ignores it and calls again waits each time.
+/// How long a refusal takes: a caller that ignores it and calls again waits each time.
 const REFUSAL_DELAY: Duration = Duration::from_secs(1);
 /// Wrong join codes of one caller in a second, and at once.
 pub(super) const WRONG_CODES_PER_SECOND: u64 = 1;
@@ -172,6 +172,13 @@ impl CallLimits {
     /// that wait.
     pub fn place_to_wait(&self, key: Key) -> Option<Held> {
         self.waiting.try_take(key)
+    }
+
+    /// Charges a call that is refused; returns how long the refusal waits.
+    pub fn charge_refused(&self, key: Key) -> Duration {
+        let wait = self.calls.wait(key).min(MAX_WAIT);
+        self.calls.charge(key, 1);
+        wait
     }
 
     /// Delays a refusal.

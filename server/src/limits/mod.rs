@@ -6,6 +6,7 @@ mod background;
 mod calls;
 mod frames;
 mod key;
+mod log_pace;
 #[cfg(test)]
 mod page;
 mod places;
@@ -19,6 +20,7 @@ pub use calls::{
 };
 pub use frames::Metered;
 pub use key::{Key, Shares};
+pub use log_pace::LogPace;
 pub use places::{Held, Places};
 pub use rate::Rate;
 

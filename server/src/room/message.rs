@@ -10,7 +10,7 @@ use tokio::time::Instant;
 
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
-use crate::access::Client;
+use crate::limits::Key;
 use crate::outbox::{OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
@@ -29,7 +29,7 @@ pub struct JoinRequest {
     /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
     /// Who asks, where the server can tell clients apart.
-    pub client: Option<Client>,
+    pub client: Option<Key>,
 }
 
 /// A seat that was taken.

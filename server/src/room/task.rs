@@ -32,7 +32,6 @@ use super::subscriber::{
     MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
 };
 use super::table_view::TableView;
-use crate::access::Client;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
@@ -179,7 +178,7 @@ pub(super) struct Room {
     /// By seat, whether every delivery must visit its connection.
     always_visit: Vec<bool>,
     /// The clients that took seats, with the secrets of their tickets.
-    clients: Vec<(Client, [u8; 32])>,
+    clients: Vec<(Key, [u8; 32])>,
     /// Length of the log at which the backlog of a connection may first be due.
     backlog_due_at: usize,
     over_since: Option<Duration>,
@@ -511,7 +510,7 @@ impl Room {
     }
 
     /// Checks that a client may take a seat, by those it took and did not leave.
-    fn check_client(&mut self, client: Option<Client>) -> Result<(), JoinError> {
+    fn check_client(&mut self, client: Option<Key>) -> Result<(), JoinError> {
         if !self.core.header().policy.one_seat_per_client {
             return Ok(());
         }

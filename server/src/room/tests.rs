@@ -21,7 +21,6 @@ use super::{
     AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, SpectateRequest, TaskContext,
     spawn_room,
 };
-use crate::access::Client;
 use crate::clock::RoomClock;
 use crate::limits::{Background, Key, Shares};
 use crate::outbox::StreamEnd;
@@ -540,7 +539,7 @@ async fn a_client_takes_one_seat_if_the_policy_says_so() {
         name: "somebody".into(),
         kind: ParticipantKind::Agent,
         seat: None,
-        client: Some(Client::Address([10, 0, 0, client].into())),
+        client: Some(Key::Address([10, 0, 0, client].into())),
     };
     let join = async |room: &Handle, client: u8| {
         let joined = room.join(request(client)).await.expect("the room exists");

@@ -18,6 +18,7 @@ use tower::{Layer, Service};
 use tracing::info;
 
 use crate::connections::peer_address;
+use crate::limits::LogPace;
 
 /// Whose pages and under which names the server may be reached.
 #[derive(Debug)]
@@ -26,7 +27,11 @@ pub struct Origins {
     origins: Vec<String>,
     /// Names of hosts besides those of this machine; `None`: all.
     hosts: Option<Vec<String>>,
+    logged: LogPace,
 }
+
+/// Refused requests that are logged in a minute.
+const LOGGED: u32 = 60;
 
 /// Why a request is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +44,11 @@ impl Origins {
     /// Allows the server's own page, these origins and, if given, only these hosts besides the
     /// names of this machine.
     pub fn new(origins: Vec<String>, hosts: Option<Vec<String>>) -> Self {
-        Self { origins, hosts }
+        Self {
+            origins,
+            hosts,
+            logged: LogPace::new(LOGGED),
+        }
     }
 
     /// Checks the origin and host of a request.
@@ -145,10 +154,11 @@ where
         match self.origins.check(&request) {
             Ok(()) => Either::Right(self.services.call(request)),
             Err(foreign) => {
-                let address = peer_address(request.extensions());
-                let address = address.map(tracing::field::display);
-                let path = request.uri().path();
-                info!(call = path, address, ?foreign, "a request was refused");
+                if self.origins.logged.admits() {
+                    let address = peer_address(request.extensions());
+                    let address = address.map(tracing::field::display);
+                    info!(address, ?foreign, "a request was refused");
+                }
                 Either::Left(ready(Ok(refused(foreign))))
             }
         }

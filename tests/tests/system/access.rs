@@ -14,9 +14,10 @@ use chefshat_room::ids::Id;
 use chefshat_server::access::{
     AccessSettings, CALLS, Call, Mode, NewToken, Role, Scope, Scoped, TokenFile, TokenId,
 };
+use chefshat_server::config::ServerConfig;
 use chefshat_server::store::MemoryStore;
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
-use http::{Request, StatusCode};
+use http::{Method, Request, StatusCode};
 use http_body_util::Full;
 use hyper_util::client::legacy::Client as HttpClient;
 use hyper_util::client::legacy::connect::HttpConnector;
@@ -407,4 +408,27 @@ async fn a_foreign_page_creates_no_room() {
         .await
         .expect("a list");
     assert_eq!(rooms.rooms, []);
+}
+
+/// A page of an allowed origin asks the browser to send a token, and the browser asks the server.
+#[tokio::test]
+async fn a_page_of_an_allowed_origin_may_send_tokens() {
+    const ORIGIN: &str = "https://page.example";
+    let allow = |config: &mut ServerConfig| config.allowed_origins = vec![ORIGIN.to_owned()];
+    let server = TestServer::with(allow, Arc::new(MemoryStore::default())).await;
+    let request = Request::builder()
+        .method(Method::OPTIONS)
+        .uri(format!("{}/chefshat.v1.RoomService/GetRoom", server.url()))
+        .header("origin", ORIGIN)
+        .header("access-control-request-method", "POST")
+        .header("access-control-request-headers", "authorization,x-grpc-web")
+        .body(Full::new(Bytes::new()))
+        .expect("a request");
+    let answer = http_client().request(request).await.expect("an answer");
+    let allowed = &answer.headers()["access-control-allow-headers"];
+    // A star would not include it.
+    assert!(
+        allowed.to_str().expect("text").contains("authorization"),
+        "{allowed:?}"
+    );
 }
