@@ -135,6 +135,11 @@ impl Store for DiskStore {
         async move { Ok(resumable) }.boxed()
     }
 
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        let finished = self.disk.finished().len() as u64;
+        async move { Ok(finished) }.boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         let games = self.disk.games();
         let stored = (games.get(&game).filter(|game| game.finished)).map(|game| {
