@@ -33,10 +33,17 @@ pub async fn copy_database(data_dir: &Path, folder: &Path) -> Result<DatabaseCop
     let mut database = open(&source).await?;
     // SQLite writes to an empty file, which keeps its permissions.
     make_private(&copy)?;
-    sqlx::query(SHRINKABLE)
-        .execute(&mut database)
+    let vacuum: i64 = sqlx::query_scalar("PRAGMA auto_vacuum")
+        .fetch_one(&mut database)
         .await
         .map_err(failed)?;
+    // For the copy. In a database that can shrink already it would be a write.
+    if vacuum == 0 {
+        sqlx::query(SHRINKABLE)
+            .execute(&mut database)
+            .await
+            .map_err(failed)?;
+    }
     sqlx::query("VACUUM INTO ?")
         .bind(copy.to_string_lossy())
         .execute(&mut database)

@@ -132,10 +132,7 @@ async fn only_one_server_can_use_a_folder() {
 }
 
 #[tokio::test]
-async fn the_copy_of_a_database_of_an_earlier_version_can_shrink() {
-    let (folder, copy) = (tempfile::tempdir(), tempfile::tempdir());
-    let (folder, copy) = (folder.expect("a folder"), copy.expect("another"));
-    opened(folder.path()).await.close().await;
+async fn the_copy_of_every_database_can_shrink() {
     let vacuum = async |folder: &Path, text: &'static str| -> i64 {
         let options = SqliteConnectOptions::new().filename(folder.join(super::super::errors::FILE));
         let mut database = SqliteConnection::connect_with(&options)
@@ -148,10 +145,15 @@ async fn the_copy_of_a_database_of_an_earlier_version_can_shrink() {
         database.close().await.expect("closed");
         mode.expect("a number")
     };
-    let none = vacuum(folder.path(), "PRAGMA auto_vacuum = NONE; VACUUM").await;
-    assert_eq!(none, 0, "as earlier versions created it");
-    let copied = super::super::copy_database(folder.path(), copy.path()).await;
-    copied.expect("copied");
     let incremental = 2;
-    assert_eq!(vacuum(copy.path(), "").await, incremental);
+    let as_earlier_versions = "PRAGMA auto_vacuum = NONE; VACUUM";
+    for (text, mode) in [("", incremental), (as_earlier_versions, 0)] {
+        let (folder, copy) = (tempfile::tempdir(), tempfile::tempdir());
+        let (folder, copy) = (folder.expect("a folder"), copy.expect("another"));
+        opened(folder.path()).await.close().await;
+        assert_eq!(vacuum(folder.path(), text).await, mode, "{text}");
+        let copied = super::super::copy_database(folder.path(), copy.path()).await;
+        copied.expect("copied");
+        assert_eq!(vacuum(copy.path(), "").await, incremental, "{text}");
+    }
 }
