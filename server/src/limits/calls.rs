@@ -196,6 +196,7 @@ impl CallLimits {
     /// # Errors
     /// It has tried too many wrong ones.
     pub fn may_try_code(&self, key: Key) -> Result<(), Refused> {
+        let key = key.site();
         let own = self.wrong_codes.wait(key);
         let all = self.all_wrong_codes.wait(Key::Local);
         let wait = match self.wrong_codes.is_full(key) {
@@ -215,7 +216,7 @@ impl CallLimits {
 
     /// Counts a wrong join code.
     pub fn wrong_code(&self, key: Key) {
-        self.wrong_codes.charge(key, 1);
+        self.wrong_codes.charge(key.site(), 1);
         self.all_wrong_codes.charge(Key::Local, 1);
     }
 }

@@ -45,6 +45,17 @@ impl Key {
         }
     }
 
+    /// The key under which wrong join codes count: a site often has 65,536 networks of IPv6 (/48).
+    pub fn site(self) -> Self {
+        match self {
+            Self::Address(IpAddr::V6(network)) if !network.is_loopback() => {
+                let site = network.to_bits() & (u128::MAX << 80);
+                Self::Address(Ipv6Addr::from_bits(site).into())
+            }
+            key => key,
+        }
+    }
+
     /// Whether these callers run on the server's machine, or their work is the server's own.
     fn is_local(self) -> bool {
         match self {
@@ -99,6 +110,9 @@ mod tests {
         assert_ne!(key("2001:db8::1"), key("2001:db8:0:1::1"));
         assert_eq!(key("::ffff:192.0.2.1"), key("192.0.2.1"));
         assert_ne!(key("192.0.2.1"), key("192.0.2.2"));
+        assert_eq!(key("2001:db8::1").site(), key("2001:db8:0:1::1").site());
+        assert_ne!(key("2001:db8::1").site(), key("2001:db8:1::1").site());
+        assert_eq!(key("192.0.2.1").site(), key("192.0.2.1"));
     }
 
     #[test]

@@ -163,7 +163,7 @@ fn of_each() -> String {
         (
             "wrong join codes",
             format!(
-                "{}; of all clients {}",
+                "{}, networks of IPv6 in one /48 together; beyond {} of all clients, who has just sent one is refused",
                 rate(calls::WRONG_CODES_PER_SECOND, calls::WRONG_CODES_AT_ONCE),
                 rate(
                     calls::ALL_WRONG_CODES_PER_SECOND,

@@ -9,7 +9,7 @@ use tokio::time::Instant;
 
 use super::Key;
 
-/// Number of buckets from which full ones, which say nothing, are removed.
+/// Fewest buckets of which full ones, which say nothing, are removed.
 const MANY: usize = 4_096;
 
 /// The buckets of all callers.
@@ -17,7 +17,14 @@ const MANY: usize = 4_096;
 pub struct Rate {
     per_second: u64,
     burst: u64,
-    buckets: Mutex<HashMap<Key, Bucket>>,
+    buckets: Mutex<Buckets>,
+}
+
+#[derive(Debug)]
+struct Buckets {
+    by_key: HashMap<Key, Bucket>,
+    /// Number of buckets at which full ones are removed: twice as many as were left the last time.
+    many: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +39,10 @@ impl Rate {
         Self {
             per_second: per_second.max(1),
             burst,
-            buckets: Mutex::default(),
+            buckets: Mutex::new(Buckets {
+                by_key: HashMap::new(),
+                many: MANY,
+            }),
         }
     }
 
@@ -44,13 +54,13 @@ impl Rate {
     /// Whether a caller's bucket is full: it has taken nothing for a while.
     pub fn is_full(&self, key: Key) -> bool {
         let now = Instant::now();
-        (self.lock().get(&key)).is_none_or(|bucket| bucket.full_at <= now)
+        (self.lock().by_key.get(&key)).is_none_or(|bucket| bucket.full_at <= now)
     }
 
     /// How long to wait until a caller's bucket is not empty.
     pub fn wait(&self, key: Key) -> Duration {
         let now = Instant::now();
-        let Some(bucket) = self.lock().get(&key).copied() else {
+        let Some(bucket) = self.lock().by_key.get(&key).copied() else {
             return Duration::ZERO;
         };
         (bucket.full_at.saturating_duration_since(now)).saturating_sub(self.time(self.burst))
@@ -60,10 +70,11 @@ impl Rate {
     pub fn charge(&self, key: Key, cost: u64) {
         let now = Instant::now();
         let mut buckets = self.lock();
-        if buckets.len() >= MANY {
-            buckets.retain(|_, bucket| bucket.full_at > now);
+        if buckets.by_key.len() >= buckets.many {
+            buckets.by_key.retain(|_, bucket| bucket.full_at > now);
+            buckets.many = MANY.max(2 * buckets.by_key.len());
         }
-        let bucket = buckets.entry(key).or_insert(Bucket { full_at: now });
+        let bucket = buckets.by_key.entry(key).or_insert(Bucket { full_at: now });
         bucket.full_at = bucket.full_at.max(now) + self.time(cost);
     }
 
@@ -72,7 +83,7 @@ impl Rate {
         Duration::from_nanos(cost.saturating_mul(1_000_000_000) / self.per_second)
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<Key, Bucket>> {
+    fn lock(&self) -> MutexGuard<'_, Buckets> {
         (self.buckets.lock()).expect("no code that holds this lock can panic")
     }
 }
