@@ -57,6 +57,12 @@ use tracing_subscriber::{EnvFilter, Layer as _, fmt};
 
 use error::{CommandError, say};
 
+/// The allocator of glibc keeps the memory that a flood of clients took; this one gives it back
+/// within seconds.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[global_allocator]
+static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
+
 /// Chef's Hat: a game server for agents, robots and people.
 #[derive(Debug, Parser)]
 #[command(name = "chefshat", version, propagate_version = true)]

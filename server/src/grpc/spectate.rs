@@ -12,6 +12,7 @@ use super::play::with_heartbeats;
 use super::reach::Reach;
 use super::status::Refusal;
 use crate::access::Caller;
+use crate::limits::Key;
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::SpectateRequest;
@@ -41,6 +42,7 @@ impl SpectatorService for Spectate {
         request: Request<SpectatorServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
         let caller = Caller::of(request.extensions());
+        let charged = Key::of_caller(&caller);
         let request = request.into_inner();
         let room = self.reach.room(&caller, &request.room_id).await?;
         let (outbox, messages) = Outbox::new();
@@ -49,6 +51,7 @@ impl SpectatorService for Spectate {
             outbox: Arc::clone(&outbox),
             from: usize::try_from(from).unwrap_or(usize::MAX),
             snapshot: request.snapshot,
+            charged,
         })
         .await
         .map_err(Refusal::from)?

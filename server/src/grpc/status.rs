@@ -328,7 +328,7 @@ impl From<SpectateError> for Refusal {
             SpectateError::Full => status(
                 Code::ResourceExhausted,
                 "TOO_MANY_SPECTATORS",
-                "this room has no space for more spectators",
+                "this room has no space for more spectators, or none for more of yours",
                 [],
             ),
             SpectateError::EventsGone(first) => status(

@@ -75,6 +75,8 @@ pub struct SpectateRequest {
     pub from: usize,
     /// Whether to start with a snapshot.
     pub snapshot: bool,
+    /// Who is charged for it.
+    pub charged: Key,
 }
 
 /// Why a room cannot be watched.
@@ -82,7 +84,7 @@ pub struct SpectateRequest {
 pub enum SpectateError {
     /// The policy does not admit spectators.
     NotAdmitted,
-    /// There are too many spectators.
+    /// There are too many spectators, or too many of this caller.
     Full,
     /// A snapshot of a delayed room would reveal its present state.
     SnapshotDelayed,

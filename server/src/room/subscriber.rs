@@ -17,6 +17,7 @@ use chefshat_room::log::RoomEvent;
 use chefshat_room::{ConnectionId, Core};
 
 use crate::convert;
+use crate::limits::Held;
 use crate::metrics::Counted;
 use crate::outbox::{HandStamp, OnSpace, Outbox, StreamEnd};
 use crate::wire::{Events, Updates, encode_decision, put_event};
@@ -62,7 +63,7 @@ pub struct Subscriber {
 enum Role {
     Seat(SeatConnection),
     Spectator {
-        _counted: Counted,
+        _counted: (Counted, Held),
         /// Number of events it could see when its stream last had space.
         kept_up_at: usize,
     },
@@ -139,7 +140,7 @@ impl Subscriber {
         on_space: Arc<dyn OnSpace>,
         from: usize,
         with_snapshot: bool,
-        counted: Counted,
+        counted: (Counted, Held),
     ) -> Self {
         let visible = core.visible_to_spectators();
         let position = if with_snapshot {

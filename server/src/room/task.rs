@@ -35,7 +35,7 @@ use super::table_view::TableView;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
-use crate::limits::{Background, Held, Key, Turn};
+use crate::limits::{Background, Held, Key, Places, Shares, Turn};
 use crate::metrics::{Counted, Metrics, Outcome};
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
@@ -73,6 +73,8 @@ pub struct TaskContext {
     pub background: Arc<Background>,
     /// Who created the room.
     pub owner: Key,
+    /// How much of each limit one caller may use.
+    pub shares: Shares,
 }
 
 /// Maintains the list of rooms.
@@ -106,6 +108,7 @@ pub(super) fn spawn(
         clock,
         connections: (0..seats).map(|_| None).collect(),
         spectators: Vec::new(),
+        spectator_places: Places::new(MAX_SPECTATORS, context.shares),
         on_space: Arc::new(NotifySpace(mailbox.downgrade())),
         releases: Vec::new(),
         public: PublicEvents::default(),
@@ -170,6 +173,7 @@ pub(super) struct Room {
     now: Duration,
     connections: Vec<Option<Subscriber>>,
     spectators: Vec<Subscriber>,
+    spectator_places: Arc<Places>,
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
     public: PublicEvents,
@@ -662,16 +666,14 @@ impl Room {
         if !request.snapshot && request.from < first {
             return Err(SpectateError::EventsGone(first));
         }
-        if self.spectators.len() >= MAX_SPECTATORS {
-            return Err(SpectateError::Full);
-        }
+        let place = (self.spectator_places.try_take(request.charged)).ok_or(SpectateError::Full)?;
         let spectator = Subscriber::spectator(
             &self.core,
             request.outbox,
             Arc::clone(&self.on_space),
             request.from,
             request.snapshot,
-            self.context.metrics.spectator(),
+            (self.context.metrics.spectator(), place),
         );
         let position = spectator.position();
         self.spectators.push(spectator);

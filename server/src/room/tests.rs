@@ -18,8 +18,8 @@ use tokio_util::task::TaskTracker;
 
 use super::subscriber::DeliveryOptions;
 use super::{
-    AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, SpectateRequest, TaskContext,
-    spawn_room,
+    AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, RoomWatcher, SeatAction, SpectateError,
+    SpectateRequest, TaskContext, spawn_room,
 };
 use crate::clock::RoomClock;
 use crate::limits::{Background, Key, Shares};
@@ -101,6 +101,7 @@ async fn room_with(
             watcher: Arc::new(NullWatcher),
             background,
             owner: Key::Local,
+            shares: Shares::default(),
         },
     )
 }
@@ -365,6 +366,33 @@ impl Journal for PanicsAfter {
     }
 }
 
+#[tokio::test]
+async fn one_caller_cannot_take_all_places_of_spectators() {
+    let room = room_with(Policy::default(), 1, |journal| journal).await;
+    let watch = async |outbox, charged| {
+        let request = SpectateRequest {
+            outbox,
+            from: 0,
+            snapshot: false,
+            charged,
+        };
+        room.spectate(request).await.expect("the room exists")
+    };
+    let mut streams = Vec::new();
+    let full = loop {
+        let (outbox, stream) = Outbox::new();
+        match watch(outbox, Key::Local).await {
+            Ok(()) => streams.push(stream),
+            Err(error) => break error,
+        }
+    };
+    assert_eq!(full, SpectateError::Full);
+    assert_eq!(streams.len(), MAX_SPECTATORS / 2);
+    let (outbox, _stream) = Outbox::new();
+    let other = Key::Address([192, 0, 2, 1].into());
+    watch(outbox, other).await.expect("another caller");
+}
+
 #[tokio::test(start_paused = true)]
 async fn the_streams_of_a_room_that_panics_end() {
     for at_once in [false, true] {
@@ -391,6 +419,7 @@ async fn check_streams_end_after_panic(at_once: bool) {
         outbox,
         from: 0,
         snapshot: false,
+        charged: Key::Local,
     })
     .await
     .expect("the room exists")

@@ -148,6 +148,7 @@ impl Rooms {
                 watcher: Arc::new(Watcher(Weak::clone(rooms))),
                 background,
                 owner: Key::Resumed,
+                shares: config.shares,
             },
             max_rooms: config.max_rooms,
             places: Places::new(config.max_rooms, config.shares),

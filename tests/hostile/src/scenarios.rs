@@ -22,12 +22,12 @@ use crate::honest::{self, HonestRoom, LONG, Noticed, SHORT};
 use crate::options::seconds;
 use crate::raw;
 use crate::report::{MIB, round};
-use crate::tally::Tally;
+use crate::tally::{Counts, Tally};
 
 /// Clients that connect at a time.
 const AT_A_TIME: usize = 64;
-/// Clients of one address: below the share of one caller.
-const PER_ADDRESS: u32 = 2_500;
+/// Addresses of the clients, so that none has more than its share.
+const ADDRESSES: u32 = 100;
 /// Connections of the server besides the idle ones.
 const OTHERS: u32 = 100;
 /// How long the rooms may take until all of them play, and until their last games have ended.
@@ -95,9 +95,9 @@ impl Running {
     }
 }
 
-/// The address of a client, so that no address has more than its share.
+/// The address of a client.
 fn address_of(client: u32) -> IpAddr {
-    let number = u8::try_from(client / PER_ADDRESS).expect("the number of clients is limited");
+    let number = u8::try_from(client % ADDRESSES).expect("fewer than 256");
     Ipv4Addr::new(127, 0, 1, number).into()
 }
 
@@ -197,9 +197,9 @@ pub(crate) struct Spectators {
 /// What spectators cost.
 #[derive(Debug, serde::Serialize)]
 struct SpectatorsReport {
-    /// Spectators in all phases, and those that were admitted.
-    tried: u64,
-    admitted: u64,
+    /// Spectators in all phases.
+    #[serde(flatten)]
+    counts: Counts,
     rooms: u32,
     rounds: u32,
     quiet_p50_ms: f64,
@@ -258,11 +258,9 @@ impl Spectators {
             memory_watched = server.memory_mib()?;
             drop(held);
         }
-        let counts = tally.counts();
         let (quiet_p99, watched_p99) = (quiet.percentile_ms(99.0), watched.percentile_ms(99.0));
         Ok(SpectatorsReport {
-            tried: counts.tried,
-            admitted: counts.granted,
+            counts: tally.counts(),
             rooms: self.rooms,
             rounds: self.rounds,
             quiet_p50_ms: round(quiet.percentile_ms(50.0)),

@@ -90,7 +90,7 @@ fn spectators_that_do_not_read_are_admitted_and_players_miss_nothing() {
         "1",
     ]);
     assert_eq!(report["tried"], 20, "{report:#}");
-    assert_eq!(report["admitted"], 20, "{report:#}");
+    assert_eq!(report["granted"], 20, "{report:#}");
     assert_eq!(report["missed"], 0, "{report:#}");
     assert!(report["watched_p99_ms"].as_f64() > Some(0.0), "{report:#}");
 }
