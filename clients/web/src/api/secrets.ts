@@ -1,10 +1,11 @@
-// The owner tokens and tickets that this device has received. Calls about a room, a tournament or a
-// record show those that may belong to it, and lists the newest ones: what is unlisted or private is
-// shown only then. They stay after the end of a game, for its record.
+// The owner tokens and tickets that this device has received for what is unlisted or private. Calls
+// about a room, a tournament or a record show those that may belong to it, and lists the newest ones:
+// the server shows it only then. They stay after the end of a game, for its record.
 
 import type { Message } from "@bufbuild/protobuf";
 import type { Interceptor } from "@connectrpc/connect";
-import { recallObject, remember } from "../store";
+import { type RoomPolicy, Visibility } from "../gen/chefshat/v1/room_pb";
+import { recall, recallObject, remember } from "../store";
 
 const HEADER = "chefshat-secret";
 const STORED = "secrets";
@@ -13,8 +14,12 @@ const MAX_SHOWN = 16;
 /** Most secrets that are stored; older ones are dropped. */
 const MAX_STORED = 200;
 
-/** Stores a secret, with the game that it shows if that is known. */
-export function keepSecret(secret: string, gameId = ""): void {
+/**
+ * Stores a secret of a room or tournament with this policy, unless it is public; with the game that
+ * it shows if that is known.
+ */
+export function keepSecret(secret: string, policy: Pick<RoomPolicy, "visibility"> | undefined, gameId = ""): void {
+  if (policy?.visibility !== Visibility.UNLISTED && policy?.visibility !== Visibility.PRIVATE) return;
   const others = kept().filter((other) => other.secret !== secret);
   remember(STORED, JSON.stringify({ kept: [{ secret, gameId }, ...others].slice(0, MAX_STORED) }));
 }
@@ -44,7 +49,9 @@ export function secretsFor(method: string, message: object): string[] {
   const { roomId = "", tournamentId = "", gameId = "" }: Partial<Record<string, unknown>> = { ...message };
   const asked = [roomId, tournamentId, gameId].filter((id) => typeof id === "string" && id !== "");
   if (asked.length === 0 && !method.startsWith("List")) return [];
-  const all = kept();
+  // Of a table, this page may have the ticket alone (attend/ticket.ts).
+  const table = recall(`table.${roomId}`);
+  const all = [...(isSecret(table) ? [{ secret: table, gameId: "" }] : []), ...kept()];
   // A secret begins with the id of its room or tournament.
   const own = all.filter(({ secret, gameId: game }) => asked.includes(secret.slice(0, 32)) || asked.includes(game));
   // The room or game may belong to a tournament, of which the page knows nothing at this point.
@@ -61,9 +68,11 @@ function kept(): Kept[] {
   const stored = recallObject(STORED, ({ kept: all }) => (Array.isArray(all) ? (all as unknown[]) : null));
   return (stored ?? []).flatMap((one) => {
     const { secret, gameId }: Partial<Record<string, unknown>> = { ...(one as object) };
-    // Another version may have stored something else, which the server would refuse.
-    return typeof secret === "string" && /^[0-9a-f]{96}$/.test(secret)
-      ? [{ secret, gameId: typeof gameId === "string" ? gameId : "" }]
-      : [];
+    return isSecret(secret) ? [{ secret, gameId: typeof gameId === "string" ? gameId : "" }] : [];
   });
+}
+
+/** Whether a value may be a secret: the server refuses anything else. */
+function isSecret(value: unknown): value is string {
+  return typeof value === "string" && /^[0-9a-f]{96}$/.test(value);
 }

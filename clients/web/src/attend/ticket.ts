@@ -1,7 +1,6 @@
 // The ticket of a physical table: what this device may report about, and the link that gives the
 // same to a tablet beside the table. The link has it after "#", which browsers send to no server.
 
-import { keepSecret } from "../api/secrets";
 import { pathOf } from "../router";
 import { recall, remember } from "../store";
 
@@ -15,7 +14,6 @@ export function tableTicket(roomId: string): string | null {
 /** Stores the ticket of a room's table; null deletes it. */
 export function keepTableTicket(roomId: string, ticket: string | null): void {
   remember(`table.${roomId}`, ticket);
-  if (ticket !== null) keepSecret(ticket);
 }
 
 /** The address that opens the attendant's view on another device. */

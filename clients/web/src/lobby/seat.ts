@@ -81,7 +81,7 @@ export async function takeSeat(code: string, name: string, seat?: number): Promi
   const room = saidRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
   remember(`seat.${room.roomId}`, JSON.stringify(held));
-  keepSecret(held.ticket, room.gameId);
+  keepSecret(held.ticket, room.policy, room.gameId);
   remember(CODE + canonical(code), room.roomId);
   remember("name", name.trim());
   return room;
@@ -95,7 +95,7 @@ export async function createRoom(
   const room = saidRoom(made.room);
   const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken };
   remember(`hosted.${room.roomId}`, JSON.stringify(hosted));
-  keepSecret(hosted.ownerToken, room.gameId);
+  keepSecret(hosted.ownerToken, room.policy, room.gameId);
   if (made.tableTicket !== "") keepTableTicket(room.roomId, made.tableTicket);
   return { room, joinCode: made.joinCode };
 }

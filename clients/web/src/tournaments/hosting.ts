@@ -32,7 +32,7 @@ export async function createTournament(settings: MessageInitShape<typeof Tournam
   if (!tournament) throw new Error("the server did not say which tournament it is");
   const hosted: HostedTournament = { joinCode, ownerToken };
   remember(`organised.${tournament.tournamentId}`, JSON.stringify(hosted));
-  keepSecret(ownerToken);
+  keepSecret(ownerToken, tournament.settings?.policy);
   return tournament.tournamentId;
 }
 

@@ -31,7 +31,7 @@ export async function takePlace(tournamentId: string, code: string, name: string
   const id = joined.tournament?.tournamentId ?? tournamentId;
   const held: HeldPlace = { ticket: joined.ticket, participant: joined.participant, name: name.trim() };
   remember(`tournament.${id}`, JSON.stringify(held));
-  keepSecret(held.ticket);
+  keepSecret(held.ticket, joined.tournament?.settings?.policy);
   remember("name", held.name);
   return id;
 }

@@ -236,8 +236,8 @@ test("a private game is found and replayed by the one who created it alone", asy
   await stranger.page.goto(server.url);
   await stranger.page.getByRole("heading", { name: "Create a room" }).waitFor();
   const answers = [
-    [room, "This room no longer exists."],
-    [host.page.url(), "The server has no record of this game."],
+    [room, "This room no longer exists"],
+    [host.page.url(), "The server has no record of this game"],
   ];
   for (const [address = "", words = ""] of answers) {
     expect(await stranger.page.getByText("Behind closed doors").count()).toBe(0);

@@ -45,8 +45,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_CALLS_AT_ONCE: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
     TOO_MANY_UNREAD_ANSWERS: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
     TOO_MANY_WAITING_CALLS: "Il server riceve troppe richieste dalla tua rete o con il tuo link. Ricarica la pagina.",
-    TOO_MANY_STREAMS:
-      "Troppe pagine e troppi agenti sono collegati dalla tua rete o con il tuo link. Chiudine alcuni.",
+    TOO_MANY_STREAMS: "Troppe pagine e troppi agenti sono collegati dalla tua rete o con il tuo link. Chiudine alcuni.",
     TOO_MANY_FOLLOWERS: "Al momento troppe persone seguono dei tornei.",
     TOO_MANY_WRONG_CODES: "Sono stati inseriti troppi codici sbagliati. Controlla il codice.",
     READER_TOO_SLOW: "La tua connessione è troppo lenta per caricare questa partita. Riprova con una migliore.",
