@@ -1,5 +1,5 @@
 //! Accepts connections: disables Nagle's delay, limits their number, of each caller and in all, and
-//! drops those whose protocol stays unknown or whose peer has vanished. Knows which clients are
+//! drops those whose peer has vanished. Knows which clients are
 //! connected, and closes their connections.
 
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use futures::{FutureExt as _, Stream, stream};
 use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
-use tokio::time::{Instant, Sleep};
+use tokio::time::Instant;
 use tokio_util::either::Either;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::{debug, warn};
@@ -32,9 +32,6 @@ use crate::proxies::TrustedProxies;
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// File descriptors that connections leave for databases, records and everything else.
 const RESERVED_DESCRIPTORS: usize = 128;
-/// Bytes after which the protocol of a connection is known: the preface of HTTP/2 and the header of
-/// its first frame. No request of HTTP/1.1 is shorter, and its headers have a time limit, too.
-const FIRST_BYTES: usize = 33;
 /// How long a client may take to read an answer.
 pub(crate) const STALLED_LIMIT: Duration = Duration::from_secs(30);
 /// Time between two checks of that.
@@ -100,8 +97,6 @@ pub struct Limits {
     pub shares: Shares,
     /// Proxies, whose connections carry many callers: they may have all.
     pub trusted_proxies: TrustedProxies,
-    /// How long a new connection may take until its protocol is known.
-    pub first_bytes_timeout: Duration,
 }
 
 /// The connections of a server.
@@ -337,7 +332,6 @@ pub fn peer_address(extensions: &http::Extensions) -> Option<IpAddr> {
 pub fn accept(
     listener: Listener,
     connections: Arc<Connections>,
-    first_bytes_timeout: Duration,
 ) -> impl Stream<Item = io::Result<Connection>> {
     let reserve = Reserve::new();
     let start = (listener, connections, reserve);
@@ -361,14 +355,7 @@ pub fn accept(
                     }
                 }
             };
-            let connection = Connection {
-                stream,
-                client,
-                unknown: Some(Unknown {
-                    bytes: 0,
-                    until: Box::pin(tokio::time::sleep(first_bytes_timeout)),
-                }),
-            };
+            let connection = Connection { stream, client };
             Some((Ok(connection), (listener, connections, reserve)))
         },
     )
@@ -429,19 +416,11 @@ fn set_options(stream: &TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// A connection that is dropped unless its protocol is known in time.
+/// A connection that [`Client::close`] closes.
 #[derive(Debug)]
 pub struct Connection {
     stream: Socket,
     client: Arc<Client>,
-    unknown: Option<Unknown>,
-}
-
-/// The state of a connection whose protocol is not yet known.
-#[derive(Debug)]
-struct Unknown {
-    bytes: usize,
-    until: Pin<Box<Sleep>>,
 }
 
 impl Connected for Connection {
@@ -458,16 +437,7 @@ impl AsyncRead for Connection {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        let before = buffer.filled().len();
         let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        if let Some(unknown) = &mut self.unknown {
-            unknown.bytes += buffer.filled().len() - before;
-            if unknown.bytes >= FIRST_BYTES {
-                self.unknown = None;
-            } else if unknown.until.as_mut().poll(context).is_ready() {
-                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
-            }
-        }
         if read.is_pending() {
             self.client.waker.register(context.waker());
             self.client.open()?;
@@ -518,12 +488,11 @@ mod tests {
 
     use super::*;
 
-    fn limits(max_connections: usize, first_bytes_timeout: Duration) -> Limits {
+    fn limits(max_connections: usize) -> Limits {
         Limits {
             max_connections,
             shares: Shares::default(),
             trusted_proxies: TrustedProxies::default(),
-            first_bytes_timeout,
         }
     }
 
@@ -536,20 +505,15 @@ mod tests {
     ) {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
-        let first_bytes_timeout = limits.first_bytes_timeout;
         let connections = Connections::new(limits, Arc::default());
-        let accepted = accept(
-            listener.into(),
-            Arc::clone(&connections),
-            first_bytes_timeout,
-        );
+        let accepted = accept(listener.into(), Arc::clone(&connections));
         (address, connections, Box::pin(accepted))
     }
 
     #[cfg(unix)]
     #[tokio::test]
     async fn an_accepted_connection_is_probed_by_the_kernel() {
-        let (address, _, mut accepted) = listening(limits(1, Duration::from_secs(60))).await;
+        let (address, _, mut accepted) = listening(limits(1)).await;
         let _client = TcpStream::connect(address).await.expect("it listens");
         let connection = accepted.next().await.expect("endless").expect("one");
         let Either::Left(stream) = &connection.stream else {
@@ -567,8 +531,7 @@ mod tests {
     #[tokio::test]
     async fn one_caller_cannot_take_all_connections() {
         // Half of them are the share of a caller on this machine.
-        let (address, connections, mut accepted) =
-            listening(limits(4, Duration::from_secs(60))).await;
+        let (address, connections, mut accepted) = listening(limits(4)).await;
         let mut clients = Vec::new();
         for _ in 0..4 {
             clients.push(TcpStream::connect(address).await.expect("it listens"));
@@ -592,7 +555,7 @@ mod tests {
         let network = "127.0.0.0/8".parse().expect("a network");
         let limits = Limits {
             trusted_proxies: TrustedProxies::new([network]),
-            ..limits(4, Duration::from_secs(60))
+            ..limits(4)
         };
         let (address, connections, accepted) = listening(limits).await;
         let mut clients = Vec::new();
@@ -605,23 +568,22 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_connection_of_one_byte_and_a_closed_one_end() {
-        let (address, connections, mut accepted) =
-            listening(limits(4, Duration::from_millis(10))).await;
-        let mut client = TcpStream::connect(address).await.expect("it listens");
-        client.write_all(b"P").await.expect("a byte");
+    async fn a_closed_connection_ends_while_it_is_read_or_written() {
+        let (address, connections, mut accepted) = listening(limits(4)).await;
+        let _client = TcpStream::connect(address).await.expect("it listens");
         let mut connection = accepted.next().await.expect("endless").expect("one");
-        let mut buffer = Vec::new();
-        let read = connection.read_to_end(&mut buffer).await;
-        let error = read.expect_err("the protocol stays unknown");
-        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
-
-        let mut client = TcpStream::connect(address).await.expect("it listens");
-        client.write_all(&[b'P'; FIRST_BYTES]).await.expect("bytes");
-        let mut connection = accepted.next().await.expect("endless").expect("one");
-        let reading = tokio::spawn(async move { connection.read_to_end(&mut buffer).await });
-        connections.clients().last().expect("connected").close();
-        let error = reading.await.expect("no panic").expect_err("it is closed");
-        assert_eq!(error.kind(), io::ErrorKind::ConnectionAborted);
+        let reading = async {
+            let read = connection.read_u8().await;
+            (read.map(drop), connection.write_all(b"late").await)
+        };
+        let closing = async {
+            tokio::task::yield_now().await;
+            connections.clients().last().expect("connected").close();
+        };
+        let ((read, written), ()) = tokio::join!(reading, closing);
+        for ended in [read, written] {
+            let error = ended.expect_err("it is closed");
+            assert_eq!(error.kind(), io::ErrorKind::ConnectionAborted);
+        }
     }
 }

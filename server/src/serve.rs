@@ -34,7 +34,7 @@ use crate::retention::Retention;
 use crate::rooms::Rooms;
 use crate::scrape;
 use crate::store::{Store, StoreError};
-use crate::tls::{Secured, Tls, TlsError};
+use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
 
@@ -115,7 +115,6 @@ impl Server {
             max_connections: config.max_connections,
             shares: config.shares,
             trusted_proxies: config.trusted_proxies.clone(),
-            first_bytes_timeout: config.first_bytes_timeout,
         };
         Ok(Self {
             calls: Arc::new(CallLimits::new(config.shares)),
@@ -156,10 +155,9 @@ impl Server {
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
         let connections = Arc::clone(&self.connections);
-        let timeout = self.config.first_bytes_timeout;
-        let incoming = connections::accept(listener.into(), connections, timeout);
+        let incoming = connections::accept(listener.into(), connections);
         let incoming = match self.tls.clone() {
-            None => incoming.map_ok(Secured::Plain).left_stream(),
+            None => incoming.map_ok(MaybeTls::Plain).left_stream(),
             Some(tls) => tls.secure(incoming).right_stream(),
         };
         self.serve_incoming(incoming, shutdown).await
@@ -205,7 +203,8 @@ impl Server {
             );
         }
         // Above any encryption, because it reads frames.
-        let incoming = incoming.map_ok(Metered::new);
+        let timeout = config.first_bytes_timeout;
+        let incoming = incoming.map_ok(move |connection| Metered::new(connection, timeout));
         let (health, health_service) = tonic_health::server::health_reporter();
         let routes = routes(
             &rooms,

@@ -1,6 +1,6 @@
-//! Slows down connections that send frames of HTTP/2 which cost work and carry nothing: PING,
-//! SETTINGS, PRIORITY, RST_STREAM and frames of unknown types. The transport answers them without
-//! limit. Requests and data are not slowed down here.
+//! Drops connections whose protocol stays unknown, and slows down those that send frames of HTTP/2
+//! which cost work and carry nothing: PING, SETTINGS, PRIORITY, RST_STREAM and frames of unknown
+//! types. The transport answers them without limit. Requests and data are not slowed down here.
 
 use std::io;
 use std::pin::Pin;
@@ -20,17 +20,28 @@ pub(super) const BURST: u32 = 4_000;
 const WINDOW_UPDATES: u32 = 20;
 /// What clients of HTTP/2 send first.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+/// Bytes after which the protocol of a connection is known: the preface of HTTP/2 and the header of
+/// its first frame. No request of HTTP/1.1 is shorter, and its headers have a time limit, too.
+const FIRST_BYTES: usize = PREFACE.len() + HEADER;
 /// Bytes of the header of a frame.
 const HEADER: usize = 9;
 
-/// A connection whose control frames are counted.
+/// A connection whose first bytes must come in time, and whose control frames are counted.
 #[derive(Debug)]
 pub struct Metered<S> {
     stream: S,
+    unknown: Option<Unknown>,
     position: Position,
     /// When the allowance is full again.
     full_at: Option<Instant>,
     pause: Option<Pin<Box<Sleep>>>,
+}
+
+/// The state of a connection whose protocol is not yet known.
+#[derive(Debug)]
+struct Unknown {
+    bytes: usize,
+    until: Pin<Box<Sleep>>,
 }
 
 /// Where the bytes of a connection are.
@@ -97,10 +108,14 @@ impl Position {
 }
 
 impl<S> Metered<S> {
-    /// Counts the control frames of a connection from its start on.
-    pub fn new(stream: S) -> Self {
+    /// Watches a connection from its start on. Its protocol must be known in time.
+    pub fn new(stream: S, first_bytes_timeout: Duration) -> Self {
         Self {
             stream,
+            unknown: Some(Unknown {
+                bytes: 0,
+                until: Box::pin(tokio::time::sleep(first_bytes_timeout)),
+            }),
             position: Position::Preface(0),
             full_at: None,
             pause: None,
@@ -141,6 +156,14 @@ impl<S: AsyncRead + Unpin> AsyncRead for Metered<S> {
         let before = buffer.filled().len();
         let this = &mut *self;
         let read = Pin::new(&mut this.stream).poll_read(context, buffer);
+        if let Some(unknown) = &mut this.unknown {
+            unknown.bytes += buffer.filled().len() - before;
+            if unknown.bytes >= FIRST_BYTES {
+                this.unknown = None;
+            } else if unknown.until.as_mut().poll(context).is_ready() {
+                return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+            }
+        }
         let cost = this.position.advance(&buffer.filled()[before..]);
         if cost > 0 {
             this.charge(cost);
@@ -211,7 +234,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_flood_is_slowed_down_and_requests_are_not() {
         let (mut client, server) = tokio::io::duplex(1 << 20);
-        let mut server = Metered::new(server);
+        let mut server = Metered::new(server, Duration::from_secs(60));
         let seconds = 3;
         let mut flood = PREFACE.to_vec();
         for _ in 0..BURST + seconds * PER_SECOND {
@@ -229,7 +252,7 @@ mod tests {
         let took = begun.elapsed().as_secs_f64();
         assert!((took - f64::from(seconds)).abs() < 0.2, "{took}");
         let (mut client, server) = tokio::io::duplex(1 << 20);
-        let mut server = Metered::new(server);
+        let mut server = Metered::new(server, Duration::from_secs(60));
         let begun = Instant::now();
         client.write_all(PREFACE).await.expect("space");
         for _ in 0..20_000 {
@@ -238,5 +261,15 @@ mod tests {
             server.read_exact(&mut bytes).await.expect("open");
         }
         assert_eq!(begun.elapsed(), Duration::ZERO);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_connection_of_one_byte_ends() {
+        let (mut client, server) = tokio::io::duplex(64);
+        client.write_all(b"P").await.expect("a byte");
+        let mut server = Metered::new(server, Duration::from_secs(10));
+        let read = server.read_to_end(&mut Vec::new()).await;
+        let error = read.expect_err("the protocol stays unknown");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
     }
 }

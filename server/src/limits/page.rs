@@ -179,7 +179,7 @@ fn of_each() -> String {
             ),
         ),
         (
-            "time until a connection has said what it speaks",
+            "time until a connection has said what it speaks, after its TLS handshake",
             seconds(ServerConfig::default().first_bytes_timeout),
         ),
         (
