@@ -12,7 +12,8 @@ use super::message::{
     Acted, AttachRequest, JoinRequest, Joined, Message, Ruled, SeatAction, SpectateError,
     SpectateRequest, Watching,
 };
-use super::task::{self, Resting, TaskContext};
+use super::resting::Resting;
+use super::task::{self, TaskContext};
 use crate::clock::RoomClock;
 use crate::store::Journal;
 use chefshat_room::ids::Id;

@@ -1,10 +1,14 @@
 //! Rooms. Each is a task that owns one game. `chefshat-room` decides; `task` commits and publishes;
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
-//! which sends it the messages in `message`; `table_view` is what those who attend to a physical
-//! table see.
+//! which sends it the messages in `message`, or handles an answer in place through `resting`;
+//! `clients` are those that took seats; `observed` counts and traces; `table_view` is what those who
+//! attend to a physical table see.
 
+mod clients;
 mod handle;
 mod message;
+mod observed;
+mod resting;
 pub mod subscriber;
 mod table_view;
 mod task;

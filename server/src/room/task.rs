@@ -4,30 +4,31 @@
 //! decisions.
 
 use std::future::{Future as _, poll_fn};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::Poll;
 use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
-use chefshat_room::journal::{AbortReason, Change, ParticipantKind, SeatedParticipant};
+use chefshat_room::journal::{AbortReason, ParticipantKind, SeatedParticipant};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
-use smallvec::SmallVec;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
-use tracing::{Instrument as _, Span, debug, debug_span, error, info, info_span};
+use tracing::{Instrument as _, debug, error, info};
 
+use super::clients::Clients;
 use super::message::{
     Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
     SeatAction, SpectateError, SpectateRequest, Watching,
 };
+use super::observed::Observed;
+use super::resting::Resting;
 use super::subscriber::{
     MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
 };
@@ -36,7 +37,7 @@ use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
 use crate::limits::{Background, Held, Key, Places, Shares, Turn};
-use crate::metrics::{Counted, Metrics, Outcome};
+use crate::metrics::Metrics;
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
@@ -98,9 +99,8 @@ pub(super) fn spawn(
     let resting = Arc::new(Resting::default());
     let seats = core.header().fills.len();
     let physical = core.header().is_physical();
-    let (state, core_changes) = (core.state(), core.changes());
-    let header = core.header();
-    let span = info_span!(parent: None, "room", room = %header.room_id, game = %header.game_id);
+    let observed = Observed::new(&core, &context.metrics);
+    let span = observed.span().clone();
     let room = Box::new(Room {
         core,
         journal,
@@ -114,7 +114,7 @@ pub(super) fn spawn(
         public: PublicEvents::default(),
         delivered: 0,
         always_visit: vec![false; seats],
-        clients: Vec::new(),
+        clients: Clients::default(),
         backlog_due_at: 0,
         over_since,
         suspended: false,
@@ -122,14 +122,9 @@ pub(super) fn spawn(
         timer_at: None,
         answers_in_place: false,
         table: physical.then(|| Box::new(TableView::new())),
-        counted_changes: core_changes,
-        counted_state: (state, context.metrics.room(state)),
-        answers_read: SmallVec::new(),
-        span,
-        traced: (None, Span::none()),
+        observed,
         context: context.clone(),
     });
-    let span = room.span.clone();
     let running = run(room, Arc::clone(&resting), inbox).instrument(span);
     context.tracker.spawn(running);
     (mailbox, resting)
@@ -181,8 +176,7 @@ pub(super) struct Room {
     delivered: usize,
     /// By seat, whether every delivery must visit its connection.
     always_visit: Vec<bool>,
-    /// The clients that took seats, with the secrets of their tickets.
-    clients: Vec<(Key, [u8; 32])>,
+    clients: Clients,
     /// Length of the log at which the backlog of a connection may first be due.
     backlog_due_at: usize,
     over_since: Option<Duration>,
@@ -193,68 +187,11 @@ pub(super) struct Room {
     place: Option<Held>,
     /// When the timer of the task fires.
     timer_at: Option<Duration>,
-    answers_in_place: bool,
+    pub(super) answers_in_place: bool,
     /// The physical table, if the room has one.
     table: Option<Box<TableView>>,
-    /// Number of changes that the metrics include.
-    counted_changes: u64,
-    /// The state as which the room is counted.
-    counted_state: (State, Counted),
-    /// When the answers were read whose results are not published.
-    answers_read: SmallVec<[Instant; 1]>,
-    /// The span of the room.
-    span: Span,
-    /// The open decision and its span. One that is taken as soon as it is opened has none.
-    traced: (Option<(Seat, u64)>, Span),
+    observed: Observed,
     context: TaskContext,
-}
-
-/// Holds the state of a room while its task waits. Meanwhile the reader of a stream may handle an
-/// answer in place, which saves a message and waking the task: a large part of the cost of a
-/// decision.
-#[derive(Default)]
-pub(super) struct Resting(Mutex<Option<Box<Room>>>);
-
-impl Resting {
-    fn lock(&self) -> MutexGuard<'_, Option<Box<Room>>> {
-        self.0
-            .lock()
-            .expect("nothing that holds this lock can panic")
-    }
-
-    /// Handles an answer in place and returns whether the task must be woken. Returns the answer if
-    /// the task is running, if the room does not handle answers in place, or if messages wait in
-    /// `mailbox`, which come first.
-    pub(super) fn answer(
-        &self,
-        mailbox: &mpsc::Sender<Message>,
-        (seat, connection): (Seat, ConnectionId),
-        answer: Answer,
-        arrived: Instant,
-    ) -> Result<bool, Answer> {
-        let Ok(mut resting) = self.0.try_lock() else {
-            return Err(answer);
-        };
-        let is_first = mailbox.capacity() == mailbox.max_capacity();
-        let Some(mut room) = resting.take_if(|room| is_first && room.answers_in_place) else {
-            return Err(answer);
-        };
-        // A panic ends the room, but not the stream of a reader that may have seats in other rooms.
-        let answered = catch_unwind(AssertUnwindSafe(move || {
-            let needs_task = room.answer_in_place(seat, connection, answer, arrived);
-            (room, needs_task)
-        }));
-        match answered {
-            Ok((room, needs_task)) => {
-                *resting = Some(room);
-                Ok(needs_task)
-            }
-            Err(_) => {
-                error!("a room panicked and is gone");
-                Ok(true)
-            }
-        }
-    }
 }
 
 /// What the task of a room does next.
@@ -343,14 +280,14 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiv
 impl Room {
     /// Handles an answer while the task waits, and publishes the changes. Returns whether the task
     /// must run: to commit to a store that takes time, to conclude the game, or to set its timer.
-    fn answer_in_place(
+    pub(super) fn answer_in_place(
         &mut self,
         seat: Seat,
         connection: ConnectionId,
         answer: Answer,
         arrived: Instant,
     ) -> bool {
-        let span = self.span.clone();
+        let span = self.observed.span().clone();
         let _entered = span.enter();
         self.now = self.now.max(self.clock.at(arrived));
         self.execute(seat, connection, SeatAction::Answer(answer), arrived);
@@ -495,7 +432,7 @@ impl Room {
         if let Some(seat) = self.core.seat_of_ticket(&ticket.secret) {
             return self.join_again(seat, ticket, &request);
         }
-        self.check_client(request.client)?;
+        self.clients.check(&self.core, request.client)?;
         let seat = self.core.join(
             self.now,
             request.seat,
@@ -505,24 +442,12 @@ impl Room {
                 ticket: ticket.hash(),
             },
         )?;
-        (self.clients).extend(request.client.map(|client| (client, ticket.secret)));
+        self.clients.add(request.client, ticket.secret);
         Ok(Joined {
             seat,
             ticket,
             room: Box::new(convert::describe(&self.core)),
         })
-    }
-
-    /// Checks that a client may take a seat, by those it took and did not leave.
-    fn check_client(&mut self, client: Option<Key>) -> Result<(), JoinError> {
-        if !self.core.header().policy.one_seat_per_client {
-            return Ok(());
-        }
-        (self.clients).retain(|(_, secret)| self.core.seat_of_ticket(secret).is_some());
-        match (self.clients.iter()).any(|(seated, _)| Some(*seated) == client) {
-            true => Err(JoinError::ClientHasSeat),
-            false => Ok(()),
-        }
     }
 
     /// Answers a repeated request for a seat.
@@ -603,7 +528,7 @@ impl Room {
     fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
         match action {
             SeatAction::Answer(answer) => {
-                self.answers_read.push(arrived);
+                self.observed.answer_read(arrived);
                 let (decision_id, action) = (answer.decision_id, answer.action);
                 let handed = self.connections[seat.index()]
                     .as_ref()
@@ -686,66 +611,9 @@ impl Room {
 
     /// Commits new changes if this takes no time.
     fn commit_now(&mut self) -> bool {
-        self.count_changes();
+        let metrics = &self.context.metrics;
+        self.observed.count_changes(&mut self.core, metrics);
         self.core.pending().is_empty() || self.journal.append_now(self.core.pending())
-    }
-
-    /// Counts the changes that are not counted yet, which are the last ones pending.
-    fn count_changes(&mut self) {
-        let new = self.core.changes() - self.counted_changes;
-        self.counted_changes += new;
-        let Self {
-            core,
-            context,
-            traced: (open, span),
-            ..
-        } = self;
-        let header = Arc::clone(core.header());
-        let metrics = &context.metrics;
-        let pending = core.pending();
-        let first = (pending.len()).saturating_sub(usize::try_from(new).unwrap_or(usize::MAX));
-        for entry in &pending[first..] {
-            match &entry.change {
-                Change::Decided(decided) => {
-                    let built_in = header.fills[decided.seat.index()].is_built_in();
-                    let outcome = Outcome::of(decided.source, built_in);
-                    metrics.decided(decided, outcome);
-                    if open.take_if(|(seat, _)| *seat == decided.seat).is_some() {
-                        let (outcome, thinking_us) = (outcome.label(), decided.time_us);
-                        debug!(parent: &*span, outcome, thinking_us, "a decision was taken");
-                        *span = Span::none();
-                    }
-                }
-                Change::Attempted { .. } => metrics.invalid_answer(),
-                _ => {}
-            }
-        }
-    }
-
-    /// Starts the span of the open decision.
-    fn trace_decision(&mut self) {
-        let open = (self.core.open()).map(|open| (open.decision.seat, open.id));
-        if open != self.traced.0 {
-            let span = open.map_or_else(Span::none, |(seat, decision)| {
-                let seat = seat.index();
-                debug_span!(parent: &self.span, "decision", seat, decision)
-            });
-            self.traced = (open, span);
-        }
-    }
-
-    /// Counts the answers that have been published, and a new state of the room.
-    fn count_published(&mut self) {
-        if !self.answers_read.is_empty() {
-            let now = Instant::now();
-            for read in self.answers_read.drain(..) {
-                self.context.metrics.answered(now - read);
-            }
-        }
-        let state = self.core.state();
-        if state != self.counted_state.0 {
-            self.counted_state = (state, self.context.metrics.room(state));
-        }
     }
 
     /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
@@ -788,8 +656,9 @@ impl Room {
             table.follow(&self.core, self.now);
         }
         self.deliver();
-        self.trace_decision();
-        self.count_published();
+        self.observed.trace_decision(&self.core);
+        let metrics = &self.context.metrics;
+        self.observed.count_published(&self.core, metrics);
     }
 
     /// Drops old events of a game without participants that no spectator waits for.
