@@ -9,7 +9,7 @@ use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
 use super::pages;
-use super::status::{Refusal, field, room_unknown, status, store_failed};
+use super::status::{Refusal, field, room_unknown, status, store_failed, tournament_unknown};
 use super::tournaments;
 use crate::connections::{Client, Connections};
 use crate::retention::Retention;
@@ -111,7 +111,7 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
         let id = request.into_inner().tournament_id;
         let handle = Id::parse(&id).and_then(|id| self.tournaments.get(id));
-        let handle = handle.ok_or_else(tournaments::unknown)?;
+        let handle = handle.ok_or_else(tournament_unknown)?;
         info!(tournament = %handle.id(), "an operator closes a tournament");
         handle.close().await.map_err(tournaments::stopped)?;
         let tournament = Some(handle.describe());

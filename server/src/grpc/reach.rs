@@ -9,9 +9,7 @@ use chefshat_proto::v1::{self, record_line::Line};
 use tonic::Status;
 
 use super::access::check;
-use super::recorded::read_failed;
-use super::status::{room_gone, room_unknown};
-use super::tournaments::unknown as tournament_unknown;
+use super::status::{read_failed, room_gone, room_unknown, tournament_unknown};
 use crate::access::{Caller, Role, Standing};
 use crate::room::Handle;
 use crate::rooms::Rooms;

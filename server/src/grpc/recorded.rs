@@ -15,7 +15,6 @@ use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert::lines_of;
 use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
-use crate::store::StoreError;
 use chefshat_room::ids::Id;
 
 /// Reason of the error while games with the same deals are being played.
@@ -81,7 +80,7 @@ impl Recorded {
         }
         let place = self.places.take(Key::of_caller(caller)).await;
         let stored = (self.rooms().store().finished(game).await)
-            .map_err(read_failed)?
+            .map_err(status::read_failed)?
             .ok_or_else(unknown)?;
         let sight = self.reach.recorded(caller, &stored, unknown)?;
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
@@ -103,12 +102,6 @@ impl Recorded {
     ) -> Result<T, Status> {
         in_background(self.places.take(key).await, work).await
     }
-}
-
-/// The status for a client when the store cannot be read.
-pub(super) fn read_failed(error: StoreError) -> Status {
-    tracing::error!(%error, "reading a record failed");
-    status::internal()
 }
 
 /// Runs work that takes milliseconds on a blocking thread. The place is free when it ends.

@@ -22,8 +22,8 @@ use tonic::{Code, Request, Response, Status, Streaming};
 use super::limits::charged;
 use super::pages;
 use super::reach::Sight;
-use super::recorded::{Recorded, SERIES_OPEN, read_failed};
-use super::status::{disk_nearly_full, field, has_reason, status};
+use super::recorded::{Recorded, SERIES_OPEN};
+use super::status::{disk_nearly_full, field, has_reason, read_failed, status};
 use crate::access::Caller;
 use crate::config::{
     IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,

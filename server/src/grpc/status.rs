@@ -15,6 +15,7 @@ use crate::limits::Refused;
 use crate::outbox::StreamEnd;
 use crate::room::{ReportRefusal, RoomGone, SpectateError};
 use crate::rooms::CreateError;
+use crate::store::StoreError;
 use chefshat_room::{ExpressError, JoinError, LeaveError, ReportError};
 
 /// Domain of every `ErrorInfo`.
@@ -75,6 +76,22 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
         reason,
         problem.to_string(),
         [("field", problem.field)],
+    )
+}
+
+/// The status for a client when the store cannot be read.
+pub fn read_failed(error: StoreError) -> Status {
+    tracing::error!(%error, "reading a record failed");
+    internal()
+}
+
+/// No tournament has this id.
+pub fn tournament_unknown() -> Status {
+    status(
+        Code::NotFound,
+        "TOURNAMENT_UNKNOWN",
+        "this tournament does not exist",
+        [("field", "tournament_id")],
     )
 }
 

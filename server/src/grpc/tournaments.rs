@@ -421,15 +421,6 @@ impl TournamentService for TournamentCalls {
     }
 }
 
-pub(super) fn unknown() -> Status {
-    status(
-        Code::NotFound,
-        "TOURNAMENT_UNKNOWN",
-        "this tournament does not exist",
-        [("field", "tournament_id")],
-    )
-}
-
 pub(super) fn stopped(_: Stopped) -> Status {
     shutting_down()
 }

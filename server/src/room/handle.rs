@@ -13,7 +13,7 @@ use super::message::{
     SpectateRequest, Watching,
 };
 use super::resting::Resting;
-use super::task::{self, TaskContext};
+use super::task::{self, Room, TaskContext};
 use crate::clock::RoomClock;
 use crate::store::Journal;
 use chefshat_room::ids::Id;
@@ -30,7 +30,7 @@ pub struct RoomGone;
 pub struct Handle {
     id: Id,
     mailbox: mpsc::Sender<Message>,
-    resting: Arc<Resting>,
+    resting: Arc<Resting<Room>>,
 }
 
 /// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
@@ -112,8 +112,13 @@ impl Handle {
         answer: Answer,
         arrived: Instant,
     ) -> Result<(), Answer> {
-        let mailbox = &self.mailbox;
-        let needs_task = (self.resting).answer(mailbox, (seat, connection), answer, arrived)?;
+        // Messages that wait come first.
+        let is_first = || self.mailbox.capacity() == self.mailbox.max_capacity();
+        let needs_task = self.resting.handle(
+            answer,
+            |room| is_first() && room.answers_in_place,
+            |room, answer| room.answer_in_place(seat, connection, answer, arrived),
+        )?;
         if needs_task {
             // If the mailbox is full, the task will run anyway.
             let _ = self.mailbox.try_send(Message::Wake);

@@ -3,51 +3,46 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard};
 
-use chefshat_engine::Seat;
-use chefshat_room::{Answer, ConnectionId};
-use tokio::sync::mpsc;
-use tokio::time::Instant;
 use tracing::error;
-
-use super::message::Message;
-use super::task::Room;
 
 /// Holds the state of a room while its task waits. Meanwhile the reader of a stream may handle an
 /// answer in place, which saves a message and waking the task: a large part of the cost of a
 /// decision.
-#[derive(Default)]
-pub(super) struct Resting(Mutex<Option<Box<Room>>>);
+pub(super) struct Resting<R>(Mutex<Option<Box<R>>>);
 
-impl Resting {
-    pub(super) fn lock(&self) -> MutexGuard<'_, Option<Box<Room>>> {
+impl<R> Default for Resting<R> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<R> Resting<R> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Option<Box<R>>> {
         self.0
             .lock()
             .expect("nothing that holds this lock can panic")
     }
 
-    /// Handles an answer in place and returns whether the task must be woken. Returns the answer if
-    /// the task is running, if the room does not handle answers in place, or if messages wait in
-    /// `mailbox`, which come first.
-    pub(super) fn answer(
+    /// Handles an input in place by `handle`, and returns what that returns: whether the task must
+    /// be woken. Returns the input if the task is running, or if `may` says no.
+    pub(super) fn handle<I>(
         &self,
-        mailbox: &mpsc::Sender<Message>,
-        (seat, connection): (Seat, ConnectionId),
-        answer: Answer,
-        arrived: Instant,
-    ) -> Result<bool, Answer> {
+        input: I,
+        may: impl FnOnce(&R) -> bool,
+        handle: impl FnOnce(&mut R, I) -> bool,
+    ) -> Result<bool, I> {
         let Ok(mut resting) = self.0.try_lock() else {
-            return Err(answer);
+            return Err(input);
         };
-        let is_first = mailbox.capacity() == mailbox.max_capacity();
-        let Some(mut room) = resting.take_if(|room| is_first && room.answers_in_place) else {
-            return Err(answer);
+        let Some(mut room) = resting.take_if(|room| may(room)) else {
+            return Err(input);
         };
         // A panic ends the room, but not the stream of a reader that may have seats in other rooms.
-        let answered = catch_unwind(AssertUnwindSafe(move || {
-            let needs_task = room.answer_in_place(seat, connection, answer, arrived);
+        let handled = catch_unwind(AssertUnwindSafe(move || {
+            let needs_task = handle(&mut room, input);
             (room, needs_task)
         }));
-        match answered {
+        match handled {
             Ok((room, needs_task)) => {
                 *resting = Some(room);
                 Ok(needs_task)

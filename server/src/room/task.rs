@@ -94,7 +94,7 @@ pub(super) fn spawn(
     over_since: Option<Duration>,
     journal: Box<dyn Journal>,
     context: TaskContext,
-) -> (mpsc::Sender<Message>, Arc<Resting>) {
+) -> (mpsc::Sender<Message>, Arc<Resting<Room>>) {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
     let resting = Arc::new(Resting::default());
     let seats = core.header().fills.len();
@@ -205,7 +205,7 @@ enum Next {
 }
 
 /// Runs a room until it is gone.
-async fn run(mut room: Box<Room>, resting: Arc<Resting>, mut inbox: mpsc::Receiver<Message>) {
+async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::Receiver<Message>) {
     let id = room.core.header().room_id;
     room.core.begin_if_all_built_in(room.now);
     let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);

@@ -7,10 +7,7 @@ use clap::Parser;
 
 use crate::attacks::{ATTACKS, Attack};
 use crate::error::HostileError;
-use crate::scenarios::Scenario;
-
-/// Maximum length of a phase, seconds.
-const MAX_SECONDS: f64 = 600.0;
+use crate::scenarios::{Scenario, seconds};
 
 /// Attack a Chef's Hat server while an honest room of four agents plays on it. Each attack gets a
 /// server of its own on the loopback interface; nothing else is contacted.
@@ -82,13 +79,4 @@ impl Options {
 fn attack(name: &str) -> Result<&'static Attack, String> {
     (ATTACKS.iter().find(|attack| attack.name == name))
         .ok_or_else(|| format!("there is no attack {name:?}; --list shows them"))
-}
-
-/// A length of time in seconds.
-pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse()
-        .ok()
-        .filter(|seconds| (0.0..=MAX_SECONDS).contains(seconds))
-        .map(Duration::from_secs_f64)
-        .ok_or_else(|| format!("{text:?} is not a number of seconds from 0 to {MAX_SECONDS}"))
 }

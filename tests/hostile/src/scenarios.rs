@@ -19,7 +19,6 @@ use tonic::transport::Channel;
 use crate::error::HostileError;
 use crate::gauge;
 use crate::honest::{self, HonestRoom, LONG, Noticed, SHORT};
-use crate::options::seconds;
 use crate::raw;
 use crate::report::{MIB, round};
 use crate::tally::{Counts, Tally};
@@ -34,6 +33,9 @@ const OTHERS: u32 = 100;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Number of memory samples of a soak.
 const SAMPLES: u32 = 360;
+
+/// Maximum length of a phase, seconds.
+const MAX_SECONDS: f64 = 600.0;
 
 /// What is measured instead of the attacks.
 #[derive(Debug, Clone, Copy, Subcommand)]
@@ -430,6 +432,15 @@ impl Line {
             slope_error: (residuals / (count - 2.0) / squares).sqrt(),
         }
     }
+}
+
+/// A length of time in seconds.
+pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .filter(|seconds| (0.0..=MAX_SECONDS).contains(seconds))
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| format!("{text:?} is not a number of seconds from 0 to {MAX_SECONDS}"))
 }
 
 #[cfg(test)]
