@@ -1,11 +1,9 @@
 //! `chefshat ratings`: a leaderboard from records, each game counted once.
 
-use std::time::{Duration, Instant};
-
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::{chefshat, fixture, run, serve};
+use super::run::{chefshat, fixture, run, serve, until};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
 
@@ -19,16 +17,12 @@ fn played(games: usize) -> (TempDir, Value) {
         run(&url, &format!("room create --target-shifts 1{seats}")).well();
     }
     let records = folder.path().join("records");
-    let long_enough = Instant::now() + Duration::from_secs(60);
     let filed = || {
         let files = std::fs::read_dir(&records).into_iter().flatten();
         let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
         names.filter(|name| name.ends_with(".jsonl")).count()
     };
-    while filed() < games {
-        assert!(Instant::now() < long_enough, "the games were not filed");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    until("the records of all games", || filed() == games);
     let board = run(&url, "leaderboard --json").json();
     (folder, board)
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Running, json_lines, run, serve};
+use super::run::{Running, json_lines, run, serve, until};
 
 /// Waits for the end of a program that must succeed. Returns its output, JSON lines.
 fn objects_of(program: Running) -> Vec<Value> {
@@ -110,7 +110,8 @@ fn check_games(url: &str, id: &str, data_dir: &Path) {
     for line in run(url, &format!("{games} --json")).json_lines() {
         assert_eq!(line["game"]["state"], "TOURNAMENT_GAME_STATE_COUNTED");
         let record = line["record"].as_str().unwrap();
-        assert!(data_dir.join(record).is_file(), "{record}");
+        // Records are written after their game has ended.
+        until(record, || data_dir.join(record).is_file());
         known.insert(record.to_owned());
     }
     assert_eq!(known.len(), 3);
