@@ -18,6 +18,9 @@ use crate::wire::Updates;
 
 /// Capacity of an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
+/// Capacity of a spectator's outbox. Small, because a room has many spectators: those that do not
+/// read soon cost it nothing, and what they miss is in its log.
+pub const SPECTATOR_CAPACITY: usize = 256;
 /// Capacity of a message, counted in updates and events. It keeps messages well below the 4 MiB
 /// that gRPC clients accept by default.
 pub const MESSAGE_CAPACITY: usize = 4_096;
@@ -88,6 +91,7 @@ pub enum StreamEnd {
 
 /// The updates queued for one stream.
 pub struct Outbox {
+    capacity: usize,
     waiting: Mutex<Waiting>,
     waker: AtomicWaker,
     /// Notified when the client has gone.
@@ -110,7 +114,13 @@ struct Waiting {
 impl Outbox {
     /// Creates an empty outbox and its stream.
     pub fn new() -> (Arc<Self>, OutboxStream) {
+        Self::with_capacity(OUTBOX_CAPACITY)
+    }
+
+    /// Creates an empty outbox of this capacity, counted in updates and events, and its stream.
+    pub fn with_capacity(capacity: usize) -> (Arc<Self>, OutboxStream) {
         let outbox = Arc::new(Self {
+            capacity,
             waiting: Mutex::new(Waiting {
                 updates: Updates::default(),
                 weight: 0,
@@ -142,7 +152,7 @@ impl Outbox {
             *updates = Updates::default();
             return true;
         }
-        if waiting.weight > 0 && waiting.weight + weight > OUTBOX_CAPACITY {
+        if waiting.weight > 0 && waiting.weight + weight > self.capacity {
             // A subscriber that tries several times is notified once.
             if let Some(on_space) = on_space
                 && !(waiting.space_waiters.iter()).any(|other| Arc::ptr_eq(other, on_space))

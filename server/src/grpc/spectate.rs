@@ -14,7 +14,7 @@ use super::status::Refusal;
 use crate::access::Caller;
 use crate::limits::Key;
 use crate::metrics::StreamKind;
-use crate::outbox::{Outbox, StreamEnd};
+use crate::outbox::{Outbox, SPECTATOR_CAPACITY, StreamEnd};
 use crate::room::SpectateRequest;
 use crate::wire::Updates;
 use crate::wire::service::spectator_service_server::SpectatorService;
@@ -45,7 +45,7 @@ impl SpectatorService for Spectate {
         let charged = Key::of_caller(&caller);
         let request = request.into_inner();
         let room = self.reach.room(&caller, &request.room_id).await?;
-        let (outbox, messages) = Outbox::new();
+        let (outbox, messages) = Outbox::with_capacity(SPECTATOR_CAPACITY);
         let from = request.from_sequence.saturating_sub(1);
         room.spectate(SpectateRequest {
             outbox: Arc::clone(&outbox),

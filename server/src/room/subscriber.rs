@@ -27,7 +27,7 @@ pub const MAX_PENDING_EVENTS: usize = 128;
 /// Most updates and events pending for a full stream. Further results of commands are dropped.
 const MAX_PENDING_UPDATES: usize = 1_024;
 /// Most events that a spectator's stream may fall behind before it is disconnected.
-pub const MAX_SPECTATOR_LAG: usize = 1_024;
+pub const MAX_SPECTATOR_LAG: usize = 4_096;
 /// Most spectators of one room.
 pub const MAX_SPECTATORS: usize = 256;
 /// Typical size of a decision request, bytes.
