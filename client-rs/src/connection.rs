@@ -185,8 +185,8 @@ pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Conne
     })
 }
 
-/// The host, if what is sent to this address can be read on the way: it is not this machine, and
-/// there is no TLS.
+/// The host, if what is sent to this address can be read on the way: without TLS to another
+/// machine.
 fn unencrypted(address: &http::Uri) -> Option<&str> {
     let host = address.host()?;
     let plain = host.trim_start_matches('[').trim_end_matches(']');

@@ -69,8 +69,8 @@ pub struct WithAccess<S> {
 }
 
 impl<S> WithAccess<S> {
-    /// Decides about a request.
-    fn decide<B>(&self, request: &Request<B>) -> Result<Granted, Status> {
+    /// Decides about a request. Also returns whether its call is a stream.
+    fn decide<B>(&self, request: &Request<B>) -> Result<(Granted, bool), Status> {
         let address = peer_address(request.extensions());
         let path = request.uri().path();
         let Some(call) = Call::find(path) else {
@@ -78,10 +78,12 @@ impl<S> WithAccess<S> {
                 return Err(Status::unimplemented("this server does not have this call"));
             }
             // No service: what follows says so.
-            return Ok(Granted {
-                caller: Caller::default(),
-                ended: None,
-            });
+            let caller = Caller {
+                address,
+                ..Caller::default()
+            };
+            let ended = None;
+            return Ok((Granted { caller, ended }, false));
         };
         let authorization = request.headers().get(header::AUTHORIZATION);
         let authorization = authorization.map(|value| value.as_bytes());
@@ -96,7 +98,7 @@ impl<S> WithAccess<S> {
         let secrets = request.headers().get_all(SECRET_HEADER).into_iter();
         granted.caller.secrets =
             Secrets::parse(secrets.map(|value| value.as_bytes())).map_err(secrets_refused)?;
-        Ok(granted)
+        Ok((granted, call.streams))
     }
 }
 
@@ -115,8 +117,8 @@ where
     }
 
     fn call(&mut self, mut request: Request<Body>) -> Self::Future {
-        let granted = match self.decide(&request) {
-            Ok(granted) => granted,
+        let (granted, streams) = match self.decide(&request) {
+            Ok(decided) => decided,
             Err(status) => {
                 let limits = &self.layer.limits;
                 return Either::Right(refuse(limits, request.extensions(), status));
@@ -129,8 +131,10 @@ where
         match granted.ended {
             None => Either::Left(self.services.call(request)),
             Some(ended) => {
-                // A client that does not read its answers keeps the answering side from ending.
-                let request = request.map(|body| EndingBody::of(body, &ended, Side::Request));
+                if streams {
+                    // A client that does not read its answers keeps the answering side from ending.
+                    request = request.map(|body| EndingBody::of(body, &ended, Side::Request));
+                }
                 let answering = self.services.call(request);
                 Either::Right(Box::pin(until_ended(answering, ended)))
             }

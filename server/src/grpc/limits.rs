@@ -22,8 +22,9 @@ use crate::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
 
 /// Who is charged for a request.
 pub(super) fn charged(extensions: &http::Extensions) -> Key {
-    match extensions.get().and_then(|caller: &Caller| caller.token) {
-        Some(token) => Key::Token(token),
+    match extensions.get() {
+        Some(caller) => Key::of_caller(caller),
+        // Refused before its caller was known.
         None => Key::of_address(peer_address(extensions)),
     }
 }

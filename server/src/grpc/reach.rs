@@ -165,7 +165,7 @@ impl Reach {
                 let standing = self.standing_in_game(caller, header, entries);
                 (header.policy.visibility, standing)
             }
-            // Whoever added it has made it public.
+            // Importing it made it public.
             StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger),
         };
         let is_private = visibility == Visibility::Private;

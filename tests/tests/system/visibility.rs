@@ -722,7 +722,7 @@ async fn a_join_code_shows_a_private_room_and_lets_join() {
     // The owner needs no header to close it, nor does a player to leave it.
     client.get_room(&id).await.expect_err("no secret");
     client.leave_room(&ticket).await.expect("left");
-    // The ticket is no longer one.
+    // The ticket is invalid now.
     let before = client.with_secrets([&ticket]).expect("a secret");
     before.get_room(&id).await.expect_err("not any more");
     let closed = client.close_room(&id, &created.owner_token).await;
