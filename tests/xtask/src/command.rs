@@ -1,4 +1,5 @@
-//! Starts other programs. Their output is passed through.
+//! Starts other programs. Their output is passed through, or captured where several run side by
+//! side.
 
 use std::ffi::OsStr;
 use std::process::{Command, Stdio};
@@ -49,6 +50,24 @@ pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
         Ok(())
     } else {
         Err(Failure::new(format!("`{}`: {status}", line(command))))
+    }
+}
+
+/// Runs a command; what it prints is returned, or in the failure.
+pub(crate) fn run_captured(command: &mut Command) -> Result<String, Failure> {
+    let output = command
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| cannot_start(command, &error))?;
+    let printed = [output.stdout, output.stderr].concat();
+    let printed = String::from_utf8_lossy(&printed).into_owned();
+    match output.status.success() {
+        true => Ok(printed),
+        false => Err(Failure::new(format!(
+            "{printed}`{}`: {}",
+            line(command),
+            output.status
+        ))),
     }
 }
 

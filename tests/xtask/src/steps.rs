@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::process::Command;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::command;
@@ -52,6 +53,50 @@ impl Steps {
     /// Runs one program as a step.
     pub(crate) fn program(&mut self, name: &str, command: &mut Command) -> Result<(), Failure> {
         self.run(name, || command::run(command))
+    }
+
+    /// Runs programs side by side, each as a step: for those that often wait. What a program prints
+    /// appears when it has ended.
+    pub(crate) fn programs(&mut self, programs: Vec<(String, Command)>) -> Result<(), Failure> {
+        let start = Instant::now();
+        let ended = thread::scope(|scope| {
+            let running: Vec<_> = (programs.into_iter())
+                .map(|(name, mut command)| {
+                    println!("\n==> {name}, beside others");
+                    let run = move || (command::run_captured(&mut command), start.elapsed());
+                    (name, scope.spawn(run))
+                })
+                .collect();
+            let ended = running.into_iter().map(|(name, running)| {
+                let (output, took) = running.join().expect("starting a program does not panic");
+                (name, output, took)
+            });
+            ended.collect::<Vec<_>>()
+        });
+        let mut failed = Vec::new();
+        for (name, result, took) in ended {
+            println!("\n==> {name}");
+            let outcome = match result {
+                Ok(output) => {
+                    print!("{output}");
+                    Outcome::Passed
+                }
+                Err(failure) => {
+                    println!("{failure}");
+                    failed.push(name.clone());
+                    Outcome::Failed
+                }
+            };
+            self.done.push(Step {
+                name,
+                outcome,
+                took,
+            });
+        }
+        match failed.as_slice() {
+            [] => Ok(()),
+            names => Err(Failure::new(format!("{} failed", names.join(", ")))),
+        }
     }
 
     /// Reports a step that cannot be run.
@@ -113,5 +158,23 @@ mod tests {
         assert!(lines[0].starts_with("ok       first "));
         assert_eq!(lines[1], "skipped  second  nothing there");
         assert!(lines[2].starts_with("FAILED   third "));
+    }
+
+    #[test]
+    fn of_programs_side_by_side_all_are_in_the_summary_and_each_failure_is_named() {
+        let program = |name: &str, script: &str| {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", script]);
+            (name.to_owned(), shell)
+        };
+        let mut steps = Steps::default();
+        let failing = program("first", "echo words; exit 1");
+        let failure = steps
+            .programs(vec![failing, program("second", "exit 0")])
+            .unwrap_err();
+        assert_eq!(failure.to_string(), "first failed");
+        let summary = steps.summary();
+        assert!(summary.contains("FAILED   first "), "{summary}");
+        assert!(summary.contains("ok       second "), "{summary}");
     }
 }

@@ -87,11 +87,10 @@ pub(crate) fn run(
     }
     if wants(Part::Python) {
         if has_python {
-            for package in places.python_packages() {
-                if package != DEPLOYMENT {
-                    pytest(places, steps, package, &[])?;
-                }
-            }
+            let packages = (places.python_packages().into_iter())
+                .filter(|package| *package != DEPLOYMENT)
+                .map(|package| pytest(places, package, &[]));
+            steps.programs(packages.collect())?;
             lint::python(places, steps)?;
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
@@ -120,25 +119,24 @@ pub(crate) fn run(
         if let Err(failure) = setup::images() {
             steps.skip("images", &failure.to_string());
         }
-        pytest(places, steps, DEPLOYMENT, &[])?;
+        let (name, mut command) = pytest(places, DEPLOYMENT, &[]);
+        steps.program(&name, &mut command)?;
         if slow {
-            pytest(places, steps, DEPLOYMENT, &["-m", "slow"])?;
+            let (name, mut command) = pytest(places, DEPLOYMENT, &["-m", "slow"]);
+            steps.program(&name, &mut command)?;
         }
     }
     Ok(())
 }
 
-fn pytest(
-    places: &Places,
-    steps: &mut Steps,
-    package: &str,
-    options: &[&str],
-) -> Result<(), Failure> {
+/// The tests of a Python package, with the name of the step.
+fn pytest(places: &Places, package: &str, options: &[&str]) -> (String, Command) {
     let cache = places.own.join("pytest").join(package);
     let cache = format!("cache_dir={}", cache.display());
     let mut pytest = python_command(places, package, "pytest");
+    pytest.args(["-o", &cache]).args(options);
     let step = format!("pytest, {package} {}", options.join(" "));
-    steps.program(step.trim_end(), pytest.args(["-o", &cache]).args(options))
+    (step.trim_end().to_owned(), pytest)
 }
 
 fn cargo_command(places: &Places) -> Command {
