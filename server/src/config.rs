@@ -27,9 +27,8 @@ pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 pub const ROOM_MAILBOX: usize = 256;
 /// Largest message of a vector stream, bytes: large enough for a list of seeds.
 pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
-/// Largest batch of a vector stream, bytes: the most games of the largest rule set, each with two
-/// Shifts ended at once.
-pub const MAX_VECTOR_BATCH_BYTES: usize = 16 * 1024 * 1024;
+/// Largest batch of a vector stream, bytes.
+pub const MAX_VECTOR_BATCH_BYTES: usize = chefshat_vector::MAX_BATCH_BYTES;
 /// Most vector streams at a time.
 pub const MAX_VECTOR_STREAMS: usize = 128;
 /// Most seats played on all vector streams together, games times seats: about 5 KB each. The

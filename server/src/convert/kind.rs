@@ -1,4 +1,4 @@
-//! Kinds of participants, and unknown values of enums.
+//! Kinds of participants.
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -22,20 +22,4 @@ pub fn kind_from_proto(
             format!("{kind} is not a kind of participant"),
         )),
     }
-}
-
-/// Converts a kind to its number.
-pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
-    match kind {
-        None => v1::ParticipantKind::Unspecified,
-        Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
-        Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
-        Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
-    }
-    .into()
-}
-
-/// The error for a number that is not a value of an enum.
-pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
-    FieldProblem::new(field, format!("{value} is not a value of this enum"))
 }

@@ -1,5 +1,6 @@
 //! Translation between rooms and the protocol: policies, seats, decisions, the log.
-//! `chefshat-record` translates rule sets and the engine's events, which records share.
+//! `chefshat-record` translates rule sets and the engine's events, which records share;
+//! `chefshat-vector` vector environments, and what games without rooms share.
 
 mod decision;
 mod event;
@@ -16,14 +17,14 @@ mod start;
 mod summary;
 mod table;
 mod tournament;
-mod vector;
 
+pub use chefshat_vector::policy::{kind_to_proto, millis, policy_to_proto};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
-pub use kind::{kind_from_proto, kind_to_proto};
+pub use kind::kind_from_proto;
 pub use name::checked_name;
 pub use players::recorded_player;
-pub use policy::{millis, policy_from_proto, policy_to_proto, simulation_policy};
+pub use policy::policy_from_proto;
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines};
 pub use room::{
@@ -37,9 +38,6 @@ pub use table::{Deck, report_response, report_to_proto, reported_from_proto, tab
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,
     tournament_plan, tournament_state, tournament_state_from_proto,
-};
-pub use vector::{
-    Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };
 
 /// Converts a count to the protocol's integer. All counts are bounded far below its limit.

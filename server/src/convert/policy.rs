@@ -3,12 +3,11 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
-use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
-use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
+use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto};
+use chefshat_vector::policy::{agent_from_proto, millis, policy_to_proto};
 
-use super::kind::{kind_from_proto, kind_to_proto, unknown};
+use super::kind::kind_from_proto;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy, Visibility};
 use chefshat_room::{Core, State};
@@ -43,16 +42,17 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         },
         max_timeouts: in_range("max_timeouts", message.max_timeouts, 1..=1000)?
             .unwrap_or(standard.max_timeouts),
-        substitute: agent("substitute", &message.substitute)?.unwrap_or(standard.substitute),
+        substitute: agent_from_proto("substitute", &message.substitute)?
+            .unwrap_or(standard.substitute),
         abort: match v1::AbortPolicy::try_from(message.abort) {
             Ok(v1::AbortPolicy::Unspecified | v1::AbortPolicy::AllLost) => AbortPolicy::AllLost,
             Ok(v1::AbortPolicy::AnyLost) => AbortPolicy::AnyLost,
             Ok(v1::AbortPolicy::Never) => AbortPolicy::Never,
-            Err(_) => return Err(unknown("abort", message.abort)),
+            Err(_) => return Err(FieldProblem::unknown("abort", message.abort)),
         },
         reward_scheme: v1::RewardScheme::try_from(message.reward_scheme)
             .map(reward_scheme_from_proto)
-            .map_err(|_| unknown("reward_scheme", message.reward_scheme))?,
+            .map_err(|_| FieldProblem::unknown("reward_scheme", message.reward_scheme))?,
         pace: time("pace_ms", message.pace_ms, 0..=60_000)?,
         waiting_time: time("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
             .unwrap_or(standard.waiting_time),
@@ -64,13 +64,13 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         durability: match v1::Durability::try_from(message.durability) {
             Ok(v1::Durability::Unspecified | v1::Durability::Durable) => Durability::Durable,
             Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
-            Err(_) => return Err(unknown("durability", message.durability)),
+            Err(_) => return Err(FieldProblem::unknown("durability", message.durability)),
         },
         clocks: clocks(message)?,
         one_seat_per_client: message.one_seat_per_client,
         visibility: match v1::Visibility::try_from(message.visibility) {
             Ok(visibility) => visibility_from_proto(visibility),
-            Err(_) => return Err(unknown("visibility", message.visibility)),
+            Err(_) => return Err(FieldProblem::unknown("visibility", message.visibility)),
         },
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
@@ -91,45 +91,6 @@ pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     policy
 }
 
-/// A policy with every field set, except a pace that depends on the participants.
-pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
-    v1::RoomPolicy {
-        decision_time_ms: Some(millis(policy.decision_time)),
-        bank_ms: Some(millis(policy.bank)),
-        max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
-        max_timeouts: Some(policy.max_timeouts),
-        substitute: policy.substitute.name().into(),
-        abort: match policy.abort {
-            AbortPolicy::AllLost => v1::AbortPolicy::AllLost,
-            AbortPolicy::AnyLost => v1::AbortPolicy::AnyLost,
-            AbortPolicy::Never => v1::AbortPolicy::Never,
-        }
-        .into(),
-        reward_scheme: reward_scheme_to_proto(policy.reward_scheme).into(),
-        pace_ms: policy.pace.map(millis),
-        waiting_time_ms: Some(millis(policy.waiting_time)),
-        spectators: Some(policy.spectators),
-        spectator_delay_decisions: Some(
-            u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
-        ),
-        spectators_see_hands: Some(policy.spectators_see_hands),
-        durability: match policy.durability {
-            Durability::Durable => v1::Durability::Durable,
-            Durability::Ephemeral => v1::Durability::Ephemeral,
-        }
-        .into(),
-        clocks: (policy.clocks.iter())
-            .map(|clock| v1::KindClock {
-                kind: kind_to_proto(Some(clock.kind)),
-                decision_time_ms: clock.decision_time.map(millis),
-                bank_ms: clock.bank.map(millis),
-            })
-            .collect(),
-        one_seat_per_client: policy.one_seat_per_client,
-        visibility: visibility_to_proto(policy.visibility).into(),
-    }
-}
-
 /// Who sees a room, tournament or recorded game.
 fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
     match visibility {
@@ -137,30 +98,6 @@ fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
         v1::Visibility::Unlisted => Visibility::Unlisted,
         v1::Visibility::Private => Visibility::Private,
     }
-}
-
-/// As in responses and records. What is public has the same bytes as before there was a choice, so
-/// that signatures of older records stay valid.
-pub(super) fn visibility_to_proto(visibility: Visibility) -> v1::Visibility {
-    match visibility {
-        Visibility::Public => v1::Visibility::Unspecified,
-        Visibility::Unlisted => v1::Visibility::Unlisted,
-        Visibility::Private => v1::Visibility::Private,
-    }
-}
-
-/// The policy of a game without a room. Only its limits and rewards have a meaning.
-pub fn simulation_policy(
-    max_invalid_attempts: Option<u32>,
-    reward_scheme: Option<RewardScheme>,
-) -> v1::RoomPolicy {
-    policy_to_proto(&Policy {
-        max_invalid_attempts,
-        reward_scheme,
-        pace: Some(Duration::ZERO),
-        clocks: Vec::new(),
-        ..Policy::default()
-    })
 }
 
 /// Clocks for kinds of participants, each kind at most once. A time set for the room applies to
@@ -185,25 +122,6 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
         clocks.push(KindClock::PEOPLE);
     }
     Ok(clocks)
-}
-
-/// The built-in agent with this name; `None` for the empty name.
-pub(super) fn agent(field: &'static str, name: &str) -> Result<Option<AgentKind>, FieldProblem> {
-    if name.is_empty() {
-        return Ok(None);
-    }
-    AgentKind::from_name(name).map(Some).ok_or_else(|| {
-        let known = AgentKind::ALL.map(AgentKind::name).join(", ");
-        FieldProblem::new(
-            field,
-            format!("{name:?} is not a built-in agent; use one of {known}"),
-        )
-    })
-}
-
-/// Whole milliseconds, as messages count time.
-pub fn millis(time: Duration) -> u32 {
-    u32::try_from(time.as_millis()).unwrap_or(u32::MAX)
 }
 
 fn time(

@@ -7,13 +7,14 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
-use super::kind::{kind_from_proto, kind_to_proto};
+use super::kind::kind_from_proto;
 use super::name::checked_name;
-use super::policy::{agent, policy_of};
+use super::policy::policy_of;
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Core, State};
+use chefshat_vector::policy::{agent_from_proto, kind_to_proto};
 
 /// The participants of a new room's seats. An empty list leaves all seats open.
 ///
@@ -49,7 +50,7 @@ pub fn fills_from_proto(
                 .ok_or_else(|| {
                     FieldProblem::new("seats", "set the kind of the player at the table")
                 }),
-            Some(FilledBy::BuiltInAgent(name)) => agent("seats", name)?
+            Some(FilledBy::BuiltInAgent(name)) => agent_from_proto("seats", name)?
                 .map(Fill::BuiltIn)
                 .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
         })

@@ -14,7 +14,6 @@ use chefshat_referee::{Question, Report, SeenCards, Stage, ToLay, ViolatedRule, 
 use chefshat_room::journal::{Fill, ReportSource, Reported};
 use chefshat_room::{Core, PhysicalTable, ReportOutcome, ReportVerdict, State};
 
-use super::kind::unknown;
 use super::name::checked_text;
 use super::room::describe;
 
@@ -78,7 +77,7 @@ pub fn reported_from_proto(
             Ok(v1::ReportSource::Unspecified | v1::ReportSource::Camera) => ReportSource::Camera,
             Ok(v1::ReportSource::Attendant) => ReportSource::Attendant,
             Ok(v1::ReportSource::Robot) => ReportSource::Robot,
-            Err(_) => return Err(unknown("source", message.source)),
+            Err(_) => return Err(FieldProblem::unknown("source", message.source)),
         },
         age: Duration::from_millis(message.age_ms.into()),
         report: report_from_proto(message, deck)?,

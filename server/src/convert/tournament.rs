@@ -9,11 +9,12 @@ use chefshat_tournament::{
     Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
 };
 
-use super::kind::{kind_from_proto, kind_to_proto, unknown};
+use super::kind::kind_from_proto;
 use super::number;
-use super::policy::{agent, policy_from_proto, policy_to_proto};
+use super::policy::policy_from_proto;
 use chefshat_room::ids::Id;
 use chefshat_room::policy::{AbortPolicy, Policy};
+use chefshat_vector::policy::{agent_from_proto, kind_to_proto, policy_to_proto};
 
 /// Defaults of fields that a request leaves unset.
 const DEFAULT_PARTICIPANTS: u32 = 64;
@@ -55,7 +56,7 @@ pub fn tournament_plan(
     let no_show_ms = standard(message.no_show_time_ms, DEFAULT_NO_SHOW_MS);
     let built_in: Vec<AgentKind> = (message.built_in_agents.iter())
         .map(|name| {
-            agent("built_in_agents", name)?
+            agent_from_proto("built_in_agents", name)?
                 .ok_or_else(|| FieldProblem::new("built_in_agents", "a built-in agent has no name"))
         })
         .collect::<Result<_, _>>()?;
@@ -92,7 +93,7 @@ pub fn tournament_plan(
             max_parallel: count(standard(message.max_parallel_games, DEFAULT_PARALLEL)),
             physical_tables,
             draw_seed: seed("draw_seed", &message.draw_seed)?.unwrap_or(draw_seed),
-            filler: agent("filler", &message.filler)?.unwrap_or(AgentKind::Random),
+            filler: agent_from_proto("filler", &message.filler)?.unwrap_or(AgentKind::Random),
         },
         policy: policy(message, deals, no_show_ms)?,
         kinds: (message.kinds.iter())
@@ -164,7 +165,7 @@ fn format_from_proto(format: i32) -> Result<Format, FieldProblem> {
             "format",
             "set knockout, round robin or swiss",
         )),
-        Err(_) => Err(unknown("format", format)),
+        Err(_) => Err(FieldProblem::unknown("format", format)),
     }
 }
 
@@ -175,7 +176,7 @@ fn deals_from_proto(deals: i32) -> Result<Deals, FieldProblem> {
         }
         Ok(v1::TournamentDeals::SameAtAllTables) => Ok(Deals::SameAtAllTables),
         Ok(v1::TournamentDeals::Rotated) => Ok(Deals::Rotated),
-        Err(_) => Err(unknown("deals", deals)),
+        Err(_) => Err(FieldProblem::unknown("deals", deals)),
     }
 }
 
@@ -242,7 +243,7 @@ pub fn tournament_state_from_proto(
         Ok(v1::TournamentState::Playing) => Ok(Some(State::Playing)),
         Ok(v1::TournamentState::Finished) => Ok(Some(State::Finished)),
         Ok(v1::TournamentState::Closed) => Ok(Some(State::Closed)),
-        Err(_) => Err(unknown(field, state)),
+        Err(_) => Err(FieldProblem::unknown(field, state)),
     }
 }
 

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
 use chefshat_referee::Refusal as Unjudged;
+use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -28,15 +29,32 @@ pub fn status<const N: usize>(
     message: impl Into<String>,
     metadata: [(&str, &str); N],
 ) -> Status {
-    let metadata: HashMap<String, String> = metadata
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value.to_owned()))
-        .collect();
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    with_reason(code, reason, message, metadata.into())
+}
+
+fn with_reason(
+    code: Code,
+    reason: &str,
+    message: impl Into<String>,
+    metadata: HashMap<String, String>,
+) -> Status {
     Status::with_error_details(
         code,
         message,
         ErrorDetails::with_error_info(reason, DOMAIN, metadata),
     )
+}
+
+/// The status for a refused request of a vector stream.
+pub fn vector_refused(error: RequestError) -> Status {
+    let code = match error.reason {
+        "RECORDS_TOO_LONG" => Code::ResourceExhausted,
+        _ => Code::InvalidArgument,
+    };
+    let metadata = error.metadata.into_iter();
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value));
+    with_reason(code, error.reason, error.message, metadata.collect())
 }
 
 /// Too many calls to games wait for a stream.

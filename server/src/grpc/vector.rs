@@ -7,17 +7,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, RuleSet, Seed};
+use chefshat_engine::{RuleSet, Seed};
 use chefshat_proto::v1::{
     self, run_request::Request as RequestKind, run_response::Response as ResponseKind,
     vector_service_server::VectorService, vector_setup,
 };
 use chefshat_record::branch::{BranchError, branch_of};
-use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto};
-use chefshat_simulation::vector::{
-    Batch, Decisions, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
+use chefshat_record::convert::FieldProblem;
+use chefshat_simulation::vector::{Decisions, Start, VectorGames, VectorSetup};
+use chefshat_vector::{
+    Limits, Request as VectorRequest, batch_to_proto, record_parts, seeds_from_setup,
+    setup_from_proto, start_from_proto, started_to_proto,
 };
-use prost::Message as _;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::mpsc::error::SendTimeoutError;
 use tokio::sync::{mpsc, oneshot};
@@ -29,17 +30,14 @@ use tonic::{Code, Request, Response, Status, Streaming};
 use super::limits::charged;
 use super::new_room::branch_refused;
 use super::recorded::Recorded;
-use super::status::{Refusal, field, internal, shutting_down, status};
+use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use crate::access::Caller;
 use crate::config::{
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
-    VECTOR_SETUP_TIMEOUT,
+    MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS,
+    MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT, VECTOR_SETUP_TIMEOUT,
 };
-use crate::convert;
-use crate::convert::Reset;
 use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
-use chefshat_record::convert::Played;
 use chefshat_room::ids::random_bytes;
 
 /// Messages queued for a slow client. At most one is a batch; the others are parts of records.
@@ -48,8 +46,12 @@ const SEND_AHEAD: usize = 4;
 const MAX_GAMES_IN_PLACE: u32 = 16;
 /// Most games that are stepped without the thread pool if fast built-in agents play.
 const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
-/// Size from which a part of a record is sent, bytes.
-const RECORD_PART_BYTES: usize = 512 * 1024;
+/// What setups may ask for.
+const LIMITS: Limits = Limits {
+    seeds: MAX_VECTOR_SEEDS,
+    recorded_games: MAX_VECTOR_RECORDED_GAMES,
+    recorded_shifts: MAX_HOSTED_SHIFTS,
+};
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -139,12 +141,6 @@ impl From<Status> for End {
     }
 }
 
-/// A request of a client.
-enum Command {
-    Actions(Vec<ActionId>),
-    Reset(Reset),
-}
-
 impl Runner {
     async fn run(self, mut requests: Streaming<v1::RunRequest>) {
         let closing = self.service.closing.clone();
@@ -174,7 +170,7 @@ impl Runner {
         let setup = self.setup(&message).await?;
         let _seats = self.reserve(&setup)?;
         let _games = self.service.metrics().vector_games(setup.games());
-        self.send(ResponseKind::Started(convert::started_to_proto(&setup)))
+        self.send(ResponseKind::Started(started_to_proto(&setup)))
             .await?;
         let in_place = steps_in_place(&setup);
         let begun = self.run_on_pool(move || VectorGames::new(setup)).await?;
@@ -190,23 +186,22 @@ impl Runner {
                 }
             }
             let statistics = games.setup().statistics();
-            let response =
-                ResponseKind::Batch(Box::new(convert::batch_to_proto(batch, statistics)));
+            let response = ResponseKind::Batch(Box::new(batch_to_proto(batch, statistics)));
             self.send(response).await?;
             let Some(command) = self.next_command(requests).await? else {
                 return Err(End::Gone);
             };
-            if let Command::Actions(actions) = &command {
+            if let VectorRequest::Actions(actions) = &command {
                 let decisions = u64::try_from(actions.len()).unwrap_or(u64::MAX);
                 self.service.metrics().vector_decided(decisions);
             }
-            let step = move || (execute(&mut games, command), games);
+            let step = move || (command.execute(&mut games), games);
             let stepped;
             (stepped, games) = match in_place {
                 true => caught(step).ok_or_else(internal)?,
                 false => self.run_on_pool(step).await?,
             };
-            batch = stepped.map_err(|error| step_refused(&error))?;
+            batch = stepped.map_err(|error| vector_refused(error.into()))?;
         }
     }
 
@@ -214,17 +209,16 @@ impl Runner {
     async fn next_command(
         &self,
         requests: &mut Streaming<v1::RunRequest>,
-    ) -> Result<Option<Command>, End> {
+    ) -> Result<Option<VectorRequest>, End> {
         let message = timeout(VECTOR_IDLE_TIMEOUT, next(requests)).await;
         match message.map_err(|_| client_idle())?? {
             None => Ok(None),
-            Some(Some(RequestKind::Actions(message))) => {
-                Ok(Some(Command::Actions(actions(&message)?)))
-            }
+            Some(Some(RequestKind::Actions(message))) => Ok(Some(
+                VectorRequest::actions(&message).map_err(vector_refused)?,
+            )),
             Some(Some(RequestKind::Reset(message))) => {
-                let reset = convert::reset_from_proto(&message)
-                    .map_err(|problem| field("RESET_REFUSED", &problem))?;
-                Ok(Some(Command::Reset(reset)))
+                let reset = VectorRequest::reset(&message, &LIMITS);
+                Ok(Some(reset.map_err(vector_refused)?))
             }
             Some(Some(RequestKind::Setup(_))) => {
                 let words = "the games are already set up; open another stream for others";
@@ -270,30 +264,17 @@ impl Runner {
 
     /// Checks a setup message and reads the recorded game it names.
     async fn setup(&self, message: &v1::VectorSetup) -> Result<VectorSetup, Status> {
-        let seeds = convert::setup_seeds(message, || u64::from_le_bytes(random_bytes()))
-            .map_err(|problem| field("SEED_REFUSED", &problem))?;
-        let (rules, start) = self.start(message).await?;
-        convert::setup_from_proto(message, rules, start, seeds)
-            .map_err(|problem| field("SETUP_REFUSED", &problem))
-    }
-
-    async fn start(&self, message: &v1::VectorSetup) -> Result<(RuleSet, Start), Status> {
-        let rules = || {
-            rules_from_proto(&message.rules.clone().unwrap_or_default())
-                .map_err(|problem| field("RULE_SET_REFUSED", &problem))
-        };
-        match &message.start {
-            None => Ok((rules()?, Start::Deal)),
-            Some(vector_setup::Start::Scripted(script)) => {
-                let rules = rules()?;
-                let script = script_from_proto(script, &rules)
-                    .map_err(|problem| field("SCRIPT_REFUSED", &problem))?;
-                Ok((rules, Start::Script(Box::new(script))))
-            }
+        let drawn = || u64::from_le_bytes(random_bytes());
+        let seeds = seeds_from_setup(message, &LIMITS, drawn).map_err(vector_refused)?;
+        let (rules, start) = match &message.start {
             Some(vector_setup::Start::Branch(point)) => {
-                self.point(point, message.rules.as_ref()).await
+                self.point(point, message.rules.as_ref()).await?
             }
-        }
+            _ => start_from_proto(message)
+                .map_err(vector_refused)?
+                .ok_or_else(internal)?,
+        };
+        setup_from_proto(message, rules, start, seeds, &LIMITS).map_err(vector_refused)
     }
 
     /// The state of a recorded game at a point.
@@ -384,99 +365,6 @@ async fn next(
     // reader.
     let message = requests.message().await.map_err(End::Failed)?;
     Ok(message.map(|message| message.request))
-}
-
-/// Executes a request.
-fn execute(games: &mut VectorGames, command: Command) -> Result<Batch, StepError> {
-    match command {
-        Command::Actions(actions) => games.step(&actions),
-        Command::Reset(Reset::All(seeds)) => Ok(games.reset(seeds)),
-        Command::Reset(Reset::Some(some)) => games.reset_some(&some),
-    }
-}
-
-/// Splits the record of a game into parts.
-fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
-    let limit = match setup.invalid_actions() {
-        InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
-        InvalidActions::Error => None,
-    };
-    let record = Played {
-        by: "vector",
-        rules: setup.rules(),
-        agents: &setup.agents().map(|agent| agent.map(AgentKind::name)),
-        seed: played.seed,
-        scheme: setup.scheme(),
-        policy: &convert::simulation_policy(limit, setup.scheme()),
-        decisions: &played.decisions,
-    };
-    let mut parts = vec![v1::VectorRecord::default()];
-    let mut size = 0;
-    for line in record.record() {
-        if size > RECORD_PART_BYTES {
-            parts.push(v1::VectorRecord::default());
-            size = 0;
-        }
-        size += line.encoded_len();
-        let part = parts.last_mut().expect("there is a first part");
-        part.lines.push(line);
-    }
-    for part in &mut parts {
-        part.game = played.game;
-        part.index = played.index;
-    }
-    let last = parts.last_mut().expect("there is a first part");
-    last.last = true;
-    parts
-}
-
-fn actions(message: &v1::VectorActions) -> Result<Vec<ActionId>, Status> {
-    let (actions, rest) = message.actions.as_chunks::<2>();
-    if !rest.is_empty() {
-        let words = "the column is incomplete: 2 bytes for each action";
-        return Err(field(
-            "ACTIONS_REFUSED",
-            &FieldProblem::new("actions", words),
-        ));
-    }
-    let actions = actions.iter();
-    Ok(actions
-        .map(|bytes| ActionId::new(u16::from_le_bytes(*bytes)))
-        .collect())
-}
-
-fn step_refused(error: &StepError) -> Status {
-    let words = error.to_string();
-    match error {
-        StepError::Actions { rows, .. } => status(
-            Code::InvalidArgument,
-            "ACTIONS_REFUSED",
-            words,
-            [("field", "actions"), ("rows", &rows.to_string())],
-        ),
-        StepError::Illegal {
-            row, game, seat, ..
-        } => status(
-            Code::InvalidArgument,
-            "ILLEGAL_ACTION",
-            words,
-            [
-                ("field", "actions"),
-                ("row", &row.to_string()),
-                ("game", &game.to_string()),
-                ("seat", &seat.index().to_string()),
-            ],
-        ),
-        StepError::NoGame { .. } | StepError::Order { .. } => {
-            field("RESET_REFUSED", &FieldProblem::new("games", words))
-        }
-        StepError::RecordsTooLong => status(
-            Code::ResourceExhausted,
-            "RECORDS_TOO_LONG",
-            words,
-            [("field", "records")],
-        ),
-    }
 }
 
 fn too_many(limit: usize) -> Refused {

@@ -47,6 +47,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["chefshat-engine", "chefshat-agents", "chefshat-referee"],
     ),
     (
+        "chefshat-vector",
+        &[
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-agents",
+            "chefshat-simulation",
+            "chefshat-record",
+            "chefshat-room",
+        ],
+    ),
+    (
         "chefshat-server",
         &[
             "chefshat-engine",
@@ -60,6 +71,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-dataset",
             "chefshat-render",
             "chefshat-room",
+            "chefshat-vector",
         ],
     ),
     ("chefshat-client", &["chefshat-proto"]),

@@ -23,6 +23,11 @@ impl FieldProblem {
             message: message.into(),
         }
     }
+
+    /// A number that is not a value of the field's enum.
+    pub fn unknown(field: &'static str, value: i32) -> Self {
+        Self::new(field, format!("{value} is not a value of this enum"))
+    }
 }
 
 /// Reads a rule set: its preset, overridden by every field that is set.

@@ -1,0 +1,47 @@
+//! Records of finished games, in parts of bounded size.
+
+use chefshat_agents::AgentKind;
+use chefshat_proto::v1;
+use chefshat_record::convert::Played;
+use chefshat_simulation::vector::{InvalidActions, PlayedGame, VectorSetup};
+use prost::Message as _;
+
+use crate::policy::simulation_policy;
+
+/// Size from which a part of a record is sent, bytes.
+const RECORD_PART_BYTES: usize = 512 * 1024;
+
+/// Splits the record of a game into parts.
+pub fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
+    let limit = match setup.invalid_actions() {
+        InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
+        InvalidActions::Error => None,
+    };
+    let record = Played {
+        by: "vector",
+        rules: setup.rules(),
+        agents: &setup.agents().map(|agent| agent.map(AgentKind::name)),
+        seed: played.seed,
+        scheme: setup.scheme(),
+        policy: &simulation_policy(limit, setup.scheme()),
+        decisions: &played.decisions,
+    };
+    let mut parts = vec![v1::VectorRecord::default()];
+    let mut size = 0;
+    for line in record.record() {
+        if size > RECORD_PART_BYTES {
+            parts.push(v1::VectorRecord::default());
+            size = 0;
+        }
+        size += line.encoded_len();
+        let part = parts.last_mut().expect("there is a first part");
+        part.lines.push(line);
+    }
+    for part in &mut parts {
+        part.game = played.game;
+        part.index = played.index;
+    }
+    let last = parts.last_mut().expect("there is a first part");
+    last.last = true;
+    parts
+}

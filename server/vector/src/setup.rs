@@ -1,0 +1,281 @@
+//! The setup of games as a message, and its answer.
+
+use std::num::{NonZeroU32, NonZeroU64};
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{RuleSet, RuleSetSpec, Seed, Stop};
+use chefshat_proto::v1::{self, vector_setup};
+use chefshat_record::convert::{
+    FieldProblem, MAX_RECORDED_ATTEMPTS, action_space, reward_scheme_from_proto, rules_from_proto,
+    rules_to_proto, script_from_proto, seat_from_number, seat_number,
+};
+use chefshat_simulation::vector::{
+    Decisions, Episode, InvalidActions, Seeds, SetupError, Start, VectorSetup,
+};
+
+use crate::error::RequestError;
+use crate::policy::agent_from_proto;
+
+/// What a setup may ask for.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Most seeds in a list.
+    pub seeds: usize,
+    /// Most parallel games with records.
+    pub recorded_games: u32,
+    /// Most points or Shifts of a game with a record.
+    pub recorded_shifts: u32,
+}
+
+/// The seeds of a setup; `drawn` supplies a base seed if it has none.
+///
+/// # Errors
+/// The list is empty or too long, or a seed is not 32 bytes long.
+pub fn seeds_from_setup(
+    message: &v1::VectorSetup,
+    limits: &Limits,
+    drawn: impl FnOnce() -> u64,
+) -> Result<Seeds, RequestError> {
+    match &message.seeds {
+        None => Ok(Seeds::Base(drawn())),
+        Some(vector_setup::Seeds::BaseSeed(base)) => Ok(Seeds::Base(*base)),
+        Some(vector_setup::Seeds::GameSeeds(seeds)) => seeds_from_proto(seeds, limits)
+            .map_err(|problem| RequestError::field("SEED_REFUSED", &problem)),
+    }
+}
+
+/// The rules and the start of games that do not continue a recorded game; `None` if they do.
+///
+/// # Errors
+/// The rule set or the hands are invalid.
+pub fn start_from_proto(
+    message: &v1::VectorSetup,
+) -> Result<Option<(RuleSet, Start)>, RequestError> {
+    let rules = || {
+        rules_from_proto(&message.rules.clone().unwrap_or_default())
+            .map_err(|problem| RequestError::field("RULE_SET_REFUSED", &problem))
+    };
+    match &message.start {
+        None => Ok(Some((rules()?, Start::Deal))),
+        Some(vector_setup::Start::Scripted(script)) => {
+            let rules = rules()?;
+            let script = script_from_proto(script, &rules)
+                .map_err(|problem| RequestError::field("SCRIPT_REFUSED", &problem))?;
+            Ok(Some((rules, Start::Script(Box::new(script)))))
+        }
+        Some(vector_setup::Start::Branch(_)) => Ok(None),
+    }
+}
+
+/// The games of a setup message, whose rules, start and seeds are already checked.
+///
+/// # Errors
+/// The first invalid field.
+pub fn setup_from_proto(
+    message: &v1::VectorSetup,
+    rules: RuleSet,
+    start: Start,
+    seeds: Seeds,
+    limits: &Limits,
+) -> Result<VectorSetup, RequestError> {
+    read(message, rules, start, seeds, limits)
+        .map_err(|problem| RequestError::field("SETUP_REFUSED", &problem))
+}
+
+fn read(
+    message: &v1::VectorSetup,
+    rules: RuleSet,
+    start: Start,
+    seeds: Seeds,
+    limits: &Limits,
+) -> Result<VectorSetup, FieldProblem> {
+    let agents = agents(message, &rules)?;
+    let invalid = invalid_actions(message)?;
+    let dealt = matches!(start, Start::Deal);
+    let setup = VectorSetup::new(rules, message.games, &agents, seeds)
+        .map_err(problem)?
+        .with_rewards(
+            v1::RewardScheme::try_from(message.reward_scheme)
+                .map(reward_scheme_from_proto)
+                .map_err(|_| FieldProblem::unknown("reward_scheme", message.reward_scheme))?,
+        )
+        .with_episode(match v1::EpisodeScope::try_from(message.episode) {
+            Ok(v1::EpisodeScope::Unspecified | v1::EpisodeScope::Shift) => Episode::Shift,
+            Ok(v1::EpisodeScope::Game) => Episode::Game,
+            Err(_) => return Err(FieldProblem::unknown("episode", message.episode)),
+        })
+        .with_decisions(decisions(message)?)
+        .with_skip_forced(message.skip_forced)
+        .with_invalid_actions(invalid)
+        .with_total_games(NonZeroU64::new(message.total_games))
+        .map_err(problem)?
+        .with_start(start)
+        .map_err(problem)?
+        .with_statistics(message.shift_statistics)
+        .with_records(message.records);
+    if message.records {
+        check_records(&setup, dealt, limits)?;
+    }
+    Ok(setup)
+}
+
+/// The answer to a setup.
+pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
+    let rules = setup.rules();
+    v1::VectorStarted {
+        rules: Some(rules_to_proto(rules)),
+        action_space: Some(action_space(&rules.actions())),
+        hand_size: rules.hand_size().into(),
+        client_seats: setup.client_seats().map(seat_number).collect(),
+        built_in_agents: (setup.agents().values())
+            .map(|agent| agent.map_or("", AgentKind::name).to_owned())
+            .collect(),
+        base_seed: match setup.seeds() {
+            Seeds::Base(base) => Some(*base),
+            Seeds::List(_) => None,
+        },
+    }
+}
+
+/// The agent of each seat; `None`: the client.
+fn agents(
+    message: &v1::VectorSetup,
+    rules: &RuleSet,
+) -> Result<Vec<Option<AgentKind>>, FieldProblem> {
+    let players = rules.players();
+    let mut owned = vec![message.client_seats.is_empty(); players];
+    let mut before = None;
+    for &number in &message.client_seats {
+        let seat = seat_from_number(number, players).filter(|_| before < Some(number));
+        let Some(seat) = seat else {
+            let words = format!(
+                "{:?}: list seats of 0..={}, ascending, each once",
+                message.client_seats,
+                players - 1
+            );
+            return Err(FieldProblem::new("client_seats", words));
+        };
+        owned[seat.index()] = true;
+        before = Some(number);
+    }
+    let others = owned.iter().filter(|owned| !**owned).count();
+    let names: Vec<Option<AgentKind>> = (message.opponents.iter())
+        .map(|name| agent_from_proto("opponents", name))
+        .collect::<Result<_, _>>()?;
+    if !(names.len() <= 1 || names.len() == others) {
+        let words = format!(
+            "{} agents for {others} other seats: give one for each of them, or one for all",
+            names.len()
+        );
+        return Err(FieldProblem::new("opponents", words));
+    }
+    let for_all = names.first().copied().flatten().unwrap_or_default();
+    let mut one_by_one = (names.len() > 1).then(|| names.into_iter());
+    Ok(owned
+        .into_iter()
+        .map(|owned| {
+            (!owned).then(|| match &mut one_by_one {
+                None => for_all,
+                Some(names) => names.next().flatten().unwrap_or_default(),
+            })
+        })
+        .collect())
+}
+
+fn decisions(message: &v1::VectorSetup) -> Result<Decisions, FieldProblem> {
+    let others = agent_from_proto("other_decisions", &message.other_decisions)?;
+    match v1::DecisionScope::try_from(message.decisions) {
+        Ok(v1::DecisionScope::Turns) => Ok(Decisions::Turns { others }),
+        Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) if others.is_some() => {
+            let words =
+                "the client takes all decisions; leave it empty, or set `decisions` to turns";
+            Err(FieldProblem::new("other_decisions", words))
+        }
+        Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) => Ok(Decisions::All),
+        Err(_) => Err(FieldProblem::unknown("decisions", message.decisions)),
+    }
+}
+
+fn invalid_actions(message: &v1::VectorSetup) -> Result<InvalidActions, FieldProblem> {
+    let limit = NonZeroU32::new(message.max_invalid_attempts);
+    match v1::InvalidActionRule::try_from(message.invalid_actions) {
+        Ok(v1::InvalidActionRule::AskAgain) => Ok(InvalidActions::AskAgain { limit }),
+        Ok(_) if limit.is_some() => {
+            let words = "an invalid action is an error here; leave it 0, or set ASK_AGAIN";
+            Err(FieldProblem::new("max_invalid_attempts", words))
+        }
+        Ok(_) => Ok(InvalidActions::Error),
+        Err(_) => Err(FieldProblem::unknown(
+            "invalid_actions",
+            message.invalid_actions,
+        )),
+    }
+}
+
+/// Checks that the games can be recorded and that records stay of bounded size.
+fn check_records(setup: &VectorSetup, dealt: bool, limits: &Limits) -> Result<(), FieldProblem> {
+    let refused = |words: String| Err(FieldProblem::new("records", words));
+    if !dealt {
+        return refused("only dealt games can be recorded; leave `start` unset".to_owned());
+    }
+    if setup.games() > limits.recorded_games {
+        return refused(format!(
+            "at most {} parallel games can be recorded",
+            limits.recorded_games
+        ));
+    }
+    let max_turns = RuleSetSpec::default().max_turns;
+    if setup.rules().max_turns() > max_turns {
+        return refused(format!("with records, max_turns is at most {max_turns}"));
+    }
+    let (Stop::Points(length) | Stop::Shifts(length)) = setup.rules().stop();
+    if length > limits.recorded_shifts {
+        return refused(format!(
+            "a recorded game ends after at most {} points or Shifts, not {length}",
+            limits.recorded_shifts
+        ));
+    }
+    match setup.invalid_actions() {
+        InvalidActions::AskAgain { limit }
+            if limit.is_none_or(|limit| limit.get() > MAX_RECORDED_ATTEMPTS) =>
+        {
+            refused(format!(
+                "with records, set max_invalid_attempts to 1..={MAX_RECORDED_ATTEMPTS}"
+            ))
+        }
+        InvalidActions::AskAgain { .. } | InvalidActions::Error => Ok(()),
+    }
+}
+
+fn problem(error: SetupError) -> FieldProblem {
+    let field = match &error {
+        SetupError::Seats { .. } | SetupError::NoClient => "client_seats",
+        SetupError::Games { .. } => "games",
+        SetupError::Total { .. } => "total_games",
+        SetupError::NoSeeds => "game_seeds",
+        SetupError::Script(_) => "scripted",
+    };
+    FieldProblem::new(field, error.to_string())
+}
+
+/// Reads a list of seeds.
+///
+/// # Errors
+/// The list is empty or too long, or a seed is not 32 bytes long.
+pub(crate) fn seeds_from_proto(
+    message: &v1::GameSeeds,
+    limits: &Limits,
+) -> Result<Seeds, FieldProblem> {
+    if !(1..=limits.seeds).contains(&message.seeds.len()) {
+        let given = message.seeds.len();
+        let words = format!("{given} seeds; give 1 to {}", limits.seeds);
+        return Err(FieldProblem::new("game_seeds", words));
+    }
+    let seeds = message.seeds.iter().map(|bytes| {
+        bytes.as_slice().try_into().map(Seed).map_err(|_| {
+            let words = format!("a seed of {} bytes; give 32", bytes.len());
+            FieldProblem::new("game_seeds", words)
+        })
+    });
+    Ok(Seeds::List(seeds.collect::<Result<_, _>>()?))
+}
