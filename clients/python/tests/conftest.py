@@ -11,7 +11,7 @@ from fake_vector import FakeVector
 from real_server import RealServer
 from stage import Stage, attached
 
-from chefshat.channels import CA, TOKEN
+from chefshat.address import CA, TOKEN
 from chefshat.join_options import TICKET
 from chefshat.local_server import BINARY
 

@@ -15,7 +15,8 @@ from proxy import Proxy
 import chefshat
 from chefshat import Backoff, ChefsHatError, Decision, LocalServer, SeatResult, ServerAddress, aio, pb
 from chefshat import agent as command
-from chefshat.channels import CA, TOKEN, channel
+from chefshat.address import CA, TOKEN
+from chefshat.channels import channel
 
 SECRET = "chefshat_0badcafe_c2VjcmV0"
 AUTHORITY = TLS / "localhost.pem"

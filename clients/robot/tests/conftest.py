@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 from chefshat import LocalServer
-from chefshat.channels import CA, TOKEN
+from chefshat.address import CA, TOKEN
 from chefshat.join_options import TICKET
 from chefshat.local_server import BINARY
 

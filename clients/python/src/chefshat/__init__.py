@@ -6,23 +6,28 @@ server says what is legal.
 
 To learn, `make` an environment: `VectorEnv` steps many games at once in columns, `envs` has the interfaces of Gymnasium and
 PettingZoo, `replay` learns from recorded games.
+
+Names are imported on first use, so that `import chefshat` is fast, and environments in this process do not load gRPC.
 """
 
-from pathlib import Path
-
-from chefshat import aio, pb
-from chefshat.agents import Agent, RandomAgent
-from chefshat.backoff import Backoff
-from chefshat.channels import ServerAddress
-from chefshat.client import Client
-from chefshat.decision import Decision, SeatInfo
-from chefshat.errors import ChefsHatError
-from chefshat.local_server import LocalServer
-from chefshat.making import make
-from chefshat.result import SeatResult, Standing
-from chefshat.session import PlayOptions
-from chefshat.transitions import Transitions
-from chefshat.vector import Batch, VectorEnv, sample_legal
+# Not from `typing`, whose import takes as long as all the rest: `chefshat.pth` imports this package whenever Python starts.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from chefshat import aio, errors, pb, replay, vector
+    from chefshat.address import ServerAddress
+    from chefshat.agents import Agent, RandomAgent
+    from chefshat.backoff import Backoff
+    from chefshat.batch import Batch
+    from chefshat.client import Client, play
+    from chefshat.decision import Decision, SeatInfo
+    from chefshat.errors import ChefsHatError
+    from chefshat.local_server import LocalServer
+    from chefshat.making import make
+    from chefshat.masks import sample_legal
+    from chefshat.result import SeatResult, Standing
+    from chefshat.session import PlayOptions
+    from chefshat.transitions import Transitions
+    from chefshat.vector import VectorEnv
 
 __all__ = [
     "Agent",
@@ -41,36 +46,51 @@ __all__ = [
     "Transitions",
     "VectorEnv",
     "aio",
+    "errors",
     "make",
     "pb",
     "play",
+    "replay",
     "sample_legal",
+    "vector",
 ]
 
+# The modules of the names that are not modules themselves.
+_HOMES = {
+    "Agent": "agents",
+    "Backoff": "backoff",
+    "Batch": "batch",
+    "ChefsHatError": "errors",
+    "Client": "client",
+    "Decision": "decision",
+    "LocalServer": "local_server",
+    "PlayOptions": "session",
+    "RandomAgent": "agents",
+    "SeatInfo": "decision",
+    "SeatResult": "result",
+    "ServerAddress": "address",
+    "Standing": "result",
+    "Transitions": "transitions",
+    "VectorEnv": "vector",
+    "make": "making",
+    "play": "client",
+    "sample_legal": "masks",
+}
 
-def play(
-    agent: Agent,
-    address: str | ServerAddress,
-    *,
-    join_code: str,
-    name: str,
-    seat: int | None = None,
-    token: str | None = None,
-    ca: Path | str | None = None,
-) -> SeatResult:
-    """Joins a room, plays its game to the end and returns the result.
 
-    Args:
-        agent: the agent.
-        address: "host:port", "http://host:port" or, for TLS, "https://host:port".
-        join_code: the room's join code.
-        name: display name, 1..=64 characters.
-        seat: the seat; None: the first free one.
-        token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
-        ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
+def __getattr__(name: str) -> object:
+    """Imports a name on first use (PEP 562)."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
 
-    Raises:
-        ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.
-    """
-    with Client(address, token=token, ca=ca) as client:
-        return client.play(agent, client.join_room(join_code, name, seat=seat).ticket)
+    home = _HOMES.get(name)
+    value: object = import_module(f"{__name__}.{home or name}")
+    if home is not None:
+        value = getattr(value, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -8,12 +8,10 @@ import asyncio
 from collections.abc import Awaitable
 from typing import TypeAlias
 
-import grpc
-import grpc.aio
-
 from chefshat import pb
 from chefshat._async.calls import AsyncCalls
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.network import grpc
 from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 

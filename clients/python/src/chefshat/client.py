@@ -7,13 +7,16 @@ import threading
 import time
 from collections import deque
 from collections.abc import Awaitable, Coroutine, Iterator
+from pathlib import Path
 from typing import TypeAlias
-
-import grpc
 
 from chefshat import pb
 from chefshat._sync.calls import Calls
+from chefshat.address import ServerAddress
+from chefshat.agents import Agent
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.network import grpc
+from chefshat.result import SeatResult
 from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 
@@ -160,3 +163,31 @@ def _part(call: "PlayCall") -> None:
         return  # The games are over in any case.
     finally:
         limit.cancel()
+
+
+def play(
+    agent: Agent,
+    address: str | ServerAddress,
+    *,
+    join_code: str,
+    name: str,
+    seat: int | None = None,
+    token: str | None = None,
+    ca: Path | str | None = None,
+) -> SeatResult:
+    """Joins a room, plays its game to the end and returns the result.
+
+    Args:
+        agent: the agent.
+        address: "host:port", "http://host:port" or, for TLS, "https://host:port".
+        join_code: the room's join code.
+        name: display name, 1..=64 characters.
+        seat: the seat; None: the first free one.
+        token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
+        ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
+
+    Raises:
+        ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.
+    """
+    with Client(address, token=token, ca=ca) as client:
+        return client.play(agent, client.join_room(join_code, name, seat=seat).ticket)

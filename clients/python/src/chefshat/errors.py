@@ -1,16 +1,18 @@
 """The exception for refusals by a server and lost connections, its conversion from gRPC, and error output of commands.
 
-Wrong arguments raise ValueError or TypeError; exceptions of agents propagate unchanged.
+Wrong arguments raise ValueError or TypeError; exceptions of agents propagate unchanged. gRPC is only imported where one of its
+errors or codes is at hand, since environments in this process work without it.
 """
 
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping
-
-import grpc
-from google.rpc import error_details_pb2, status_pb2
+from typing import TYPE_CHECKING
 
 from chefshat import pb
+
+if TYPE_CHECKING:
+    import grpc
 
 DETAILS_KEY = "grpc-status-details-bin"
 #: Reason of a connection whose server is not trusted or does not use TLS.
@@ -20,20 +22,17 @@ _TLS_MARKS = ("SSL_ERROR_SSL", "Verification Check failed")
 #: Exit code of a command ended by Ctrl-C, by the convention of shells.
 INTERRUPTED = 130
 
-# The codes by number.
-_CODES: dict[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
-
-# Codes after which a retry with the same arguments is pointless.
+# Names of the codes after which a retry with the same arguments is pointless.
 _FINAL_CODES = frozenset(
     {
-        grpc.StatusCode.INVALID_ARGUMENT,
-        grpc.StatusCode.NOT_FOUND,
-        grpc.StatusCode.ALREADY_EXISTS,
-        grpc.StatusCode.PERMISSION_DENIED,
-        grpc.StatusCode.FAILED_PRECONDITION,
-        grpc.StatusCode.OUT_OF_RANGE,
-        grpc.StatusCode.UNIMPLEMENTED,
-        grpc.StatusCode.UNAUTHENTICATED,
+        "INVALID_ARGUMENT",
+        "NOT_FOUND",
+        "ALREADY_EXISTS",
+        "PERMISSION_DENIED",
+        "FAILED_PRECONDITION",
+        "OUT_OF_RANGE",
+        "UNIMPLEMENTED",
+        "UNAUTHENTICATED",
     }
 )
 
@@ -54,7 +53,7 @@ class ChefsHatError(Exception):
         reason: str,
         message: str = "",
         metadata: Mapping[str, str] | None = None,
-        code: grpc.StatusCode | None = None,
+        code: "grpc.StatusCode | None" = None,
     ) -> None:
         super().__init__(f"{reason}: {message}" if message else reason)
         self.reason = reason
@@ -65,23 +64,29 @@ class ChefsHatError(Exception):
     @property
     def retryable(self) -> bool:
         """Whether the same attempt may succeed later (a lost connection, a restarting server)."""
-        return self.code is not None and self.code not in _FINAL_CODES and self.reason != TLS_FAILED
+        return self.code is not None and self.code.name not in _FINAL_CODES and self.reason != TLS_FAILED
 
 
 def connection_lost(message: str = "the server ended the stream before the game was over") -> ChefsHatError:
     """Returns the error for a stream that ended without an error status."""
+    from chefshat.network import grpc
+
     return ChefsHatError("CONNECTION_LOST", message, code=grpc.StatusCode.UNAVAILABLE)
 
 
 def from_refused(refused: pb.Refused) -> ChefsHatError:
     """Converts a refusal inside a stream."""
+    from chefshat.network import grpc
+
     # 0 means unset here, since a refusal is never OK.
-    code = _CODES.get(refused.code) if refused.code else None
+    code = next((code for code in grpc.StatusCode if refused.code and code.value[0] == refused.code), None)
     return ChefsHatError(refused.reason, refused.message, refused.metadata, code)
 
 
-def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
+def from_rpc_error(error: "grpc.RpcError") -> ChefsHatError:
     """Converts the error of a call, blocking or asyncio, with reason and metadata from google.rpc.ErrorInfo."""
+    from chefshat.network import grpc
+
     # Errors of calls have these methods, but their common base class does not declare them.
     code = getattr(error, "code", lambda: None)() or grpc.StatusCode.UNKNOWN
     message = getattr(error, "details", lambda: None)() or ""
@@ -100,6 +105,8 @@ def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
 
 def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[str, str]]:
     """Returns the reason and metadata in a call's trailers; empty if the server gave none."""
+    from google.rpc import error_details_pb2, status_pb2
+
     for key, value in trailers:
         if key != DETAILS_KEY or not isinstance(value, bytes):
             continue

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from chefshat import pb
+from chefshat.address import CA, TOKEN, ServerAddress
 from chefshat.agents import Agent
-from chefshat.channels import CA, TOKEN, ServerAddress
 from chefshat.client import Client
 from chefshat.decision import SeatInfo
 from chefshat.errors import ChefsHatError

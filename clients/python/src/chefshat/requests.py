@@ -6,10 +6,9 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from typing import Protocol, TypeAlias, TypeVar
 
-import grpc
-
 from chefshat import pb
 from chefshat.errors import from_rpc_error
+from chefshat.network import grpc
 
 
 class PageRequest(Protocol):

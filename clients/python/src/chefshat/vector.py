@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chefshat import channels, local_server, pb
 from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
+from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
-from chefshat.channels import ServerAddress, server_address
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.masks import sample_legal

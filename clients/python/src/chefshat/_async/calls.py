@@ -12,8 +12,6 @@ from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
-import grpc
-
 from chefshat import pb, requests
 from chefshat._gen.chefshat.v1.play_service_pb2_grpc import PlayServiceStub
 from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
@@ -22,10 +20,12 @@ from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
 from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
 from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
+from chefshat.address import ServerAddress, server_address
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
-from chefshat.channels import ServerAddress, async_channel, server_address
+from chefshat.channels import async_channel
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.network import grpc
 from chefshat.participant import MakeAgent, OnEntered
 from chefshat.requests import async_pages, awaited
 from chefshat.result import SeatResult

@@ -10,27 +10,20 @@ The forms of observations are in `observing`.
 from typing import TYPE_CHECKING, Any
 
 try:
-    import gymnasium
+    import gymnasium.envs.registration
 except ImportError as error:
     raise ImportError("chefshat.envs needs Gymnasium and PettingZoo: pip install 'chefshat[envs]'") from error
 
 from chefshat.envs.gymnasium_env import ChefsHatEnv
 from chefshat.envs.gymnasium_vector import ChefsHatVectorEnv
+from chefshat.registration import ENV_ID, register
 
 if TYPE_CHECKING:
     from chefshat.envs import chefshat_v1
 
 __all__ = ["ENV_ID", "ChefsHatEnv", "ChefsHatVectorEnv", "chefshat_v1"]
 
-#: The id in Gymnasium's registry. `gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1")` works without an import.
-ENV_ID = "chefshat/ChefsHat-v1"
-
-if ENV_ID not in gymnasium.registry:
-    gymnasium.register(
-        ENV_ID,
-        entry_point="chefshat.envs.gymnasium_env:ChefsHatEnv",
-        vector_entry_point="chefshat.envs.gymnasium_vector:ChefsHatVectorEnv",
-    )
+register(gymnasium.envs.registration)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - A module.

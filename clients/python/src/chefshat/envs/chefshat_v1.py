@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 
 try:
     from pettingzoo import AECEnv

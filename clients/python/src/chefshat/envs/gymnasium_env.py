@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.columns import Situations
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.columns import Endings
 from chefshat.envs.gymnasium_env import check_open
 from chefshat.envs.observing import Form, ObservationFunction, Observed

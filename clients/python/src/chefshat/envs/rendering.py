@@ -5,8 +5,7 @@ import functools
 import numpy as np
 
 from chefshat import pb
-from chefshat.channels import ServerAddress
-from chefshat.client import Client
+from chefshat.address import ServerAddress
 from chefshat.columns import Situations
 
 RENDER_MODES = ("ansi", "human")
@@ -23,6 +22,8 @@ def check_render_mode(render_mode: str | None) -> None:
 @functools.cache
 def action_texts(server: ServerAddress, faces: int) -> tuple[str, ...]:
     """Fetches the texts of all actions."""
+    from chefshat.client import Client
+
     with Client(server) as client:
         return tuple(client.action_table(faces).texts)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import chefshat
 from chefshat import join_options
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.experiments import page, plots, results, tables
 from chefshat.experiments.progress import Progress

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from google.protobuf.json_format import MessageToDict
 
 from chefshat import pb
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.experiments import paper, stats
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Points, Result, Table

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.files import write_atomically
 
 FORMAT = "chefshat-experiment-1"

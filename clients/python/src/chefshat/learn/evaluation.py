@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chefshat import join_options
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError

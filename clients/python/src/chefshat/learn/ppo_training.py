@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
 
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.learn import ppo
 from chefshat.learn.ppo import Params, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training

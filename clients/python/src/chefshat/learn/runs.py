@@ -13,7 +13,7 @@ from typing import Any, Self
 from google.protobuf.json_format import MessageToDict
 
 from chefshat import pb
-from chefshat.channels import ServerAddress
+from chefshat.address import ServerAddress
 from chefshat.vector import Rules, VectorEnv
 
 # Seeds given by users are below 2^31. Adding multiples of this gives other games.

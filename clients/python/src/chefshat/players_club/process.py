@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Self
 
-from chefshat.channels import TOKEN
+from chefshat.address import TOKEN
 from chefshat.join_options import TICKET
 
 LOG = logging.getLogger("chefshat")

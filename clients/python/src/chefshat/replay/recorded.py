@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chefshat import pb
-from chefshat.channels import ServerAddress
-from chefshat.client import Client
+from chefshat.address import ServerAddress
 from chefshat.columns import Sizes
 from chefshat.errors import ChefsHatError
 from chefshat.files import write_record
@@ -109,6 +108,8 @@ def from_server(address: str | ServerAddress, wanted: pb.RecordFilter | None = N
     Raises:
         ChefsHatError: there are no such records, the server refuses, or see `from_records`.
     """
+    from chefshat.client import Client
+
     with tempfile.TemporaryDirectory() as folder, Client(address) as client:
         count = 0
         for summary in client.records(wanted):

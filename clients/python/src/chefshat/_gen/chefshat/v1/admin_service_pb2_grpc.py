@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import admin_service_pb2 as chefshat_dot_v1_dot_admin__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class AdminServiceStub:
+class AdminServiceStub(object):
     """Operates a server: its clients, what others created, and its storage. Every call needs the role
     ADMIN.
     """
@@ -68,7 +68,7 @@ class AdminServiceStub:
                 _registered_method=True)
 
 
-class AdminServiceServicer:
+class AdminServiceServicer(object):
     """Operates a server: its clients, what others created, and its storage. Every call needs the role
     ADMIN.
     """
@@ -159,7 +159,7 @@ def add_AdminServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class AdminService:
+class AdminService(object):
     """Operates a server: its clients, what others created, and its storage. Every call needs the role
     ADMIN.
     """

@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import play_service_pb2 as chefshat_dot_v1_dot_play__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class PlayServiceStub:
+class PlayServiceStub(object):
     """Playing on seats, authorised by their tickets.
     """
 
@@ -52,7 +52,7 @@ class PlayServiceStub:
                 _registered_method=True)
 
 
-class PlayServiceServicer:
+class PlayServiceServicer(object):
     """Playing on seats, authorised by their tickets.
     """
 
@@ -113,7 +113,7 @@ def add_PlayServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class PlayService:
+class PlayService(object):
     """Playing on seats, authorised by their tickets.
     """
 

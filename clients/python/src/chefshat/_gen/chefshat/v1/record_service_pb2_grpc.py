@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import record_service_pb2 as chefshat_dot_v1_dot_record__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class RecordServiceStub:
+class RecordServiceStub(object):
     """The records of a server.
     """
 
@@ -57,7 +57,7 @@ class RecordServiceStub:
                 _registered_method=True)
 
 
-class RecordServiceServicer:
+class RecordServiceServicer(object):
     """The records of a server.
     """
 
@@ -131,7 +131,7 @@ def add_RecordServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class RecordService:
+class RecordService(object):
     """The records of a server.
     """
 

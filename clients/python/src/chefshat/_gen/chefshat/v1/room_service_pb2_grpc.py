@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import room_service_pb2 as chefshat_dot_v1_dot_room__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class RoomServiceStub:
+class RoomServiceStub(object):
     """Rooms of a server.
     """
 
@@ -67,7 +67,7 @@ class RoomServiceStub:
                 _registered_method=True)
 
 
-class RoomServiceServicer:
+class RoomServiceServicer(object):
     """Rooms of a server.
     """
 
@@ -170,7 +170,7 @@ def add_RoomServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class RoomService:
+class RoomService(object):
     """Rooms of a server.
     """
 

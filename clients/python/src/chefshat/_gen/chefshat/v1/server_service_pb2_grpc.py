@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import server_service_pb2 as chefshat_dot_v1_dot_server__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class ServerServiceStub:
+class ServerServiceStub(object):
     """Information about a server.
     """
 
@@ -47,7 +47,7 @@ class ServerServiceStub:
                 _registered_method=True)
 
 
-class ServerServiceServicer:
+class ServerServiceServicer(object):
     """Information about a server.
     """
 
@@ -86,7 +86,7 @@ def add_ServerServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class ServerService:
+class ServerService(object):
     """Information about a server.
     """
 

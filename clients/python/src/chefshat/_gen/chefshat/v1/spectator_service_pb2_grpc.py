@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import spectator_service_pb2 as chefshat_dot_v1_dot_spectator__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class SpectatorServiceStub:
+class SpectatorServiceStub(object):
     """Watching rooms.
     """
 
@@ -42,7 +42,7 @@ class SpectatorServiceStub:
                 _registered_method=True)
 
 
-class SpectatorServiceServicer:
+class SpectatorServiceServicer(object):
     """Watching rooms.
     """
 
@@ -75,7 +75,7 @@ def add_SpectatorServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class SpectatorService:
+class SpectatorService(object):
     """Watching rooms.
     """
 

@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import table_service_pb2 as chefshat_dot_v1_dot_table__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class TableServiceStub:
+class TableServiceStub(object):
     """The table of a physical room. Several clients with the table's ticket may report and watch at the
     same time: a camera, and an attendant on the page.
     """
@@ -48,7 +48,7 @@ class TableServiceStub:
                 _registered_method=True)
 
 
-class TableServiceServicer:
+class TableServiceServicer(object):
     """The table of a physical room. Several clients with the table's ticket may report and watch at the
     same time: a camera, and an attendant on the page.
     """
@@ -98,7 +98,7 @@ def add_TableServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class TableService:
+class TableService(object):
     """The table of a physical room. Several clients with the table's ticket may report and watch at the
     same time: a camera, and an attendant on the page.
     """

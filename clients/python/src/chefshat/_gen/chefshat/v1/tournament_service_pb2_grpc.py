@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import tournament_service_pb2 as chefshat_dot_v1_dot_tournament__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class TournamentServiceStub:
+class TournamentServiceStub(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`).
     """
@@ -98,7 +98,7 @@ class TournamentServiceStub:
                 _registered_method=True)
 
 
-class TournamentServiceServicer:
+class TournamentServiceServicer(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`).
     """
@@ -286,7 +286,7 @@ def add_TournamentServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class TournamentService:
+class TournamentService(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`).
     """

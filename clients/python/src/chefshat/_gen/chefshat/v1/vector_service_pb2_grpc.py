@@ -5,7 +5,7 @@ import warnings
 
 from chefshat._gen.chefshat.v1 import vector_service_pb2 as chefshat_dot_v1_dot_vector__service__pb2
 
-GRPC_GENERATED_VERSION = '1.85.1'
+GRPC_GENERATED_VERSION = '1.76.0'
 GRPC_VERSION = grpc.__version__
 _version_not_supported = False
 
@@ -25,7 +25,7 @@ if _version_not_supported:
     )
 
 
-class VectorServiceStub:
+class VectorServiceStub(object):
     """Games stepped in batches.
     """
 
@@ -42,7 +42,7 @@ class VectorServiceStub:
                 _registered_method=True)
 
 
-class VectorServiceServicer:
+class VectorServiceServicer(object):
     """Games stepped in batches.
     """
 
@@ -79,7 +79,7 @@ def add_VectorServiceServicer_to_server(servicer, server):
 
 
  # This class is part of an EXPERIMENTAL API.
-class VectorService:
+class VectorService(object):
     """Games stepped in batches.
     """
 

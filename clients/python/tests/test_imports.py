@@ -1,0 +1,72 @@
+"""What importing the package loads: names on first use, and no gRPC before a server is used."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import chefshat
+
+SOURCE = Path(chefshat.__file__).parents[1]
+# Time limit in seconds.
+WAIT_S = 60
+
+# Prints which of the modules named by the arguments a program has loaded.
+LOADED = "\nimport sys\nprint(*sorted(name for name in sys.argv[1:] if name in sys.modules))"
+# Makes importing gRPC fail as if it were not installed.
+WITHOUT_GRPC = "import sys\nsys.modules['grpc'] = None\n"
+
+
+def run(program: str, *arguments: str) -> str:
+    """Runs a program in a fresh interpreter and returns its output."""
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(SOURCE)!r})\n{program}", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_the_package_alone_loads_nothing_else() -> None:
+    heavy = ("grpc", "numpy", "google.protobuf", "gymnasium", "asyncio", "chefshat.client", "chefshat.pb")
+    assert run(f"import chefshat{LOADED}", *heavy) == ""
+
+
+def test_every_name_is_there() -> None:
+    for name in chefshat.__all__:
+        assert getattr(chefshat, name) is not None
+    assert set(chefshat.__all__) <= set(dir(chefshat))
+    assert not hasattr(chefshat, "no_such_name")
+    assert run("from chefshat import *; print(make.__module__, pb.__name__)") == "chefshat.making chefshat.pb"
+
+
+def test_what_needs_no_server_needs_no_grpc() -> None:
+    modules = [
+        "agents",
+        "batch",
+        "columns",
+        "decision",
+        "errors",
+        "files",
+        "local_server",
+        "masks",
+        "replay",
+        "result",
+        "transitions",
+    ]
+    imports = "".join(f"import chefshat.{module}\n" for module in modules)
+    assert run(f"{WITHOUT_GRPC}{imports}print(chefshat.sample_legal.__name__)") == "sample_legal"
+    assert run(f"{imports}{LOADED}", "grpc", "numpy") == "numpy"
+
+
+def test_what_needs_a_server_says_what_to_install() -> None:
+    program = "import chefshat\ntry:\n    chefshat.Client\nexcept ImportError as error:\n    print(error)"
+    assert "pip install grpcio" in run(WITHOUT_GRPC + program)
+
+
+def test_gymnasium_finds_the_environments_by_name() -> None:
+    # What chefshat.pth does when Python starts.
+    start = "import chefshat.registration; chefshat.registration.when_imported()\n"
+    specs = "print(*(gymnasium.spec('chefshat/ChefsHat-v1').entry_point.split(':')), sep='\\n')"
+    expected = "chefshat.envs.gymnasium_env\nChefsHatEnv"
+    assert run(f"{start}{start}import gymnasium\n{specs}") == expected
+    assert run(f"import gymnasium\n{start}{specs}") == expected
+    assert run(f"{start}import chefshat.envs, gymnasium\n{specs}") == expected
+    assert run(f"{start}{LOADED}", "gymnasium", "numpy", "importlib.machinery") in ("", "importlib.machinery")
