@@ -3,6 +3,7 @@
 import json
 import re
 import struct
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +70,9 @@ def test_means_and_spreads() -> None:
     half = 1.96 * np.sqrt(5 / 3 / 4)
     assert (estimate.value, estimate.low, estimate.high) == pytest.approx((2.5, 2.5 - half, 2.5 + half), abs=1e-4)
     assert stats.mean([7]) == Estimate(7.0)
-    assert stats.spread([3.0, 1.0, 2.0]) == Estimate(2.0, 1.0, 3.0)
+    assert stats.spread([4.0, 2.0, 3.0, 1.0]) == Estimate(2.5, 1.0, 4.0, error=float(np.sqrt(5 / 3) / 2))
+    assert stats.spread([3.0]) == Estimate(3.0, 3.0, 3.0)
+    assert stats.clustered([4.0, 2.0, 3.0, 1.0]) == Estimate(2.5, error=float(np.sqrt(5 / 3) / 2))
     assert stats.spread([0.1] * 3).value == 0.1
     for refused in (
         lambda: stats.mean([]),
@@ -79,6 +82,16 @@ def test_means_and_spreads() -> None:
     ):
         with pytest.raises(ValueError):  # noqa: PT011 - that it is refused is all that is said
             refused()
+
+
+def test_values_that_agree_within_a_cluster_are_less_certain() -> None:
+    # Clusters of four equal values: only every fourth is independent. The errors differ by 2, and the few degrees of freedom.
+    values = np.repeat([[1.0], [0.0], [0.0], [1.0]], 4, axis=1)
+    assert stats.cluster_ratio(values) == pytest.approx(2 * np.sqrt((15 / 16) / (3 / 4)))
+    independent = np.random.default_rng(1).random((400, 250))
+    assert stats.cluster_ratio(independent) == pytest.approx(1, abs=0.1)
+    with pytest.raises(ValueError, match="two clusters"):
+        stats.cluster_ratio([[1, 2]])
 
 
 def test_curves_over_repetitions() -> None:
@@ -123,6 +136,8 @@ def test_a_table_as_text_and_as_markdown() -> None:
         (None, "\u2013"),
         (Estimate(-0.0001), "0.0"),
         (Estimate(1.0, percent=True), "100.0%"),
+        (Estimate(0.5, 0.25, 0.75, percent=True, digits=0, error=0.1), "50 ± 10% (25\u201375)"),
+        (Estimate(142.0, error=4.7, digits=0), "142 ± 5"),
     ],
 )
 def test_a_cell(cell: results.Cell, shown: str) -> None:
@@ -283,6 +298,31 @@ def test_results_need_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert re.search(rf"--out {out}: .*is a file, not a folder", capsys.readouterr().err)
 
 
+def test_results_name_the_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def git(*arguments: str) -> str:
+        options = ["-c", "user.name=Ada", "-c", "user.email=ada@example.org", "-C", str(tmp_path)]
+        return subprocess.run(["git", *options, *arguments], check=True, capture_output=True, text=True).stdout.strip()
+
+    package = tmp_path / "package"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert command._commit(package) == "unknown"
+    assert "not in a git checkout" in capsys.readouterr().err
+    git("init", "-q")
+    # A package within a checkout that does not contain it, such as an installed one.
+    assert command._commit(package) == "unknown"
+    git("add", ".")
+    git("commit", "-q", "-m", "package")
+    capsys.readouterr()
+    commit = command._commit(package)
+    assert git("rev-parse", "HEAD").startswith(commit)
+    assert len(commit) == command.COMMIT_DIGITS
+    (package / "__init__.py").write_text("changed = True")
+    assert command._commit(package) == f"{commit}-dirty"
+    assert capsys.readouterr().err == ""
+
+
 def test_a_missing_server_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mechanics", "--quick", "--out", str(tmp_path), "--address", "127.0.0.1:1", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["reason"] == "UNAVAILABLE"
@@ -316,6 +356,7 @@ def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> Non
     assert result.run["command"] == f"python -m chefshat.experiments {name} --seed 1{repetitions} --quick"
     assert result.run["package_version"]
     assert result.run["server_version"]
+    assert result.run["commit"]
     for figure in result.figures:
         assert png_size((quick_run / page.picture_name(result, figure)).read_bytes())[0] > 400
 

@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from chefshat import ServerAddress, pb
-from chefshat.experiments import learning, rules, stats, winning
-from chefshat.experiments.learning import Learned
+from chefshat.columns import Sizes
+from chefshat.experiments import baselines, learning, rules, stats, winning
+from chefshat.experiments.learning import Counts, Learned
 from chefshat.experiments.progress import Progress
-from chefshat.experiments.results import Config, Estimate
+from chefshat.experiments.results import Config
+from chefshat.experiments.winning import Condition
 from chefshat.learn import deep_q, deep_q_training
 from chefshat.learn.deep_q import DeepQConfig
 from chefshat.learn.deep_q_training import Played
+from chefshat.transitions import Transitions, situations
 
 AGENT = DeepQConfig(hidden=(4,), batch_size=2, memory_size=4)
 
@@ -33,7 +36,7 @@ def learned(places: list[list[list[int]]]) -> Learned:
         "reward_sums": array.astype(np.float32),
     }
     of_shifts: dict[str, Any] = {"starters": np.zeros(array.shape[:2], np.int64), "turns": 40 * np.ones(array.shape[:2])}
-    return Learned(deep_q.start(AGENT, [1]), Played(of_shifts, of_seats, pb.RuleSet(), 7))
+    return Learned(Played(of_shifts, of_seats, pb.RuleSet(), 7), deep_q.start(AGENT, [1]))
 
 
 # Two games of three Shifts. The starter is always seat 0.
@@ -53,21 +56,72 @@ def test_statistics_follow_from_places_and_counts() -> None:
 
 def test_the_tables_have_the_counts(tmp_path: Path) -> None:
     config = Config(ServerAddress(""), (1, 2), True, tmp_path)
-    both = dict.fromkeys(rules.CONDITIONS, SOME)
-    actions = {str(row[0]): row[2] for row in rules._actions(config, both).rows}
-    assert actions["wrong actions of the learner, per Shift"] == stats.spread([10 / 3, 20])
+    both = {"learner": SOME, "other": Counts(SOME.played)}
+    learner, other = rules._actions(config, both).rows[1:]
+    assert learner[:2] == ["learner", stats.spread([10 / 3, 20])]
+    assert other[:2] == ["other", stats.clustered([10 / 3, 20])]
     victories = rules._victories(config, both).rows
-    assert [row[2] for row in victories][:2] == [Estimate(1.5, 1, 2), Estimate(1.0, 1, 1)]
-    table = winning._four(config, dict.fromkeys(winning.FOUR, SOME))
+    assert [row[0] for row in victories[1:]] == list(both)
+    assert victories[1][1:3] == [stats.spread([2, 1]), stats.spread([1, 1])]
+    one = Condition("random", "paper", four=False)
+    four = dataclasses.replace(one, four=True)
+    others = {each: Counts(SOME.played) for each in (one, four)}
+    table = winning._four(config, dict.fromkeys(winning.FOUR, SOME), others)
     assert table.rows[0][1:7] == [117, 45, 55, 33, 117, 33]
     # The best seat wins two Shifts with one seed and one with the other; the last seat wins none.
-    assert table.rows[1][5] == Estimate(1.5, 1, 2)
-    assert table.rows[1][6] == Estimate(0.0, 0, 0)
+    assert table.rows[1][5:7] == [stats.spread([2, 1]), stats.spread([0, 0])]
+    assert table.rows[-1][0] == "random"
+    assert table.rows[-1][5] == stats.clustered([2, 1])
+    assert [row[:2] for row in winning._behaviour(config, {}, others).rows] == [["one", "random"], ["four", "random"]]
+
+
+def test_agents_that_do_not_learn_choose_as_they_say() -> None:
+    # Four actions of a turn; the last is passing.
+    masks = np.array([[True, False, True, True], [True, True, True, False], [False, False, False, True]])
+    for draw, wanted in ((0.0, [0, 0, 3]), (0.5, [2, 1, 3]), (0.99, [3, 2, 3])):
+        assert baselines.random(masks, np.full(3, draw)).tolist() == wanted
+    for draw, wanted in ((0.0, [0, 0, 3]), (0.99, [2, 2, 3])):
+        assert baselines.never_idle(masks, np.full(3, draw)).tolist() == wanted
+    assert baselines.last_play(masks, np.zeros(3)).tolist() == [2, 2, 3]
+
+
+def test_greedy_plays_the_highest_face_without_jokers_first() -> None:
+    def index(face: int, cards: int, jokers: int) -> int:
+        return 3 * (face * (face - 1) // 2 + cards - 1) + jokers
+
+    lone_joker, idle = 198, 199
+    order = [index(11, 3, 0), index(11, 2, 0), index(10, 9, 0), index(11, 2, 1), lone_joker, index(11, 9, 2), idle]
+    masks = np.zeros((len(order), 200), np.bool_)
+    for row in range(len(order)):
+        masks[row, order[row:]] = True
+    assert baselines.greedy(masks, np.zeros(len(order))).tolist() == order
+
+
+def test_the_rewards_of_the_papers_program() -> None:
+    sizes = Sizes(players=4, faces=11, jokers=2, hand_size=17, num_actions=214, turn_actions=200)
+    #        a play, an idle pass, a forced pass, a wrong action, the first place, another place
+    actions = np.array([3, 199, 199, 9, 3, 3], np.uint16)
+    masks = np.zeros((6, 200), np.bool_)
+    masks[:, 199] = True
+    masks[[0, 1, 3, 4, 5], 3] = True
+    hands = np.zeros((6, 12), np.uint8)
+    hands[0, 0] = 12
+    before = {"mask_bits": np.packbits(np.pad(masks, ((0, 0), (0, 14))), axis=1, bitorder="little")}
+    columns = {
+        "actions": actions,
+        "invalid": np.array([0, 0, 0, 1, 0, 0], np.bool_),
+        "ended": np.array([0, 0, 0, 0, 1, 1], np.bool_),
+        "places_taken": np.array([0, 0, 0, 0, 1, 2], np.uint8),
+    }
+    transitions = Transitions.of(6, sizes, columns)
+    transitions.before = situations(6, sizes, before)
+    transitions.after = situations(6, sizes, {"hands": hands})
+    assert winning.program_rewards(transitions) == pytest.approx([0.7 * 5 / 17, -0.5, 0.01, -1, 1, -0.01])
 
 
 def test_an_idle_pass_can_count_as_illegal() -> None:
     masks = np.array([[False, True, True], [False, False, True], [True, False, False]])
-    right = deep_q_training._without_idle_passes(masks)
+    right = deep_q_training.without_idle_passes(masks)
     assert right.tolist() == [[False, True, False], [False, False, True], [True, False, False]]
     # The first pass is sent as an illegal action; for the second only passing is legal; the third was illegal already.
     assert deep_q_training._wrong_as_illegal(np.array([2, 2, 2], np.int32), right).tolist() == [0, 2, 1]
@@ -100,7 +154,7 @@ def test_networks_of_other_settings_are_learned_again(real_address: str, tmp_pat
     ruleset = pb.RuleSet(players=4, faces=11, jokers=2)
     made = rules.CONDITIONS[rules.FIRST].agent
     agents = deep_q.start(made, quick.seeds)
-    rules._keep(quick, Learned(agents, Played({}, {}, ruleset, 0)))
+    rules._keep(quick, Learned(Played({}, {}, ruleset, 0), agents))
     monkeypatch.setattr(learning, "learn", never)
     loaded = rules.networks(quick, Progress(show=False))
     jax.tree.map(np.testing.assert_array_equal, loaded, agents.online)

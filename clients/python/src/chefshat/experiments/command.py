@@ -9,6 +9,8 @@ import importlib
 import importlib.metadata
 import json
 import platform
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -27,6 +29,7 @@ from chefshat.local_server import LocalServer
 EXPERIMENTS = ("mechanics", "rules", "winning")
 # Decimal places of an experiment's duration in seconds.
 SECONDS_DIGITS = 1
+COMMIT_DIGITS = 12
 
 
 class Refused(Exception):
@@ -47,6 +50,7 @@ def run(options: argparse.Namespace) -> int:
             with chefshat.Client(address) as client:
                 server_version = client.server_info().server_version
             seeds = tuple(range(options.seed, options.seed + options.seeds))
+            commit = _commit()
             config = Config(address=address, seeds=seeds, quick=options.quick, out=folder)
             for experiment in modules.values():
                 begun = time.monotonic()
@@ -54,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
                 facts = {
                     "package_version": importlib.metadata.version("chefshat"),
                     "server_version": server_version,
+                    "commit": commit,
                     "python": platform.python_version(),
                     "command": _command(result),
                     "seconds": round(time.monotonic() - begun, SECONDS_DIGITS),
@@ -164,6 +169,23 @@ def _command(result: Result) -> str:
     repetitions = f" --seeds {len(result.seeds)}" if len(result.seeds) > 1 else ""
     quick = " --quick" if result.quick else ""
     return f"python -m chefshat.experiments {result.experiment} --seed {result.seeds[0]}{repetitions}{quick}"
+
+
+def _commit(package: Path = Path(chefshat.__file__).parent) -> str:
+    """Returns the commit of the checkout, with "-dirty" if its code has changed since; "unknown" without a checkout."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(package), *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    try:
+        # Fails for a package that is installed in somebody else's checkout.
+        git("ls-files", "--error-unmatch", "__init__.py")
+        changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":/server")
+        return git("rev-parse", f"--short={COMMIT_DIGITS}", "HEAD") + ("-dirty" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        print(f"warning: {package} is not in a git checkout: the results will not name a commit", file=sys.stderr)
+        return "unknown"
 
 
 def _fill(path: Path, made: list[Result]) -> list[Path]:

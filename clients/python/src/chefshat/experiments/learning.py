@@ -22,6 +22,7 @@ from chefshat.learn import deep_q, deep_q_training
 from chefshat.learn.deep_q import Agents, DeepQConfig
 from chefshat.learn.deep_q_training import Played
 from chefshat.learn.mlp import Params
+from chefshat.transitions import RewardFunction
 from chefshat.vector import VectorEnv
 
 QUICK_SHIFTS = 2
@@ -30,6 +31,10 @@ QUICK_SHIFTS = 2
 OPPONENTS = "random_unmasked"
 # The rule set, with the number of Shifts to learn in.
 RULES = "paper"
+# How the client's seats decide in the exchange: the built-in agent that does it, or None for the default actions (the highest face
+# is given, special actions are declined). The other seats give random cards and take special actions at random.
+DEFAULT_GIFTS, RANDOM_GIFTS = "default gifts", "random gifts"
+GIFTS: Mapping[str, str | None] = {DEFAULT_GIFTS: None, RANDOM_GIFTS: "random"}
 # Window of the running means of curves, in Shifts.
 SMOOTHED = 10
 # The beginning and the end of the learning, in Shifts.
@@ -39,16 +44,18 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Learned:
-    """One condition, all seeds. G seeds, S Shifts, N seats.
+class Counts:
+    """What was counted in one condition. G games, S Shifts in each, N seats.
 
     Attributes:
-        agents: the agents as they are at the end.
-        played: what was counted.
+        played: the counts.
     """
 
-    agents: Agents
     played: Played
+
+    def estimate(self, values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
+        """Returns the mean of one value for each game, with its standard error."""
+        return stats.clustered(values, percent=percent, digits=digits)
 
     @property
     def won(self) -> npt.NDArray[np.bool_]:
@@ -56,11 +63,11 @@ class Learned:
         return np.asarray(self.played.of_seats["places"] == 1)
 
     def wins(self, seat: int) -> list[float]:
-        """Shifts that a seat won, by seed."""
+        """Shifts that a seat won, by game."""
         return [float(wins) for wins in self.won[:, :, seat].sum(axis=1)]
 
     def starter_wins(self) -> list[float]:
-        """The share of Shifts that the starter won, by seed."""
+        """The share of Shifts that the starter won, by game."""
         starters = self.played.of_shifts["starters"][:, :, np.newaxis]
         return [float(share) for share in np.take_along_axis(self.won, starters, axis=2)[:, :, 0].mean(axis=1)]
 
@@ -77,17 +84,32 @@ class Learned:
         return np.asarray(self.played.of_seats["wrong"], np.float64)
 
     def mean_reward(self, seat: int, shifts: slice = slice(None)) -> list[float]:
-        """The mean over Shifts of a seat's mean reward in each, by seed."""
+        """The mean over Shifts of a seat's mean reward in each, by game."""
         return [float(mean) for mean in self.rewards()[:, shifts, seat].mean(axis=1)]
 
     def mean_wrong(self, seat: int, shifts: slice = slice(None)) -> list[float]:
-        """Wrong actions per Shift, by seed."""
+        """Wrong actions per Shift, by game."""
         return [float(mean) for mean in self.wrong()[:, shifts, seat].mean(axis=1)]
 
     def share_of_turns(self, of: str, seat: int, shifts: slice = slice(None)) -> list[float]:
-        """Returns a count, for example of passes, as a share of a seat's turns, by seed."""
+        """Returns a count, for example of passes, as a share of a seat's turns, by game."""
         seats = self.played.of_seats
         return [float(share) for share in seats[of][:, shifts, seat].sum(axis=1) / seats["valid"][:, shifts, seat].sum(axis=1)]
+
+
+@dataclass(frozen=True)
+class Learned(Counts):
+    """One condition of learning agents: one game for each seed.
+
+    Attributes:
+        agents: the agents as they are at the end.
+    """
+
+    agents: Agents
+
+    def estimate(self, values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
+        """Returns the mean over the seeds, with its standard error, the minimum and the maximum."""
+        return stats.spread(values, percent=percent, digits=digits)
 
 
 def learn(
@@ -96,8 +118,9 @@ def learn(
     what: str,
     *,
     agent: DeepQConfig,
-    rewards: str,
+    rewards: str | RewardFunction,
     seats: Sequence[int],
+    gifts: str = DEFAULT_GIFTS,
     begin_with: Params | None = None,
     idle_pass_is_wrong: bool = False,
 ) -> Learned:
@@ -108,34 +131,52 @@ def learn(
         progress: shows the Shifts.
         what: name of the condition, for the progress.
         agent: the agents' hyper-parameters.
-        rewards: the reward scheme.
+        rewards: the reward scheme, or a function.
         seats: their seats; random agents have the others.
+        gifts: how the learners decide in the exchange, a key of `GIFTS`.
         begin_with: an initial network for each seed; None: new ones.
         idle_pass_is_wrong: whether the learners' passing counts as illegal where another action is legal.
     """
-    shifts = shifts_of(config)
     seeds = [_number(seed, seat) for seed in config.seeds for seat in seats]
     if begin_with is None:
         agents = deep_q.start(agent, seeds)
     else:
         copies = np.repeat(np.arange(len(config.seeds)), len(seats))
         agents = deep_q.start_from(agent, jax.tree.map(lambda leaf: leaf[copies], begin_with), seeds)
-    env = VectorEnv(
+    env = games(config, [game_seed(seed) for seed in config.seeds], rewards=rewards, seats=seats, gifts=gifts)
+    total = shifts_of(config) * len(config.seeds)
+    with env, progress.task(what, total=total, unit="Shifts") as advance:
+        learned, played = deep_q_training.play(env, agent, agents, idle_pass_is_wrong=idle_pass_is_wrong, advance=advance)
+    return Learned(played, learned)
+
+
+def games(config: Config, seeds: Sequence[bytes], *, rewards: str | RewardFunction, seats: Sequence[int], gifts: str) -> VectorEnv:
+    """Starts one game of 250 Shifts (a few if quick) for each seed, in which the client takes the turns of some seats.
+
+    Args:
+        config: address, quick or not.
+        seeds: the games' seeds.
+        rewards: the reward scheme, or a function.
+        seats: the client's seats; random agents have the others.
+        gifts: how the client's seats decide in the exchange, a key of `GIFTS`.
+    """
+    function = None if isinstance(rewards, str) else rewards
+    return VectorEnv(
         config.address,
-        len(config.seeds),
+        len(seeds),
+        reward_function=function,
         client_seats=seats,
         opponents=OPPONENTS,
-        rewards=rewards,
+        rewards=rewards if isinstance(rewards, str) else None,
         episode="shift",
         decisions="turns",
+        other_decisions=GIFTS[gifts],
         invalid="ask_again",
-        total_games=len(config.seeds),
-        seed=[_digest(seed) for seed in config.seeds],
-        rules={"preset": RULES, "target_shifts": shifts},
+        total_games=len(seeds),
+        seed=list(seeds),
+        rules={"preset": RULES, "target_shifts": shifts_of(config)},
         shift_statistics=True,
     )
-    with env, progress.task(what, total=shifts * len(config.seeds), unit="Shifts") as advance:
-        return Learned(*deep_q_training.play(env, agent, agents, idle_pass_is_wrong=idle_pass_is_wrong, advance=advance))
 
 
 def shifts_of(config: Config) -> int:
@@ -173,9 +214,14 @@ def rules_json(played: Played) -> Mapping[str, object]:
     return dict(MessageToDict(played.rules, preserving_proto_field_name=True))
 
 
-def count(config: Config, values: Sequence[float]) -> Estimate:
-    """Summarises a count over seeds. The mean of a few small ones needs a decimal place."""
-    return stats.spread(values, digits=1 if config.quick else 0)
+def count(config: Config, counts: Counts, values: Sequence[float]) -> Estimate:
+    """Summarises a count over games. The mean of a few small ones needs a decimal place."""
+    return counts.estimate(values, digits=1 if config.quick or not isinstance(counts, Learned) else 0)
+
+
+def note(config: Config) -> str:
+    """Returns the sentence about the rows of learners for the note of a table."""
+    return f"Learners: means over {len(config.seeds)} seeds ± standard errors; in brackets: minimum and maximum."
 
 
 def in_words(shifts: int) -> str:
@@ -193,8 +239,13 @@ def by_seed(config: Config, values: Sequence[float], digits: int = 4) -> dict[st
     return {str(seed): round(value, digits) for seed, value in zip(config.seeds, values, strict=True)}
 
 
-def _digest(seed: int, of: str = "the games") -> bytes:
-    """Derives 32 bytes from a seed: the same for every condition, so that conditions differ in nothing else."""
+def game_seed(seed: int, repetition: int = 0) -> bytes:
+    """Derives the seed of a game: the same for every condition, so that conditions differ in nothing else."""
+    return _digest(seed, f"the games, repetition {repetition}" if repetition else "the games")
+
+
+def _digest(seed: int, of: str) -> bytes:
+    """Derives 32 bytes from a seed."""
     return hashlib.sha256(f"seed {seed} of {of}".encode()).digest()
 
 

@@ -47,5 +47,6 @@ def provenance(result: Result) -> str:
     seeds = f"seed {result.seeds[0]}" if len(result.seeds) == 1 else f"seeds {result.seeds[0]} to {result.seeds[-1]}"
     return (
         f"Made with {seeds} by `{run.get('command', 'a program')}` in {run.get('seconds', 0):,} s "
-        f"(package {run.get('package_version')}, server {run.get('server_version')}, Python {run.get('python')})."
+        f"(commit {run.get('commit', 'unknown')}, package {run.get('package_version')}, server {run.get('server_version')}, "
+        f"Python {run.get('python')})."
     )

@@ -49,6 +49,7 @@ class Estimate:
         high: upper end; None if there is none.
         percent: whether it is a share, shown in percent.
         digits: decimal places to show.
+        error: standard error; None if it is not shown.
     """
 
     value: float
@@ -56,6 +57,7 @@ class Estimate:
     high: float | None = None
     percent: bool = False
     digits: int = 1
+    error: float | None = None
 
 
 # A cell of a table; None is shown as a dash.
@@ -171,7 +173,7 @@ class Result:
         tables: the tables.
         figures: the figures.
         values: further numbers as JSON, for example those of every seed.
-        run: set by the command: package and server version, command, seconds.
+        run: set by the command: package and server version, commit, command, seconds.
     """
 
     experiment: str

@@ -10,6 +10,9 @@ number of attempts at a decision is among the values.) There are three condition
 - the classic vector, where a pass counts as illegal if another action is legal, as in an early public version of the paper's
   environment. Since learning that takes thousands of attempts, a random one of the remaining legal actions is taken after ten
   illegal ones at one decision, as in a later version of that environment.
+
+Agents that do not learn play in the same setting, see `baselines`. Four that never pass idly show what the third condition would be
+like if all four seats obeyed its rule.
 """
 
 import hashlib
@@ -22,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 import chefshat
-from chefshat.experiments import learning, paper, stats
-from chefshat.experiments.learning import Learned
+from chefshat.experiments import baselines, learning, paper
+from chefshat.experiments.learning import Counts, Learned
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Result, Table
 from chefshat.learn import checkpoint, network
@@ -50,6 +53,9 @@ CONDITIONS: Mapping[str, Condition] = {
     "sees hand and board": Condition(DeepQConfig(see_mask=False)),
     "may not pass idly": Condition(DeepQConfig(wrong_limit=10), idle_pass_is_wrong=True),
 }
+# The row of four agents that do not learn.
+FOUR = "four that never pass idly"
+PAPER = "the 2020 paper"
 # The condition whose networks Experiment 3 starts with.
 FIRST = "sees what is legal"
 REWARDS = "validity"
@@ -58,9 +64,12 @@ DIGEST_LENGTH = 16
 
 
 def run(config: Config, progress: Progress) -> Result:
-    """Runs all conditions with all seeds."""
+    """Runs all conditions with all seeds, and the agents that do not learn."""
     learned = {name: _learn(config, progress, name) for name in CONDITIONS}
     _keep(config, learned[FIRST])
+    others = {name: baselines.play(config, progress, name, rewards=REWARDS, seats=[LEARNER]) for name in baselines.POLICIES}
+    four = baselines.play(config, progress, baselines.NEVER_IDLE, rewards=REWARDS, seats=[LEARNER, *RANDOM])
+    rows: Mapping[str, Counts] = {**learned, **others}
     return Result(
         experiment="rules",
         title="Experiment 2: learning the rules",
@@ -68,9 +77,12 @@ def run(config: Config, progress: Progress) -> Result:
         quick=config.quick,
         settings={name: _settings(config, name) for name in CONDITIONS},
         rules={name: learning.rules_json(each.played) for name, each in learned.items()},
-        tables=[_actions(config, learned), _victories(config, learned)],
+        tables=[_rewards(config, rows), _actions(config, rows), _victories(config, {**rows, FOUR: four})],
         figures=[_figure(learned)],
-        values={name: _values(config, each) for name, each in learned.items()},
+        values={
+            **{name: _values(config, each) for name, each in learned.items()},
+            **{name: baselines.values(config, each) for name, each in {**others, FOUR: four}.items()},
+        },
     )
 
 
@@ -149,85 +161,79 @@ def _trained_by(config: Config, seed: int, digest: str) -> str:
     return f"python -m chefshat.experiments rules --seed {seed} --seeds 1{quick}  # settings {digest}"
 
 
-def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
-    begin, end, width = learning.first(config), learning.last(config), learning.in_words(learning.window(config))
+def _rewards(config: Config, agents: Mapping[str, Counts]) -> Table:
+    width = learning.in_words(learning.window(config))
 
-    def best_random(each: Learned) -> Estimate:
-        return stats.spread(np.max([each.mean_reward(seat) for seat in RANDOM], axis=0).tolist(), digits=2)
+    def mean(counts: Counts, shifts: slice = slice(None)) -> Estimate:
+        return counts.estimate(counts.mean_reward(LEARNER, shifts), digits=2)
 
-    def wrong_of_random(each: Learned) -> list[float]:
-        return [float(mean) for mean in np.mean([each.mean_wrong(seat) for seat in RANDOM], axis=0)]
+    def best_random(counts: Counts) -> Estimate:
+        return counts.estimate(np.max([counts.mean_reward(seat) for seat in RANDOM], axis=0).tolist(), digits=2)
 
-    def compared(each: Learned) -> Estimate:
-        pairs = zip(each.mean_wrong(LEARNER), wrong_of_random(each), strict=True)
-        return stats.spread([mine / theirs for mine, theirs in pairs], percent=True, digits=1)
-
-    def reward(each: Learned, shifts: slice) -> Estimate:
-        return stats.spread(each.mean_reward(LEARNER, shifts), digits=2)
-
-    def row(what: str, printed: Cell, cells: Mapping[str, Cell]) -> list[Cell]:
-        return [what, printed, *(cells[name] for name in learned)]
-
-    rows = [
-        row(
-            "mean reward of the learner", paper.RULES_REWARD_LEARNER, {n: reward(each, slice(None)) for n, each in learned.items()}
-        ),
-        row(f"… in the first {width}", None, {n: reward(each, begin) for n, each in learned.items()}),
-        row(f"… in the last {width}", None, {n: reward(each, end) for n, each in learned.items()}),
-        row(
-            "mean reward of the best random agent", paper.RULES_REWARD_BEST_RANDOM, {n: best_random(e) for n, e in learned.items()}
-        ),
-        row(
-            "wrong actions of the learner, per Shift",
-            None,
-            {n: stats.spread(each.mean_wrong(LEARNER)) for n, each in learned.items()},
-        ),
-        row(
-            f"… in the last {width}",
-            None,
-            {n: stats.spread(each.mean_wrong(LEARNER, end)) for n, each in learned.items()},
-        ),
-        row(
-            "wrong actions of a random agent, per Shift",
-            None,
-            {n: stats.spread(wrong_of_random(each), digits=0) for n, each in learned.items()},
-        ),
-        row(
-            "the learner's wrong actions, as a share of a random agent's",
-            Estimate(paper.RULES_WRONG_ACTIONS_RATIO, percent=True, digits=0),
-            {n: compared(each) for n, each in learned.items()},
-        ),
-        row(
-            f"passes of the learner, as a share of its turns, last {width}",
-            None,
-            {n: stats.spread(each.share_of_turns("passes", LEARNER, end), percent=True) for n, each in learned.items()},
-        ),
+    rows: list[list[Cell]] = [[PAPER, paper.RULES_REWARD_LEARNER, None, None, paper.RULES_REWARD_BEST_RANDOM]]
+    rows += [
+        [name, mean(each), mean(each, learning.first(config)), mean(each, learning.last(config)), best_random(each)]
+        for name, each in agents.items()
     ]
     return Table(
-        name="actions",
-        title=f"Experiment 2: rewards and wrong actions in {learning.shifts_of(config)} Shifts",
-        columns=["", "paper", *learned],
+        name="rewards",
+        title=f"Experiment 2: mean reward of an action in {learning.shifts_of(config)} Shifts",
+        columns=["agent of seat 1", "its mean reward", f"in the first {width}", f"in the last {width}", "of the best random agent"],
         rows=rows,
-        note=f"Means over {len(config.seeds)} seeds; in brackets: minimum and maximum. The mean reward is per action in a "
-        "Shift, averaged over Shifts; the paper prints wrong actions as “almost half”.",
+        note=f"The mean reward is per action in a Shift, averaged over Shifts. {learning.note(config)} {baselines.note(config)}",
     )
 
 
-def _victories(config: Config, learned: Mapping[str, Learned]) -> Table:
-    rows: list[list[Cell]] = [
+def _actions(config: Config, agents: Mapping[str, Counts]) -> Table:
+    end, width = learning.last(config), learning.in_words(learning.window(config))
+
+    def wrong_of_random(counts: Counts) -> list[float]:
+        return [float(mean) for mean in np.mean([counts.mean_wrong(seat) for seat in RANDOM], axis=0)]
+
+    def compared(counts: Counts) -> Estimate:
+        pairs = zip(counts.mean_wrong(LEARNER), wrong_of_random(counts), strict=True)
+        return counts.estimate([mine / theirs for mine, theirs in pairs], percent=True)
+
+    share: Cell = Estimate(paper.RULES_WRONG_ACTIONS_RATIO, percent=True, digits=0)
+    rows: list[list[Cell]] = [[PAPER, None, None, None, share, None]]
+    rows += [
         [
-            f"seat {seat + 1}, {'the learner' if seat == LEARNER else 'random'}",
-            printed,
-            *(learning.count(config, each.wins(seat)) for each in learned.values()),
+            name,
+            each.estimate(each.mean_wrong(LEARNER)),
+            each.estimate(each.mean_wrong(LEARNER, end)),
+            each.estimate(wrong_of_random(each), digits=0),
+            compared(each),
+            each.estimate(each.share_of_turns("passes", LEARNER, end), percent=True),
         ]
-        for seat, printed in enumerate(paper.RULES_WINS)
+        for name, each in agents.items()
+    ]
+    return Table(
+        name="actions",
+        title=f"Experiment 2: wrong actions and passes in {learning.shifts_of(config)} Shifts",
+        columns=[
+            "agent of seat 1",
+            "its wrong actions per Shift",
+            f"in the last {width}",
+            "of a random agent",
+            "its share of those",
+            f"its passes, of turns, last {width}",
+        ],
+        rows=rows,
+        note="The paper prints wrong actions as “almost half” of a random agent's.",
+    )
+
+
+def _victories(config: Config, agents: Mapping[str, Counts]) -> Table:
+    rows: list[list[Cell]] = [[learning.of_all(config, PAPER), *paper.RULES_WINS]]
+    rows += [
+        [name, *(learning.count(config, each, each.wins(seat)) for seat in (LEARNER, *RANDOM))] for name, each in agents.items()
     ]
     return Table(
         name="victories",
         title=f"Experiment 2: Shifts won of {learning.shifts_of(config)}",
-        columns=["", learning.of_all(config, "paper"), *learned],
+        columns=["agent of seat 1", "seat 1", "seat 2, random", "seat 3, random", "seat 4, random"],
         rows=rows,
-        note="Means over the seeds; in brackets: minimum and maximum. The paper speaks of 100 simulations here; its numbers add "
+        note=f"In the row “{FOUR}” the other seats have that agent, too. The paper speaks of 100 simulations here; its numbers add "
         "up to 250.",
     )
 

@@ -1,5 +1,6 @@
-"""Confidence intervals and ranges for the figures of the experiments."""
+"""Confidence intervals, standard errors and ranges for the figures of the experiments."""
 
+import dataclasses
 from collections.abc import Sequence
 from math import sqrt
 
@@ -41,13 +42,37 @@ def mean(values: npt.ArrayLike, *, digits: int = 1) -> Estimate:
 
 
 def spread(values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
-    """Returns the mean over repetitions (seeds), with the minimum and the maximum."""
+    """Returns the mean over repetitions (seeds), with its standard error, the minimum and the maximum."""
     if not values:
         raise ValueError("a spread of nothing")
     array = np.asarray(values, dtype=np.float64)
     # Rounding may put the mean of equal numbers below them.
     middle = float(np.clip(array.mean(), array.min(), array.max()))
-    return Estimate(middle, float(array.min()), float(array.max()), percent=percent, digits=digits)
+    return Estimate(middle, float(array.min()), float(array.max()), percent=percent, digits=digits, error=standard_error(array))
+
+
+def clustered(values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
+    """Returns the mean over games with its standard error. Games are independent; the Shifts of a game need not be."""
+    return dataclasses.replace(spread(values, percent=percent, digits=digits), low=None, high=None)
+
+
+def standard_error(values: npt.ArrayLike) -> float | None:
+    """Returns the standard error of the mean of independent values; None for a single value."""
+    array = np.asarray(values, dtype=np.float64)
+    return float(array.std(ddof=1)) / sqrt(array.size) if array.size > 1 else None
+
+
+def cluster_ratio(values: npt.ArrayLike) -> float:
+    """Returns the standard error of the mean if only clusters are independent, as a multiple of that if all values are.
+
+    Args:
+        values: (clusters, values of each), at least two of each, not all equal.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    by_cluster, alone = standard_error(array.mean(axis=1)), standard_error(array)
+    if not by_cluster or not alone:
+        raise ValueError("the ratio needs two clusters of values that differ")
+    return by_cluster / alone
 
 
 def band(label: str, x: Sequence[float], runs: npt.ArrayLike) -> Line:

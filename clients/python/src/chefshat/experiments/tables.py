@@ -43,7 +43,7 @@ def markdown(table: Table) -> str:
 
 
 def show(cell: Cell) -> str:
-    """Formats a cell: an estimate as "28.4% (27.9-28.9)", with an en dash."""
+    """Formats a cell: an estimate as "28.4% (27.9-28.9)", with an en dash, or as "28.4 ± 0.3%"."""
     if cell is None:
         return DASH
     if isinstance(cell, Estimate):
@@ -64,6 +64,8 @@ def _estimate(estimate: Estimate) -> str:
 
     unit = "%" if estimate.percent else ""
     shown = number(estimate.value) + unit
+    if estimate.error is not None:
+        shown = f"{number(estimate.value)} ± {number(estimate.error)}{unit}"
     if estimate.low is None or estimate.high is None:
         return shown
     # A dash next to a minus sign is hard to read.

@@ -170,7 +170,7 @@ def play(
     seat_index = np.zeros(env.players, np.int32)
     seat_index[list(env.client_seats)] = np.arange(seats)
     stack = LockStep(config, agents, env.games, explore=explore, learn=learn)
-    log = _Log(env)
+    log = ShiftLog(env)
     batch = env.reset()
     while True:
         advance(log.add(batch))
@@ -183,7 +183,7 @@ def play(
         states = features.classic_of(batch)
         masks = states[:, -config.outputs :] != 0
         if idle_pass_is_wrong:
-            masks = _without_idle_passes(masks)
+            masks = without_idle_passes(masks)
         actions = stack.decide(
             _ids(batch.games, seat_index[batch.seats], seats), batch.rewards, states, masks, batch.attempts.astype(np.int32)
         )
@@ -191,8 +191,8 @@ def play(
         batch = env.step(_wrong_as_illegal(actions, masks) if idle_pass_is_wrong else actions)
 
 
-class _Log:
-    """Collects the statistics of the Shifts."""
+class ShiftLog:
+    """Collects the statistics of every Shift of an env with Shift statistics and `total_games` equal to `games`."""
 
     def __init__(self, env: VectorEnv) -> None:
         self._env = env
@@ -240,7 +240,7 @@ def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:
         raise ValueError("the rule set must end the game after a number of Shifts (target_shifts)")
 
 
-def _without_idle_passes(masks: Mask) -> Mask:
+def without_idle_passes(masks: Mask) -> Mask:
     """Removes the pass from the legal actions where another action is legal."""
     right = masks.copy()
     right[:, -1] &= masks.sum(axis=1) == 1
