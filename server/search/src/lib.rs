@@ -1,0 +1,13 @@
+//! Search in games with hidden hands: deals that are consistent with what a seat knows, games played
+//! on from them, and what its actions are worth. `docs/search.md` says how it works and what is
+//! exact.
+
+mod history;
+mod holders;
+mod knowledge;
+mod sampler;
+mod table;
+
+pub use history::ShiftHistory;
+pub use knowledge::{Knowledge, KnowledgeError, World};
+pub use sampler::{Chance, Sampler};

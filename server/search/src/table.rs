@@ -1,0 +1,402 @@
+//! Counts the deals that the holders of hidden cards allow, kind by kind, and draws one of them.
+//!
+//! A deal gives each physical card to a holder. All cards of a kind are alike, so a way to split a
+//! kind counts as often as there are physical cards to make it: n! / (k1! k2! …). A state says how
+//! many cards each holder has been dealt of the kinds so far, and how many cards each hidden
+//! chooser gave. [`Table::completions`] is the number of ways to deal the remaining kinds.
+
+use std::ops::ControlFlow;
+
+use crate::KnowledgeError;
+use crate::holders::{Dealt, Holders, MAX_KINDS};
+
+/// The most numbers in a state: five seats, the cards set aside, and the gifts of two pairs.
+const MAX_VARIABLES: usize = 8;
+/// A number of the state, for each variable.
+type State = [u8; MAX_VARIABLES];
+
+/// What a variable of a state counts.
+#[derive(Clone, Debug)]
+struct Variable {
+    /// Its range before each kind, and after the last.
+    ranges: Vec<(u8, u8)>,
+    /// The step of its value in the index of a state; 0 if the others determine it.
+    stride: Vec<usize>,
+}
+
+/// One way to split a kind among the holders.
+#[derive(Copy, Clone, Debug)]
+pub(crate) struct Split {
+    /// The state with this kind dealt.
+    pub(crate) next: State,
+    /// Variable of the holder that is dealt the Golden card.
+    pub(crate) golden: Option<u8>,
+    weight: f64,
+}
+
+/// The deals that are possible.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    holders: Holders,
+    variables: Vec<Variable>,
+    /// Of each kind, the number of completions of each state; NaN if not counted yet.
+    layers: Vec<Vec<f64>>,
+    steps: u64,
+    max_steps: u64,
+}
+
+impl Table {
+    /// Counts the deals.
+    ///
+    /// # Errors
+    /// If that takes more than `max_steps` steps.
+    pub(crate) fn new(holders: Holders, max_steps: u64) -> Result<Table, KnowledgeError> {
+        let mut table = Table {
+            variables: variables(&holders),
+            holders,
+            layers: Vec::new(),
+            steps: 0,
+            max_steps,
+        };
+        if !table.is_feasible() {
+            return Ok(table);
+        }
+        for kind in 0..=table.holders.kinds() {
+            let size = table.index_layer(kind);
+            if size as u64 > max_steps {
+                return Err(KnowledgeError::TooManySteps(max_steps));
+            }
+            table.layers.push(vec![f64::NAN; size]);
+        }
+        table.count(0, State::default())?;
+        Ok(table)
+    }
+
+    /// The number of ways to deal the hidden cards and to choose the hidden gifts, physical cards
+    /// told apart.
+    pub(crate) fn ways(&self) -> f64 {
+        if !self.is_feasible() {
+            return 0.0;
+        }
+        let orders: f64 = (0..self.holders.kinds())
+            .map(|kind| factorial(self.holders.hidden_of(kind).plain))
+            .product();
+        self.completions(0, &State::default()) * orders
+    }
+
+    /// Draws a deal: calls `take` with each kind, the state before it, and how it is split.
+    /// `uniform` gives numbers from 0 to below 1.
+    ///
+    /// # Panics
+    /// If there is no deal.
+    pub(crate) fn draw(
+        &self,
+        mut uniform: impl FnMut() -> f64,
+        mut take: impl FnMut(usize, &State, &Split),
+    ) {
+        let mut state = State::default();
+        for kind in 0..self.holders.kinds() {
+            let mut rest = uniform() * self.completions(kind, &state);
+            let mut chosen = None;
+            let _ = self.splits(kind, &state, &mut |split| {
+                let ways = split.weight * self.completions(kind + 1, &split.next);
+                if ways > 0.0 {
+                    chosen = Some(split);
+                    rest -= ways;
+                    if rest < 0.0 {
+                        return ControlFlow::Break(());
+                    }
+                }
+                ControlFlow::Continue(())
+            });
+            let split = chosen.expect("there is a deal");
+            take(kind, &state, &split);
+            state = split.next;
+        }
+    }
+
+    /// The holders.
+    pub(crate) fn holders(&self) -> &Holders {
+        &self.holders
+    }
+
+    fn is_feasible(&self) -> bool {
+        self.variables
+            .iter()
+            .all(|variable| variable.ranges.iter().all(|(low, high)| low <= high))
+    }
+
+    /// Lays out the states before a kind, and returns how many there are.
+    fn index_layer(&mut self, kind: usize) -> usize {
+        let width = |variable: &Variable| {
+            let (low, high) = variable.ranges[kind];
+            usize::from(high - low) + 1
+        };
+        // The cards dealt so far are known, so the widest holder's number follows from the others.
+        let holders = self.holders.pairs.len() * 2 + self.holders.singles.len();
+        let widest = (0..holders).max_by_key(|&holder| width(&self.variables[holder]));
+        let mut size = 1usize;
+        for (index, variable) in self.variables.iter_mut().enumerate() {
+            if Some(index) == widest {
+                variable.stride.push(0);
+            } else {
+                variable.stride.push(size);
+                size = size.saturating_mul(width(variable));
+            }
+        }
+        size
+    }
+
+    fn index(&self, kind: usize, state: &State) -> usize {
+        self.variables
+            .iter()
+            .zip(state)
+            .map(|(variable, &value)| {
+                usize::from(value - variable.ranges[kind].0) * variable.stride[kind]
+            })
+            .sum()
+    }
+
+    fn completions(&self, kind: usize, state: &State) -> f64 {
+        self.layers[kind][self.index(kind, state)]
+    }
+
+    /// Counts the completions of a state.
+    fn count(&mut self, kind: usize, state: State) -> Result<f64, KnowledgeError> {
+        let index = self.index(kind, &state);
+        let known = self.layers[kind][index];
+        if !known.is_nan() {
+            return Ok(known);
+        }
+        let mut sum = 0.0;
+        if kind == self.holders.kinds() {
+            sum = 1.0;
+        } else {
+            let mut splits = Vec::new();
+            let _ = self.splits(kind, &state, &mut |split| {
+                splits.push((split.next, split.weight));
+                ControlFlow::Continue(())
+            });
+            self.steps += splits.len() as u64 + 1;
+            if self.steps > self.max_steps {
+                return Err(KnowledgeError::TooManySteps(self.max_steps));
+            }
+            for (next, weight) in splits {
+                sum += weight * self.count(kind + 1, next)?;
+            }
+        }
+        self.layers[kind][index] = sum;
+        Ok(sum)
+    }
+
+    /// Calls `found` with every way to split a kind among the holders.
+    fn splits(
+        &self,
+        kind: usize,
+        state: &State,
+        found: &mut impl FnMut(Split) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let start = Split {
+            next: *state,
+            golden: None,
+            weight: 1.0,
+        };
+        self.split_among(kind, state, 0, self.holders.hidden_of(kind), start, found)
+    }
+
+    /// Splits what is `left` of a kind among the holders from a block on. Blocks are the pairs, then
+    /// the singles.
+    fn split_among(
+        &self,
+        kind: usize,
+        state: &State,
+        block: usize,
+        left: Dealt,
+        so_far: Split,
+        found: &mut impl FnMut(Split) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let (pairs, faces) = (&self.holders.pairs, self.holders.faces);
+        let blocks = pairs.len() + self.holders.singles.len();
+        if block == blocks {
+            return if left.total() == 0 {
+                found(so_far)
+            } else {
+                ControlFlow::Continue(())
+            };
+        }
+        let is_last = block + 1 == blocks;
+        if let Some(pair) = pairs.get(block) {
+            let [chooser, forced, gifts] = [2 * block, 2 * block + 1, self.gifts_variable(block)];
+            let due = pair.count - pair.count.min(state[forced]);
+            for first in portions(left, false) {
+                let Some(next) = self.dealt(kind, &so_far, chooser, first) else {
+                    continue;
+                };
+                for second in portions(remainder(left, first), is_last) {
+                    let Some(mut next) = self.dealt(kind, &next, forced, second) else {
+                        continue;
+                    };
+                    for given in 0..=first.total().min(pair.count - state[gifts]) {
+                        if !pair.allows(kind, faces, [first, second], given, due) {
+                            continue;
+                        }
+                        let total = state[gifts] + given;
+                        if !self.is_in_range(kind, gifts, total) {
+                            continue;
+                        }
+                        next.next[gifts] = total;
+                        let rest = remainder(remainder(left, first), second);
+                        let weighted = Split {
+                            weight: next.weight * choose(first.total(), given),
+                            ..next
+                        };
+                        self.split_among(kind, state, block + 1, rest, weighted, found)?;
+                    }
+                }
+            }
+        } else {
+            let single = &self.holders.singles[block - pairs.len()];
+            let variable = block + pairs.len();
+            for dealt in portions(left, is_last) {
+                if !single.allows(kind, faces, dealt) {
+                    continue;
+                }
+                if let Some(next) = self.dealt(kind, &so_far, variable, dealt) {
+                    let rest = remainder(left, dealt);
+                    self.split_among(kind, state, block + 1, rest, next, found)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The variable of the gifts of a pair.
+    pub(crate) fn gifts_variable(&self, pair: usize) -> usize {
+        self.holders.pairs.len() * 2 + self.holders.singles.len() + pair
+    }
+
+    /// A split with cards dealt to a holder; `None` if that leads nowhere.
+    fn dealt(&self, kind: usize, so_far: &Split, variable: usize, dealt: Dealt) -> Option<Split> {
+        let mut split = *so_far;
+        let value = split.next[variable] + dealt.total();
+        split.next[variable] = value;
+        split.weight *= INVERSE_FACTORIALS[usize::from(dealt.plain)];
+        if dealt.golden {
+            split.golden = Some(variable as u8);
+        }
+        self.is_in_range(kind, variable, value).then_some(split)
+    }
+
+    /// Whether a variable may have this value after a kind.
+    fn is_in_range(&self, kind: usize, variable: usize, value: u8) -> bool {
+        let (low, high) = self.variables[variable].ranges[kind + 1];
+        (low..=high).contains(&value)
+    }
+}
+
+/// The ways to take a part of the cards of a kind; only all of them if `all`.
+fn portions(left: Dealt, all: bool) -> impl Iterator<Item = Dealt> {
+    let fewest = if all { left.plain } else { 0 };
+    let plain = move |golden| (fewest..=left.plain).map(move |plain| Dealt { plain, golden });
+    let without = (!all || !left.golden).then(|| plain(false));
+    let with = left.golden.then(|| plain(true));
+    without.into_iter().chain(with).flatten()
+}
+
+fn remainder(left: Dealt, taken: Dealt) -> Dealt {
+    Dealt {
+        plain: left.plain - taken.plain,
+        golden: left.golden && !taken.golden,
+    }
+}
+
+/// The variables of the holders, in the order pairs (chooser, forced giver), singles, gifts of
+/// pairs.
+fn variables(holders: &Holders) -> Vec<Variable> {
+    let kinds = holders.kinds();
+    let all = |kind: usize| {
+        let hidden = holders.hidden_of(kind);
+        (0..=hidden.plain)
+            .flat_map(move |plain| [false, hidden.golden].map(|golden| Dealt { plain, golden }))
+    };
+    let mut variables = Vec::new();
+    for pair in &holders.pairs {
+        for after in &pair.after {
+            // Cards that were played may have been received.
+            let least = |kind: usize| after.played[kind].saturating_sub(pair.count);
+            variables.push(ranges(pair.size, kinds, least));
+        }
+    }
+    for single in &holders.singles {
+        let least = |kind: usize| {
+            all(kind)
+                .filter(|dealt| single.allows(kind, holders.faces, *dealt))
+                .map(Dealt::total)
+                .min()
+                // No number of cards fits.
+                .unwrap_or(single.size + 1)
+        };
+        variables.push(ranges(single.size, kinds, least));
+    }
+    for pair in &holders.pairs {
+        let mut range = vec![(0, pair.count); kinds + 1];
+        range[0] = (0, 0);
+        range[kinds] = (pair.count, pair.count);
+        variables.push(Variable {
+            ranges: range,
+            stride: Vec::new(),
+        });
+    }
+    variables
+}
+
+/// The ranges of the number of cards dealt to a holder of `size` cards, at least `least` of each
+/// kind. Some range is empty if there is no way.
+fn ranges(size: u8, kinds: usize, least: impl Fn(usize) -> u8) -> Variable {
+    let least: Vec<u8> = (0..kinds).map(least).collect();
+    let sum = |kinds: &[u8]| {
+        kinds
+            .iter()
+            .fold(0u8, |sum, &count| sum.saturating_add(count))
+    };
+    let ranges = (0..=kinds).map(|kind| {
+        let (before, from) = least.split_at(kind);
+        match size.checked_sub(sum(from)) {
+            // Before the first kind nothing is dealt, after the last everything.
+            Some(_) if kind == 0 => (0, 0),
+            Some(high) if kind == kinds => (high, if sum(before) <= size { high } else { 0 }),
+            Some(high) => (sum(before), high),
+            None => (1, 0),
+        }
+    });
+    Variable {
+        ranges: ranges.collect(),
+        stride: Vec::new(),
+    }
+}
+
+const MAX_CARDS: usize = MAX_KINDS;
+
+const INVERSE_FACTORIALS: [f64; MAX_CARDS] = {
+    let mut table = [1.0; MAX_CARDS];
+    let mut n = 1;
+    while n < MAX_CARDS {
+        table[n] = table[n - 1] / n as f64;
+        n += 1;
+    }
+    table
+};
+
+fn factorial(n: u8) -> f64 {
+    1.0 / INVERSE_FACTORIALS[usize::from(n)]
+}
+
+/// The number of ways to choose `k` of `n`, with `k` at most 2.
+fn choose(n: u8, k: u8) -> f64 {
+    let n = f64::from(n);
+    match k {
+        0 => 1.0,
+        1 => n,
+        _ => n * (n - 1.0) / 2.0,
+    }
+}

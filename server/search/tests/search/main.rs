@@ -1,0 +1,5 @@
+//! Tests of the crate's public interface: one binary.
+
+mod enumeration;
+mod sampler;
+mod scenario;
