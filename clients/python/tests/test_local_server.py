@@ -1,11 +1,13 @@
 """The local server: finding the program, the error without it, and stopping with the process."""
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -53,6 +55,8 @@ def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.delenv(BINARY, raising=False)
     monkeypatch.setenv("PATH", str(folder))
     monkeypatch.setattr(local_server, "_cargo_targets", list)
+    # As if the package chefshat-server were not installed.
+    monkeypatch.setitem(sys.modules, "chefshat_server", None)
     return folder
 
 
@@ -63,6 +67,9 @@ def test_the_program_is_searched_in_this_order(nowhere: Path, tmp_path: Path, mo
     assert local_server.find_binary() == new
     on_the_path = program(nowhere / "chefshat", "exit 0")
     assert local_server.find_binary() == on_the_path
+    installed = program(tmp_path / "installed", "exit 0")
+    monkeypatch.setitem(sys.modules, "chefshat_server", SimpleNamespace(find_binary=lambda: installed))
+    assert local_server.find_binary() == installed
     named = program(tmp_path / "mine", "exit 0")
     monkeypatch.setenv(BINARY, str(named))
     assert local_server.find_binary() == named
@@ -71,7 +78,7 @@ def test_the_program_is_searched_in_this_order(nowhere: Path, tmp_path: Path, mo
 def test_a_missing_program_is_reported_with_a_remedy(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     makers: list[Callable[[], object]] = [LocalServer, chefshat.VectorEnv, lambda: chefshat.make("vector")]
     for make in makers:
-        with pytest.raises(ChefsHatError, match=rf"BINARY_MISSING.*cargo build.*{BINARY}.*address"):
+        with pytest.raises(ChefsHatError, match=rf"BINARY_MISSING.*pip install.*{BINARY}.*cargo build.*address"):
             make()
     monkeypatch.setenv(BINARY, "/no/such/program")
     with pytest.raises(ChefsHatError, match=rf"{BINARY} names /no/such/program"):
@@ -137,3 +144,18 @@ def test_the_shared_server_stops_with_its_process(way: str) -> None:
     # The server's parent has ended, so the test can only wait for its absence.
     watch = f"while kill -0 {process} 2>/dev/null; do sleep 0.05; done"
     subprocess.run(["sh", "-c", watch], check=True, timeout=WAIT_S)
+
+
+def test_the_package_of_the_server_finds_its_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "server" / "src"))
+    package = importlib.import_module("chefshat_server")
+    scripts = tmp_path / "scripts"
+    scripts.mkdir()
+    monkeypatch.setattr("sysconfig.get_path", lambda name, scheme=None: str(scripts if scheme is None else tmp_path))
+    with pytest.raises(FileNotFoundError, match=f"none of {scripts}.*pip install"):
+        package.find_binary()
+    (scripts / "chefshat").touch()
+    with pytest.raises(FileNotFoundError):
+        package.find_binary()
+    executable = program(scripts / "chefshat", "exit 0")
+    assert package.find_binary() == executable

@@ -28,7 +28,7 @@ _NAME = "chefshat.exe" if os.name == "nt" else "chefshat"
 
 
 def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a running server") -> Path:
-    """Finds the program: `CHEFSHAT_BIN`, else `chefshat` on the PATH, else the latest build of the repository.
+    """Finds the program: `CHEFSHAT_BIN`, the package chefshat-server, `chefshat` on the PATH, or the latest build of the repository.
 
     The repository is the one that contains this package, else the one that contains the working directory.
 
@@ -45,6 +45,9 @@ def find_binary(purpose: str = SERVING, instead: str = "; or give the address of
         if found is None:
             raise ChefsHatError("BINARY_MISSING", f"the environment variable {BINARY} names {named}, which is not a program")
         return Path(found)
+    installed = _installed()
+    if installed is not None:
+        return installed
     found = shutil.which("chefshat")
     if found is not None:
         return Path(found)
@@ -53,9 +56,21 @@ def find_binary(purpose: str = SERVING, instead: str = "; or give the address of
         return max(built, key=lambda path: path.stat().st_mtime)
     raise ChefsHatError(
         "BINARY_MISSING",
-        f"the program chefshat is required to {purpose}. Build it (in the repository: cargo build --release --bin chefshat), then "
-        f"run this in the repository, put the program on the PATH or set the environment variable {BINARY}{instead}",
+        f"the program chefshat is required to {purpose}. Install it (pip install 'chefshat[server]'), put it on the PATH, set "
+        f"the environment variable {BINARY}, or build it (cargo build --release --bin chefshat) and run this in the repository{instead}",
     )
+
+
+def _installed() -> Path | None:
+    """Returns the program of the package chefshat-server, if that is installed."""
+    try:
+        import chefshat_server
+    except ModuleNotFoundError:
+        return None
+    try:
+        return chefshat_server.find_binary()
+    except FileNotFoundError as error:
+        raise ChefsHatError("BINARY_MISSING", str(error)) from error
 
 
 def _cargo_targets() -> list[Path]:
