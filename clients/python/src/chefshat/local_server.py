@@ -28,7 +28,7 @@ _NAME = "chefshat.exe" if os.name == "nt" else "chefshat"
 
 
 def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a running server") -> Path:
-    """Finds the program: `CHEFSHAT_BIN`, the package chefshat-server, `chefshat` on the PATH, or the latest build of the repository.
+    """Finds the program: `CHEFSHAT_BIN`, the package chefshat-server, `chefshat` on the PATH, or the repository's latest build.
 
     The repository is the one that contains this package, else the one that contains the working directory.
 
@@ -56,8 +56,9 @@ def find_binary(purpose: str = SERVING, instead: str = "; or give the address of
         return max(built, key=lambda path: path.stat().st_mtime)
     raise ChefsHatError(
         "BINARY_MISSING",
-        f"the program chefshat is required to {purpose}. Install it (pip install 'chefshat[server]'), put it on the PATH, set "
-        f"the environment variable {BINARY}, or build it (cargo build --release --bin chefshat) and run this in the repository{instead}",
+        f"the program chefshat is required to {purpose}. Install it (pip install 'chefshat[server]'), put it on the PATH, "
+        f"set the environment variable {BINARY}, or build it (cargo build --release --bin chefshat) and run this in the "
+        f"repository{instead}",
     )
 
 
