@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import chefshat
 
 SOURCE = Path(chefshat.__file__).parents[1]
@@ -62,6 +64,7 @@ def test_what_needs_a_server_says_what_to_install() -> None:
 
 
 def test_gymnasium_finds_the_environments_by_name() -> None:
+    pytest.importorskip("gymnasium")
     # What chefshat.pth does when Python starts.
     start = "import chefshat.registration; chefshat.registration.when_imported()\n"
     specs = "print(*(gymnasium.spec('chefshat/ChefsHat-v1').entry_point.split(':')), sep='\\n')"

@@ -1,7 +1,7 @@
-//! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, and builds the
-//! page.
+//! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, builds the
+//! page, and wheels.
 //!
-//! The command line is here; [`lint`], [`test`] and [`web`] are the tasks, [`setup`] prepares them.
+//! The command line is here; [`lint`], [`test`], [`web`] and [`wheels`] are the tasks, [`setup`] prepares them.
 //! It depends on no crate of the project: it only starts other programs, and builds even if they do
 //! not.
 
@@ -15,6 +15,7 @@ mod setup;
 mod steps;
 mod test;
 mod web;
+mod wheels;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,15 @@ enum Task {
     Lint,
     /// Build the page for people, which the server serves on its port.
     Web,
+    /// Build the wheels of the Python packages, into `target/wheels`.
+    Wheels {
+        /// Cargo's profile for the program and the native module; `release` builds faster.
+        #[arg(long, default_value = "dist")]
+        profile: String,
+        /// Install them in an empty environment, without Rust and this repository, and use them.
+        #[arg(long = "try")]
+        try_them: bool,
+    },
 }
 
 fn main() -> ExitCode {
@@ -59,6 +69,7 @@ fn main() -> ExitCode {
         Task::Test { only, slow } => test::run(&places, &mut steps, only, slow),
         Task::Lint => lint::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
+        Task::Wheels { profile, try_them } => wheels::run(&places, &mut steps, &profile, try_them),
     });
     print!("{}", steps.summary());
     match outcome {

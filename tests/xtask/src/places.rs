@@ -110,6 +110,21 @@ impl Places {
         self.own.join("tools")
     }
 
+    /// Virtual environment of the builders of wheels in wheels.txt.
+    pub(crate) fn wheel_tools(&self) -> PathBuf {
+        self.own.join("wheel-tools")
+    }
+
+    /// Where wheels are put.
+    pub(crate) fn wheels(&self) -> PathBuf {
+        self.target.join("wheels")
+    }
+
+    /// Virtual environment with the oldest or newest versions that the Python SDK works with.
+    pub(crate) fn versions(&self, which: &str) -> PathBuf {
+        self.own.join(format!("venv-{which}"))
+    }
+
     /// Where `cargo install` puts checkers written in Rust.
     pub(crate) fn cargo_tools(&self) -> PathBuf {
         self.own.join("tools-cargo")

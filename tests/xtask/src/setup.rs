@@ -40,13 +40,26 @@ pub(crate) fn python_packages(places: &Places) -> Result<(), Failure> {
 
 /// The checkers of tools.txt, in their own environment.
 pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
-    let list = places.root.join("tests/xtask/tools.txt");
+    listed(places, "tests/xtask/tools.txt", &places.tools())
+}
+
+/// The builders of wheels.txt, in their own environment.
+pub(crate) fn wheel_tools(places: &Places) -> Result<(), Failure> {
+    listed(places, "tests/xtask/wheels.txt", &places.wheel_tools())
+}
+
+/// The oldest or newest versions that the Python SDK works with, in their own environment.
+pub(crate) fn versions(places: &Places, which: &str) -> Result<(), Failure> {
+    let list = format!("clients/python/tests/{which}.txt");
+    listed(places, &list, &places.versions(which))
+}
+
+/// An environment with the packages of a list.
+fn listed(places: &Places, list: &str, folder: &Path) -> Result<(), Failure> {
+    let list = places.root.join(list);
     let made_from = fs::read_to_string(&list).map_err(|error| at(&list, &error))?;
-    venv(
-        &places.tools(),
-        &made_from,
-        &["--requirement", &list.to_string_lossy()],
-    )
+    let install = ["--requirement", &list.to_string_lossy()];
+    venv(folder, &made_from, &install)
 }
 
 /// The JavaScript agent, with its modules.

@@ -90,7 +90,13 @@ pub(crate) fn run(
             let packages = (places.python_packages().into_iter())
                 .filter(|package| *package != DEPLOYMENT)
                 .map(|package| pytest(places, package, &[]));
-            steps.programs(packages.collect())?;
+            let mut tests: Vec<_> = packages.collect();
+            for which in VERSIONS {
+                let set_up = || setup::versions(places, which);
+                steps.run(&format!("set up the {which} versions"), set_up)?;
+                tests.push(pytest_with(places, which));
+            }
+            steps.programs(tests)?;
             lint::python(places, steps)?;
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
@@ -127,6 +133,24 @@ pub(crate) fn run(
         }
     }
     Ok(())
+}
+
+/// The ends of the ranges of versions that the Python SDK works with.
+const VERSIONS: [&str; 2] = ["oldest", "newest"];
+
+/// Tests of the Python SDK that use each of its dependencies, with other versions of those.
+fn pytest_with(places: &Places, versions: &str) -> (String, Command) {
+    let mut pytest = Command::new(places.versions(versions).join("bin/python"));
+    pytest.current_dir(places.root.join("clients/python"));
+    pytest.env("PYTHONPATH", "src");
+    pytest.env("PYTHONPYCACHEPREFIX", places.own.join("pycache"));
+    // A warning of protobuf about versions is an error.
+    pytest.args(["-W", "error::UserWarning", "-m", "pytest"]);
+    pytest.args(["-p", "no:cacheprovider", "-m", "not server"]);
+    for module in ["imports", "vector", "decision", "errors", "play"] {
+        pytest.arg(format!("tests/test_{module}.py"));
+    }
+    (format!("pytest, the {versions} versions"), pytest)
 }
 
 /// The tests of a Python package, with the name of the step.
