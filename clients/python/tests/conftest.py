@@ -69,6 +69,15 @@ def address(request: pytest.FixtureRequest) -> str:
     return str(request.getfixturevalue("real_address"))
 
 
+@pytest.fixture(params=["native", pytest.param("server", marks=pytest.mark.server)])
+def anywhere(request: pytest.FixtureRequest) -> str | None:
+    """The address of a `VectorEnv`: the test runs once in this process and once on the real server."""
+    if request.param == "native":
+        pytest.importorskip("chefshat_native")
+        return None
+    return str(request.getfixturevalue("real_address"))
+
+
 @pytest.fixture
 def processes() -> Iterator[list[subprocess.Popen[str]]]:
     """A list for processes a test starts; those still running after it are killed."""

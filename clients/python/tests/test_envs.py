@@ -32,11 +32,10 @@ FORMS: list[Any] = ["classic", "table", "columns", hands]
 NAMES = ["classic", "table", "columns", "own"]
 
 
-@pytest.mark.server
 @pytest.mark.parametrize("episode", ["shift", "game"])
 @pytest.mark.parametrize("observation", FORMS, ids=NAMES)
-def test_the_gymnasium_checker_passes(real_address: str, observation: Any, episode: str) -> None:
-    env = gymnasium.make(ENV_ID, address=real_address, observation=observation, episode=episode)
+def test_the_gymnasium_checker_passes(anywhere: str | None, observation: Any, episode: str) -> None:
+    env = gymnasium.make(ENV_ID, address=anywhere, observation=observation, episode=episode)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # The range of a custom function is unknown.
@@ -46,12 +45,11 @@ def test_the_gymnasium_checker_passes(real_address: str, observation: Any, episo
     env.close()
 
 
-@pytest.mark.server
 @pytest.mark.parametrize("episode", ["shift", "game"])
 @pytest.mark.parametrize("observation", FORMS, ids=NAMES)
-def test_the_pettingzoo_checker_passes(real_address: str, observation: Any, episode: str) -> None:
+def test_the_pettingzoo_checker_passes(anywhere: str | None, observation: Any, episode: str) -> None:
     def make(**options: Any) -> Any:
-        return chefshat_v1.env(real_address, observation=observation, episode=episode, **options)
+        return chefshat_v1.env(anywhere, observation=observation, episode=episode, **options)
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -67,9 +65,8 @@ def test_the_pettingzoo_checker_passes(real_address: str, observation: Any, epis
     assert "takes a turn" in printed.getvalue()
 
 
-@pytest.mark.server
-def test_a_random_agent_plays_complete_games(real_address: str) -> None:
-    env = chefshat.make("gymnasium", address=real_address, episode="game", rewards="points", render_mode="ansi")
+def test_a_random_agent_plays_complete_games(anywhere: str | None) -> None:
+    env = chefshat.make("gymnasium", address=anywhere, episode="game", rewards="points", render_mode="ansi")
     env.action_space.seed(1)
     _, info = env.reset(seed=1)
     total, ended = 0.0, False
@@ -88,10 +85,9 @@ def test_a_random_agent_plays_complete_games(real_address: str) -> None:
     env.close()
 
 
-@pytest.mark.server
-def test_the_vector_environment_equals_many_single_ones(real_address: str) -> None:
+def test_the_vector_environment_equals_many_single_ones(anywhere: str | None) -> None:
     games = 3
-    options: dict[str, Any] = {"address": real_address, "opponents": "greedy", "observation": "columns", "rewards": "paper"}
+    options: dict[str, Any] = {"address": anywhere, "opponents": "greedy", "observation": "columns", "rewards": "paper"}
     vector = gymnasium.make_vec(ENV_ID, num_envs=games, **options)
     assert vector.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     observed, infos = vector.reset(seed=11)
@@ -129,14 +125,13 @@ def test_the_vector_environment_equals_many_single_ones(real_address: str) -> No
     vector.close()
 
 
-@pytest.mark.server
-def test_observation_forms(real_address: str) -> None:
-    with chefshat.VectorEnv(real_address, seed=3) as env:
+def test_observation_forms(anywhere: str | None) -> None:
+    with chefshat.VectorEnv(anywhere, seed=3) as env:
         seen = env.batch
         sizes = env.sizes
         classic = features.classic(seen.observations, seen.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
         for observation, wanted in [("classic", classic[0]), (hands, seen.observations.hands[0])]:
-            one = chefshat.make(address=real_address, observation=observation, seat=int(seen.seats[0]), seed=3)
+            one = chefshat.make(address=anywhere, observation=observation, seat=int(seen.seats[0]), seed=3)
             assert one.reset()[0].tolist() == wanted.tolist()
             one.close()
 
@@ -315,10 +310,9 @@ def test_a_missing_extra_is_named(missing: str, use: str) -> None:
     assert "pip install 'chefshat[envs]'" in done.stderr
 
 
-@pytest.mark.server
-def test_a_shift_adjudicated_at_the_turn_limit_terminates(real_address: str) -> None:
+def test_a_shift_adjudicated_at_the_turn_limit_terminates(anywhere: str | None) -> None:
     """It awards places and points by the rules, so it is not truncated."""
-    env = ChefsHatEnv(real_address, rules={"max_turns": 6}, rewards="points")
+    env = ChefsHatEnv(anywhere, rules={"max_turns": 6}, rewards="points")
     _, info = env.reset(seed=1)
     terminated = truncated = False
     while not (terminated or truncated):

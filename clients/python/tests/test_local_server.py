@@ -27,9 +27,9 @@ from chefshat import local_server
 
 address = local_server.shared_address()
 assert local_server.shared_address() == address
-with chefshat.VectorEnv() as env:
+with chefshat.VectorEnv("local") as env:
     assert env.server.address == address
-env = chefshat.make()
+env = chefshat.make(address="local")
 assert env.unwrapped.vector.server.address == address
 env.reset()
 print(address, local_server._shared._process.pid, flush=True)
@@ -57,6 +57,7 @@ def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr(local_server, "_cargo_targets", list)
     # As if the package chefshat-server were not installed.
     monkeypatch.setitem(sys.modules, "chefshat_server", None)
+    monkeypatch.setattr(local_server, "_shared", None)
     return folder
 
 
@@ -76,7 +77,11 @@ def test_the_program_is_searched_in_this_order(nowhere: Path, tmp_path: Path, mo
 
 
 def test_a_missing_program_is_reported_with_a_remedy(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    makers: list[Callable[[], object]] = [LocalServer, chefshat.VectorEnv, lambda: chefshat.make("vector")]
+    makers: list[Callable[[], object]] = [
+        LocalServer,
+        lambda: chefshat.VectorEnv("local"),
+        lambda: chefshat.make("vector", address="local"),
+    ]
     for make in makers:
         with pytest.raises(ChefsHatError, match=rf"BINARY_MISSING.*pip install.*{BINARY}.*cargo build.*address"):
             make()

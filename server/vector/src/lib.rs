@@ -11,6 +11,6 @@ mod setup;
 
 pub use batch::{MAX_BATCH_BYTES, batch_to_proto};
 pub use error::RequestError;
-pub use record::record_parts;
+pub use record::{record_lines, record_parts};
 pub use request::{Request, Reset};
 pub use setup::{Limits, seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto};

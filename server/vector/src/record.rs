@@ -11,8 +11,8 @@ use crate::policy::simulation_policy;
 /// Size from which a part of a record is sent, bytes.
 const RECORD_PART_BYTES: usize = 512 * 1024;
 
-/// Splits the record of a game into parts.
-pub fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
+/// The lines of the record of a game.
+pub fn record_lines(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::RecordLine> {
     let limit = match setup.invalid_actions() {
         InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
         InvalidActions::Error => None,
@@ -26,9 +26,14 @@ pub fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorR
         policy: &simulation_policy(limit, setup.scheme()),
         decisions: &played.decisions,
     };
+    record.record()
+}
+
+/// Splits the record of a game into parts.
+pub fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
     let mut parts = vec![v1::VectorRecord::default()];
     let mut size = 0;
-    for line in record.record() {
+    for line in record_lines(setup, played) {
         if size > RECORD_PART_BYTES {
             parts.push(v1::VectorRecord::default());
             size = 0;

@@ -76,6 +76,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("chefshat-client", &["chefshat-proto"]),
     (
+        "chefshat-native",
+        &[
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-simulation",
+            "chefshat-record",
+            "chefshat-vector",
+        ],
+    ),
+    (
         "chefshat-examiner",
         &[
             "chefshat-engine",

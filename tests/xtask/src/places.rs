@@ -45,6 +45,11 @@ impl Places {
         self.target.join("debug/chefshat")
     }
 
+    /// The Python module built by the `build` step.
+    pub(crate) fn native_module(&self) -> PathBuf {
+        self.target.join("debug/libchefshat_native.so")
+    }
+
     /// The Python packages in the source tree, relative to its root: the SDK, then those built on
     /// it.
     pub(crate) fn python_packages(&self) -> Vec<&'static str> {

@@ -38,6 +38,19 @@ pub(crate) fn python_packages(places: &Places) -> Result<(), Failure> {
     venv(&places.venv(), &made_from, &install)
 }
 
+/// The module `chefshat_native` that the `build` step built, in the environment of the packages.
+pub(crate) fn native_module(places: &Places) -> Result<(), Failure> {
+    let program = "import sysconfig; print(sysconfig.get_path('platlib'))";
+    let folder = read(Command::new(places.python()).args(["-c", program]))?;
+    let module = Path::new(folder.trim()).join("chefshat_native.abi3.so");
+    // A process that has loaded the old one keeps it.
+    let _ = fs::remove_file(&module);
+    match fs::copy(places.native_module(), &module) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(at(&module, &error)),
+    }
+}
+
 /// The checkers of tools.txt, in their own environment.
 pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
     listed(places, "tests/xtask/tools.txt", &places.tools())

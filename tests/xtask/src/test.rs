@@ -65,6 +65,10 @@ pub(crate) fn run(
     ];
     steps.program("build", cargo_command(places).args(build))?;
 
+    if has_python {
+        steps.run("install the native module", || setup::native_module(places))?;
+    }
+
     if wants(Part::Rust) {
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {

@@ -6,6 +6,7 @@ Columns are in `columns`; the stream of batches is in `vector`.
 import os
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -37,6 +38,52 @@ class GameRecord:
         write_record(path, self.lines)
 
 
+class Content(Protocol):
+    """What a batch is made from: a message of a server, or a batch of the native engine."""
+
+    @property
+    def step(self) -> int:
+        """Number of the batch, from 1."""
+
+    @property
+    def done(self) -> bool:
+        """Whether all games are over and no other follows."""
+
+    def endings(self, sizes: Sizes) -> Endings:
+        """Returns the episodes that have ended."""
+
+    def beginnings(self, sizes: Sizes) -> Beginnings:
+        """Returns the games that have begun."""
+
+    def shifts(self, sizes: Sizes) -> ShiftStatistics | None:
+        """Returns the Shifts that have ended; None without statistics."""
+
+    def totals(self) -> Totals:
+        """Returns the counts."""
+
+
+class NoContent:
+    """The content of a batch that was made from arrays: nothing beyond its rows."""
+
+    step = 0
+    done = False
+
+    def endings(self, sizes: Sizes) -> Endings:
+        """Returns an empty table."""
+        return Endings(0, sizes)
+
+    def beginnings(self, sizes: Sizes) -> Beginnings:
+        """Returns an empty table."""
+        return Beginnings(0, sizes)
+
+    def shifts(self, sizes: Sizes) -> None:
+        """Returns None."""
+
+    def totals(self) -> Totals:
+        """Returns zeros."""
+        return Totals(0, 0, 0, 0, 0)
+
+
 class Batch(Situations):
     """The open decisions of the client, one row each, and what happened since the last batch.
 
@@ -54,13 +101,13 @@ class Batch(Situations):
     rewards = Column[np.float32]("<f4")
     """(R,): sum of the seat's rewards since it last decided and since its episode began."""
 
-    def __init__(self, rows: int, sizes: Sizes, message: pb.VectorBatch | None = None) -> None:
-        super().__init__(rows, sizes, message)
-        self._message = message or pb.VectorBatch()
+    def __init__(self, rows: int, sizes: Sizes, content: Content | None = None) -> None:
+        super().__init__(rows, sizes)
+        self._content = content = content or NoContent()
         #: Number of the batch, from 1.
-        self.step = self._message.step
+        self.step = content.step
         #: Whether all games are over and no other follows; only a reset with a seed starts new ones.
-        self.done = self._message.done
+        self.done = content.done
         #: The records of the games that have ended, if the env was created with `records=True`.
         self.records: tuple[GameRecord, ...] = ()
         self._transitions: Transitions | None = None
@@ -68,28 +115,22 @@ class Batch(Situations):
     @cached_property
     def endings(self) -> Endings:
         """The episodes of the client's seats that have ended."""
-        message = self._message.endings
-        return Endings(message.rows, self.sizes, message)
+        return self._content.endings(self.sizes)
 
     @cached_property
     def beginnings(self) -> Beginnings:
         """The games that have begun."""
-        message = self._message.beginnings
-        return Beginnings(message.rows, self.sizes, message)
+        return self._content.beginnings(self.sizes)
 
     @cached_property
     def shifts(self) -> ShiftStatistics | None:
         """The Shifts that have ended, if the env was created with `shift_statistics=True`."""
-        if not self._message.HasField("shifts"):
-            return None
-        message = self._message.shifts
-        return ShiftStatistics(message.rows, self.sizes, message)
+        return self._content.shifts(self.sizes)
 
     @cached_property
     def totals(self) -> Totals:
         """Counts since the stream began."""
-        totals = self._message.totals
-        return Totals(totals.client_decisions, totals.decisions, totals.invalid_attempts, totals.shifts, totals.games)
+        return self._content.totals()
 
     @property
     def transitions(self) -> Transitions:

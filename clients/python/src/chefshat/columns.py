@@ -1,4 +1,4 @@
-"""Tables in columns: the contents of a `VectorEnv`'s batch, as numpy views of the received bytes.
+"""Tables in columns: the contents of a `VectorEnv`'s batch, as numpy views of the bytes of a server or of the native engine.
 
 A table has rows; a column has one value, or one row of values, for each of them. Columns are created on first use, without copying,
 and are read-only. The stream is in `vector`, pairs of decisions are in `transitions`.
@@ -10,7 +10,7 @@ f-1 counts face f, index F the jokers. Arrays of seats are N wide.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Self, TypeVar, overload
+from typing import Any, Generic, NamedTuple, Self, TypeVar, overload
 
 import numpy as np
 from google.protobuf.message import Message
@@ -42,6 +42,18 @@ class Sizes:
     hand_size: int
     num_actions: int
     turn_actions: int
+
+    @classmethod
+    def of(cls, started: pb.VectorStarted) -> Self:
+        """Returns the numbers of the games that have been started."""
+        return cls(
+            players=started.rules.players,
+            faces=started.rules.faces,
+            jokers=started.rules.jokers,
+            hand_size=started.hand_size,
+            num_actions=started.action_space.size,
+            turn_actions=started.action_space.turn_actions,
+        )
 
     @property
     def card_kinds(self) -> int:
@@ -91,6 +103,8 @@ class Column(Generic[Scalar]):
         shape = self.shape(len(table), table.sizes)
         if table.source is not None:
             array: NDArray[Scalar] = table.source(self._name)
+        elif table.packed is not None:
+            array = np.ndarray(shape, self.dtype, table.packed.bytes, table.packed.offsets[self._name])
         elif table.message is None:
             array = np.zeros(shape, self.dtype)
             array.flags.writeable = False
@@ -106,15 +120,29 @@ class Column(Generic[Scalar]):
         return array
 
 
+class Packed(NamedTuple):
+    """Columns one after the other.
+
+    Attributes:
+        bytes: the columns.
+        offsets: where each column begins, by name.
+    """
+
+    bytes: NDArray[np.uint8]
+    offsets: Mapping[str, int]
+
+
 class Table:
     """Rows in columns. Subclasses define the columns.
 
     Attributes:
         sizes: the numbers that determine widths.
         message: the message with the columns; None for a table made from arrays, where an omitted column is all zeros.
-        source: creates columns by name, if there is no message.
+        packed: the columns of a table of games in this process.
+        source: creates columns by name, if there is neither.
     """
 
+    packed: Packed | None = None
     source: Callable[[str], NDArray[Any]] | None = None
 
     def __init__(self, rows: int, sizes: Sizes, message: Message | None = None) -> None:
@@ -202,7 +230,9 @@ class Situations(Table):
     def observations(self) -> Observations:
         """The observations of the seats."""
         message = None if self.message is None else getattr(self.message, "observations")  # noqa: B009 - of several messages.
-        return Observations(len(self), self.sizes, message)
+        seen = Observations(len(self), self.sizes, message)
+        seen.packed = self.packed
+        return seen
 
     @cached_property
     def masks(self) -> NDArray[np.bool_]:
@@ -242,9 +272,8 @@ class Endings(Situations):
 
     def __init__(self, rows: int, sizes: Sizes, message: pb.EpisodeEndings | None = None) -> None:
         super().__init__(rows, sizes, message)
-        if message is not None:
-            self.__dict__["kinds"] = np.zeros(rows, np.uint8)
-            self.__dict__["mask_bits"] = np.zeros((rows, sizes.mask_bytes), np.uint8)
+        self.__dict__["kinds"] = np.zeros(rows, np.uint8)
+        self.__dict__["mask_bits"] = np.zeros((rows, sizes.mask_bytes), np.uint8)
 
 
 class Beginnings(Table):

@@ -30,7 +30,10 @@ def make(kind: Literal["pettingzoo"], **options: Any) -> "AECEnv[str, Any, Any]"
 @overload
 def make(kind: str, **options: Any) -> Any: ...
 def make(kind: str = "gymnasium", **options: Any) -> Any:
-    """Creates an environment. Without an `address` it plays on the server shared by this process, which is started on demand.
+    """Creates an environment.
+
+    Without an `address` it plays in this process if `chefshat-native` is installed, or else on the server shared by this process,
+    which is started on demand.
 
     Args:
         kind: "gymnasium": `envs.ChefsHatEnv`, one seat against built-in agents; "gymnasium_vector": `envs.ChefsHatVectorEnv`, the

@@ -57,28 +57,55 @@ def sample_legal(mask_bits: NDArray[np.uint8], rng: np.random.Generator) -> NDAr
     Raises:
         ValueError: a row has no legal action.
     """
+    words, upto = _words(mask_bits)
+    # The rank of the drawn bit, from 0.
+    return _nth(words, upto, (rng.random(len(words)) * upto[:, -1]).astype(np.uint64))
+
+
+def sample_by(mask_bits: NDArray[np.uint8], seed: int, first: int) -> NDArray[np.uint16]:
+    """Draws one legal action for each row, uniformly, by a sequence that every implementation has in common.
+
+    Row i takes the draw `first + i` of SplitMix64 with this seed; its upper 32 bits are scaled to the number of legal actions.
+
+    Args:
+        mask_bits: as in `sample_legal`.
+        seed: the seed, 0..2**64-1.
+        first: the number of the first draw, from 0.
+    """
+    words, upto = _words(mask_bits)
+    with np.errstate(over="ignore"):
+        state = np.arange(first + 1, first + 1 + len(words), dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(seed)
+        state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        state ^= state >> np.uint64(31)
+    return _nth(words, upto, (state >> np.uint64(32)) * upto[:, -1] >> np.uint64(32))
+
+
+def _words(mask_bits: NDArray[np.uint8]) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Returns masks as 64-bit words, and the set bits up to and including each word."""
     rows, width = mask_bits.shape
-    if rows == 0:
-        return np.zeros(0, np.uint16)
     words_wide = -(-width // 8)
     padded = np.zeros((rows, words_wide * 8), np.uint8)
     padded[:, :width] = mask_bits
     words = padded.view("<u8")
-    counts = np.bitwise_count(words).astype(np.uint64)
-    # Set bits up to and including each word.
-    upto = counts.copy()
+    upto = np.bitwise_count(words).astype(np.uint64)
     for word in range(1, words_wide):
         upto[:, word] += upto[:, word - 1]
     total = upto[:, -1]
     if not total.all():
         raise ValueError(f"row {int(total.argmin())} has no legal action")
-    # The rank of the drawn bit, from 0; then the word it is in, and its rank within that word.
-    rank = (rng.random(rows) * total).astype(np.uint64)
+    return words, upto
+
+
+def _nth(words: NDArray[np.uint64], upto: NDArray[np.uint64], rank: NDArray[np.uint64]) -> NDArray[np.uint16]:
+    """Returns in each row the set bit of this rank, from 0."""
+    rows, words_wide = words.shape
+    # The word it is in, and its rank within that word.
     wanted = np.zeros(rows, np.intp)
     for before in range(words_wide - 1):
         wanted += upto[:, before] <= rank
     at = np.arange(0, rows * words_wide, words_wide) + wanted
-    rank -= upto.reshape(-1)[at] - counts.reshape(-1)[at]
+    rank -= upto.reshape(-1)[at] - np.bitwise_count(words.reshape(-1)[at])
     chosen = words.reshape(-1)[at]
     # Byte b of `sums` counts the set bits of the bytes up to b.
     sums = chosen - (chosen >> np.uint64(1) & _PAIRS)

@@ -1,25 +1,25 @@
-"""Many games at once, with numpy arrays, over one stream of `VectorService.Run`.
+"""Many games at once, with numpy arrays, in this process or over one stream of `VectorService.Run`.
 
-`VectorEnv` steps games in lock-step. Batches are in `batch`, columns in `columns`, sampling of legal actions in `masks`,
-transitions in `transitions`, and environments with the interfaces of Gymnasium and PettingZoo in `envs`.
+`VectorEnv` steps games in lock-step. What plays the games is in `_native` and `_remote`, behind the interface in `_games`. Batches
+are in `batch`, columns in `columns`, sampling of legal actions in `masks`, transitions in `transitions`, and environments with the
+interfaces of Gymnasium and PettingZoo in `envs`.
 """
 
-import queue
-import weakref
-from collections.abc import Iterator
+import importlib.util
+import secrets
+from functools import cached_property
 from pathlib import Path
-from typing import Self, TypeAlias, Unpack
+from typing import NoReturn, Self, Unpack
 
-import grpc
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chefshat import channels, local_server, pb
-from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
+from chefshat import local_server, pb
+from chefshat._games import Games
 from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
-from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.errors import ChefsHatError
 from chefshat.masks import sample_legal
 from chefshat.transitions import Memory, RewardFunction, Transitions
 from chefshat.vector_setup import Rules, Seed, VectorOptions, put_seed, vector_setup
@@ -43,31 +43,21 @@ __all__ = [
     "sample_legal",
 ]
 
-# Maximum bytes of a message: the largest batch has a quarter of them (`max_vector_batch_bytes`), a part of a record far fewer.
-MAX_BATCH_BYTES = 64 * 1024 * 1024
-# An environment cannot reconnect and has no clock, so it is patient with a busy server. Times in milliseconds.
-PATIENT_CHANNEL = [
-    ("grpc.max_receive_message_length", MAX_BATCH_BYTES),
-    ("grpc.keepalive_time_ms", 30_000),
-    ("grpc.keepalive_timeout_ms", 60_000),
-    ("grpc.http2.ping_timeout_ms", 60_000),
-]
-
-# The name exists only in the type stubs of grpc.
-RunCall: TypeAlias = "grpc._CallIterator[pb.RunResponse]"
-Requests: TypeAlias = "queue.SimpleQueue[pb.RunRequest | None]"
+#: The address of the server shared by this process, which is started on demand.
+LOCAL = "local"
 
 
 class VectorEnv:
-    """Parallel games on a server, stepped in batches. Close it, or use it as a context manager. Not thread-safe.
+    """Parallel games, stepped in batches. Close it, or use it as a context manager. Not thread-safe.
 
-    The server ends an environment after an hour without an answer (CLIENT_IDLE), and serves 64 of them at a time.
+    The games are played in this process if the package `chefshat-native` is installed, or else, and with an address, by a server.
+    A server ends an environment after an hour without an answer (CLIENT_IDLE), and serves 64 of them at a time.
 
-    Every method raises `ChefsHatError` with the server's reason if the server refuses. Then the environment has ended, and every
-    further call raises an error: create a new one.
+    Every method raises `ChefsHatError` with a reason if a request is refused. Then the environment has ended, and every further
+    call raises an error: create a new one. An environment cannot be pickled or copied: create another one with the same arguments.
 
     Attributes:
-        server: the server.
+        server: the server that plays the games; None: this process.
         sizes: the numbers that determine the widths of columns; some of them are attributes, too.
         games: n, the number of parallel games.
         client_seats: the seats that the client plays, ascending.
@@ -91,8 +81,9 @@ class VectorEnv:
         """Starts the games and fetches the first batch.
 
         Args:
-            address: "host:port", "http://host:port" or, for TLS, "https://host:port"; None: the server shared by this process,
-                which is started on demand (see `LocalServer`).
+            address: "host:port", "http://host:port" or, for TLS, "https://host:port"; "local": the server shared by this process,
+                which is started on demand (see `LocalServer`); None: this process without a server, if `chefshat-native` is
+                installed, or else as "local".
             token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
             ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
             games: n. Games times client seats is limited by the server (`max_vector_seats`).
@@ -102,29 +93,20 @@ class VectorEnv:
         """
         setup = vector_setup(games, options)
         self._ended: ChefsHatError | None = None
-        self._parts: list[pb.RecordLine] = []
-        # A server of this process knows no tokens.
-        own = ServerAddress(local_server.shared_address(), token="") if address is None else address
-        self.server = server_address(own, token, ca)
-        channel = channels.channel(self.server, PATIENT_CHANNEL)
-        # gRPC takes requests from the queue in a thread of its own.
-        outbox: Requests = queue.SimpleQueue()
-        self._outbox = outbox
-        outbox.put(pb.RunRequest(setup=setup))
-        self._call: RunCall = VectorServiceStub(channel).Run(_until_none(outbox))
-        self._finalizer = weakref.finalize(self, _end, outbox, self._call, channel)
+        self._games = _begin(setup, address, token, ca)
         try:
-            started = self._receive()
-            if not started.HasField("started"):
-                raise self._fail(ChefsHatError("PROTOCOL_VIOLATED", "the server did not begin with the start message"))
-            self._set_attributes(started.started, games)
+            self._set_attributes(self._games.started, games)
+            self.server = self._games.server
             self._memory = Memory(games, self.sizes) if transitions or reward_function is not None else None
             self._reward_function = reward_function
-            self.batch = self._receive_batch()
+            self.batch = self._completed(self._games.first())
         except BaseException:
-            self._finalizer()
+            self._games.close()
             raise
         self._fresh = True
+        # The sequence of `sample`, and the number of its next draw.
+        self._sampling_seed = secrets.randbits(64)
+        self._drawn = 0
 
     def _set_attributes(self, started: pb.VectorStarted, games: int) -> None:
         self.rules = started.rules
@@ -132,14 +114,7 @@ class VectorEnv:
         self.built_in_agents = tuple(started.built_in_agents)
         self.base_seed = started.base_seed if started.HasField("base_seed") else None
         self.games = games
-        self.sizes = Sizes(
-            players=started.rules.players,
-            faces=started.rules.faces,
-            jokers=started.rules.jokers,
-            hand_size=started.hand_size,
-            num_actions=started.action_space.size,
-            turn_actions=started.action_space.turn_actions,
-        )
+        self.sizes = Sizes.of(started)
         self.players = self.sizes.players
         self.faces = self.sizes.faces
         self.jokers = self.sizes.jokers
@@ -161,7 +136,11 @@ class VectorEnv:
 
     def __repr__(self) -> str:
         state = "open" if self._ended is None else self._ended.reason
-        return f"VectorEnv(games={self.games}, client_seats={self.client_seats}, {state})"
+        where = "in process" if self.server is None else f"on {self.server}"
+        return f"VectorEnv(games={self.games}, client_seats={self.client_seats}, {where}, {state})"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a VectorEnv cannot be pickled or copied: create another one with the same arguments and seed")
 
     def step(self, actions: ArrayLike) -> Batch:
         """Takes the decisions of the latest batch and returns the next batch.
@@ -177,9 +156,34 @@ class VectorEnv:
         if self._memory is not None:
             self._memory.remember(batch.games, batch.attempts, batch, array)
         self._fresh = False
-        self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=array.tobytes())))
-        self.batch = self._receive_batch()
+        try:
+            batch = self._games.step(array)
+        except BaseException as error:
+            self._fail(error)
+            raise
+        self.batch = batch if self._memory is None else self._completed(batch)
         return self.batch
+
+    def sample(self, seed: int | None = None) -> NDArray[np.uint16]:
+        """Draws one legal action for each row of the latest batch, uniformly.
+
+        Args:
+            seed: begins a new sequence of draws, 0..2**64-1; None: continues the sequence, which initially is a random one.
+        """
+        self._check_open()
+        if seed is not None:
+            if not 0 <= seed < 2**64:
+                raise ValueError(f"a seed is 0..={2**64 - 1}, not {seed}")
+            self._sampling_seed, self._drawn = int(seed), 0
+        first = self._drawn
+        self._drawn += len(self.batch)
+        return self._games.sample(self.batch, self._sampling_seed, first)
+
+    @cached_property
+    def action_texts(self) -> tuple[str, ...]:
+        """The texts of all actions, for people."""
+        self._check_open()
+        return tuple(self._games.action_texts(self.faces))
 
     def reset(self, seed: Seed = None, *, games: ArrayLike | None = None) -> Batch:
         """Abandons games, starts new ones in their place and returns the next batch. Rewards of abandoned games are lost.
@@ -210,16 +214,20 @@ class VectorEnv:
             self._memory.forget(chosen)
         if seed is not None:
             self.base_seed = request.base_seed if request.HasField("base_seed") else None
-        self._outbox.put(pb.RunRequest(reset=request))
-        self.batch = self._receive_batch()
+        try:
+            batch = self._games.reset(request)
+        except BaseException as error:
+            self._fail(error)
+            raise
+        self.batch = self._completed(batch)
         self._fresh = games is None
         return self.batch
 
     def close(self) -> None:
-        """Ends the stream and the games. Does nothing if it is closed."""
+        """Ends the games. Does nothing if it is closed."""
         if self._ended is None:
             self._ended = ChefsHatError("ENV_CLOSED", "this VectorEnv has been closed; make a new one")
-        self._finalizer()
+        self._games.close()
 
     def _check_open(self) -> None:
         if self._ended is None:
@@ -242,59 +250,34 @@ class VectorEnv:
                 raise ValueError(f"row {wrong} has the action {array[wrong]}; actions are 0..={self.num_actions - 1}")
         return array.astype("<u2", copy=False)
 
-    def _receive_batch(self) -> Batch:
-        records: list[GameRecord] = []
-        while True:
-            response = self._receive()
-            if response.HasField("batch"):
-                message = response.batch
-                batch = Batch(message.rows, self.sizes, message)
-                batch.records = tuple(records)
-                if self._memory is not None:
-                    self._complete(batch, self._memory)
-                return batch
-            if not response.HasField("record"):
-                raise self._fail(ChefsHatError("PROTOCOL_VIOLATED", "the server sent neither a batch nor a record"))
-            part = response.record
-            self._parts.extend(part.lines)
-            if part.last:
-                records.append(GameRecord(part.game, part.index, tuple(self._parts)))
-                self._parts.clear()
+    def _completed(self, batch: Batch) -> Batch:
+        """Computes the transitions of a batch, if they are enabled."""
+        if self._memory is not None:
+            try:
+                batch.complete(self._memory, self._reward_function)
+            except BaseException:
+                # The games wait for the actions of a batch that the caller never got.
+                self._fail(ChefsHatError("REWARDS_FAILED", "the reward function failed"))
+                raise
+        return batch
 
-    def _complete(self, batch: Batch, memory: Memory) -> None:
-        try:
-            batch.complete(memory, self._reward_function)
-        except BaseException:
-            # The server waits for the actions of a batch that the caller never got.
-            self._fail(ChefsHatError("REWARDS_FAILED", "the reward function failed"))
-            raise
-
-    def _receive(self) -> pb.RunResponse:
-        try:
-            return next(self._call)
-        except grpc.RpcError as error:
-            raise self._fail(from_rpc_error(error)) from error
-        except StopIteration:
-            raise self._fail(connection_lost("the server ended the stream; make a new VectorEnv")) from None
-        except BaseException:
-            # An interrupt: the response may still come.
-            self._fail(ChefsHatError("INTERRUPTED", "a step was interrupted"))
-            raise
-
-    def _fail(self, error: ChefsHatError) -> ChefsHatError:
+    def _fail(self, error: BaseException) -> None:
         """Ends the environment with an error."""
-        self._ended = error
-        self._finalizer()
-        return error
+        # After an interrupt the response may still come.
+        known = error if isinstance(error, ChefsHatError) else ChefsHatError("INTERRUPTED", "a step was interrupted")
+        self._ended = known
+        self._games.close()
 
 
-def _until_none(outbox: Requests) -> Iterator[pb.RunRequest]:
-    """Iterates over the queue until None. Does not reference the env, which can then be garbage-collected."""
-    return iter(outbox.get, None)
+def _begin(setup: pb.VectorSetup, address: str | ServerAddress | None, token: str | None, ca: Path | str | None) -> Games:
+    """Begins games in this process or on a server."""
+    if address is None and importlib.util.find_spec("chefshat_native") is not None:
+        from chefshat._native import NativeGames
 
+        return NativeGames(setup)
+    from chefshat._remote import RemoteGames
 
-def _end(outbox: Requests, call: RunCall, channel: grpc.Channel) -> None:
-    """Ends a stream and closes its channel."""
-    outbox.put(None)
-    call.cancel()
-    channel.close()
+    if address is None or address == LOCAL:
+        # A server of this process knows no tokens.
+        address = ServerAddress(local_server.shared_address(), token="")
+    return RemoteGames(server_address(address, token, ca), setup)

@@ -4,6 +4,7 @@
 //! output. There are no threads here; several environments can be stepped in parallel.
 
 mod columns;
+mod sampling;
 mod setup;
 mod slot;
 
@@ -98,6 +99,24 @@ impl VectorGames {
     /// The options.
     pub fn setup(&self) -> &VectorSetup {
         &self.setup
+    }
+
+    /// Number of open decisions.
+    pub fn rows(&self) -> usize {
+        self.open.len()
+    }
+
+    /// Draws a legal action for each open decision, uniformly. Row i takes the draw `first + i` of
+    /// the seed's sequence.
+    pub fn sample(&self, seed: u64, first: u64, mut put: impl FnMut(ActionId)) {
+        for (number, game) in (first..).zip(&self.open) {
+            let legal = self.slots[*game as usize].legal();
+            put(sampling::sample(
+                legal.expect("the game has a row"),
+                seed,
+                number,
+            ));
+        }
     }
 
     /// Takes one action for each row of the last batch, in order, and returns the next batch.

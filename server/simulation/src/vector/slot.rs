@@ -95,6 +95,11 @@ impl Slot {
         self.running.as_ref().map_or(0, |running| running.kept)
     }
 
+    /// The legal actions of the open decision.
+    pub(super) fn legal(&self) -> Option<&Mask> {
+        Some(&self.running.as_ref()?.open.as_ref()?.legal)
+    }
+
     /// The seat of the open decision, if the action is illegal there.
     pub(super) fn refuses(&self, action: ActionId) -> Option<Seat> {
         let open = self.running.as_ref()?.open.as_ref()?;

@@ -19,7 +19,7 @@ except ImportError as error:
 from chefshat.columns import Situations
 from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
-from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode
+from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.vector import Batch, VectorEnv
 
 __all__ = ["env", "raw_env"]
@@ -144,7 +144,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         situations: Situations = self.vector.batch
         if self.agents and (any(self.terminations.values()) or any(self.truncations.values())):
             situations = self.vector.batch.endings
-        text = as_text(situations, 0, action_texts(self.vector.server, self.vector.faces))
+        text = as_text(situations, 0, self.vector.action_texts)
         if self.render_mode == "human":
             print(text)
             return None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chefshat.address import ServerAddress
 from chefshat.columns import Situations
 from chefshat.envs.observing import Form, ObservationFunction
-from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode
+from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.errors import ChefsHatError
 from chefshat.vector import VectorEnv
 
@@ -134,7 +134,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         if self.render_mode is None:
             gymnasium.logger.warn('render needs an environment made with render_mode="ansi" or "human"')
             return None
-        text = as_text(self._now, 0, action_texts(self.vector.server, self.vector.faces))
+        text = as_text(self._now, 0, self.vector.action_texts)
         if self.render_mode == "ansi":
             return text
         print(text)

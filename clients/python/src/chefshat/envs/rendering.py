@@ -1,11 +1,8 @@
 """Formats a seat's situation as text, for `render` of the environments."""
 
-import functools
-
 import numpy as np
 
 from chefshat import pb
-from chefshat.address import ServerAddress
 from chefshat.columns import Situations
 
 RENDER_MODES = ("ansi", "human")
@@ -17,15 +14,6 @@ def check_render_mode(render_mode: str | None) -> None:
     """Raises ValueError if it is neither None nor one of `RENDER_MODES`."""
     if render_mode is not None and render_mode not in RENDER_MODES:
         raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
-
-
-@functools.cache
-def action_texts(server: ServerAddress, faces: int) -> tuple[str, ...]:
-    """Fetches the texts of all actions."""
-    from chefshat.client import Client
-
-    with Client(server) as client:
-        return tuple(client.action_table(faces).texts)
 
 
 def as_text(situations: Situations, row: int, texts: tuple[str, ...]) -> str:

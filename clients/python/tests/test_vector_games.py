@@ -1,4 +1,4 @@
-"""`VectorEnv` on the real server: invariants of games, and refusals."""
+"""`VectorEnv` in this process and on the real server: invariants of games, and refusals."""
 
 from collections import Counter
 from typing import Any
@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 import chefshat
 from chefshat import ChefsHatError, Transitions, VectorEnv, pb, sample_legal
 
-pytestmark = pytest.mark.server
 
-
-def test_invariants_hold_in_every_game(real_address: str) -> None:
+def test_invariants_hold_in_every_game(anywhere: str | None) -> None:
     rng = np.random.default_rng(1)
     decided, ended, games_over = 0, 0, 0
     points = np.zeros(4)
-    with VectorEnv(real_address, 16, seed=1, rewards="points", shift_statistics=True) as env:
+    with VectorEnv(anywhere, 16, seed=1, rewards="points", shift_statistics=True) as env:
         batch = env.batch
         assert (env.players, env.faces, env.hand_size, env.num_actions, env.turn_actions) == (4, 11, 17, 214, 200)
         assert env.base_seed == 1
@@ -62,9 +60,9 @@ def trajectory(env: VectorEnv, steps: int) -> list[Any]:
     return found
 
 
-def test_a_game_of_a_batch_can_be_replayed_alone(real_address: str) -> None:
+def test_a_game_of_a_batch_can_be_replayed_alone(anywhere: str | None) -> None:
     options: dict[str, Any] = {"rewards": "paper", "client_seats": [1], "opponents": ["greedy", "random", "random_unmasked"]}
-    with VectorEnv(real_address, 3, seed=5, **options) as env:
+    with VectorEnv(anywhere, 3, seed=5, **options) as env:
         seeds = [bytes(seed) for seed in env.batch.beginnings.seeds]
         together = trajectory(env, 40)
         env.reset(seed=5)
@@ -72,14 +70,14 @@ def test_a_game_of_a_batch_can_be_replayed_alone(real_address: str) -> None:
         env.reset(seed=6)
         assert trajectory(env, 40) != together
     for game, seed in enumerate(seeds):
-        with VectorEnv(real_address, 1, seed=[seed], **options) as env:
+        with VectorEnv(anywhere, 1, seed=[seed], **options) as env:
             alone = trajectory(env, 40)
         assert [[column[0] for column in step[:3]] for step in alone] == [
             [column[game] for column in step[:3]] for step in together
         ]
 
 
-def test_a_custom_reward_can_equal_a_scheme(real_address: str) -> None:
+def test_a_custom_reward_can_equal_a_scheme(anywhere: str | None) -> None:
     def validity(transitions: Transitions) -> NDArray[np.float32]:
         turns = transitions.kinds == pb.DECISION_KIND_TURN
         return np.where(turns, np.where(transitions.invalid, -1, 1), 0).astype(np.float32)
@@ -88,8 +86,8 @@ def test_a_custom_reward_can_equal_a_scheme(real_address: str) -> None:
     options: dict[str, Any] = {"seed": 9, "invalid": "ask_again", "client_seats": [0, 2]}
     wrong = 0
     with (
-        VectorEnv(real_address, 8, rewards="validity", **options) as scheme,
-        VectorEnv(real_address, 8, reward_function=validity, **options) as own,
+        VectorEnv(anywhere, 8, rewards="validity", **options) as scheme,
+        VectorEnv(anywhere, 8, reward_function=validity, **options) as own,
     ):
         while len(scheme.batch.endings) == 0 or wrong < 100:
             actions = sample_legal(scheme.batch.mask_bits, rng)
@@ -104,8 +102,8 @@ def test_a_custom_reward_can_equal_a_scheme(real_address: str) -> None:
         assert scheme.batch.totals.invalid_attempts == wrong
 
 
-def test_turns_have_the_200_actions_of_the_paper(real_address: str) -> None:
-    with VectorEnv(real_address, 8, seed=1, decisions="turns", other_decisions="greedy", skip_forced=True) as env:
+def test_turns_have_the_200_actions_of_the_paper(anywhere: str | None) -> None:
+    with VectorEnv(anywhere, 8, seed=1, decisions="turns", other_decisions="greedy", skip_forced=True) as env:
         kinds: Counter[int] = Counter()
         while env.batch.totals.games < 2:
             batch = env.step(sample_legal(env.batch.mask_bits, np.random.default_rng(0)))
@@ -115,9 +113,9 @@ def test_turns_have_the_200_actions_of_the_paper(real_address: str) -> None:
         assert set(kinds) == {pb.DECISION_KIND_TURN}
 
 
-def test_a_limited_number_of_games(real_address: str) -> None:
+def test_a_limited_number_of_games(anywhere: str | None) -> None:
     rng = np.random.default_rng(3)
-    with VectorEnv(real_address, 2, seed=1, total_games=5, episode="game", rules={"target_shifts": 2}) as env:
+    with VectorEnv(anywhere, 2, seed=1, total_games=5, episode="game", rules={"target_shifts": 2}) as env:
         begun, over = env.batch.beginnings.indices.tolist(), 0
         while not env.batch.done:
             batch = env.step(sample_legal(env.batch.mask_bits, rng))
@@ -132,8 +130,8 @@ def test_a_limited_number_of_games(real_address: str) -> None:
         assert len(env.reset(9)) == 2
 
 
-def test_other_rules_have_other_widths(real_address: str) -> None:
-    with VectorEnv(real_address, 2, rules={"players": 6, "faces": 15, "jokers": 1}, transitions=True) as env:
+def test_other_rules_have_other_widths(anywhere: str | None) -> None:
+    with VectorEnv(anywhere, 2, rules={"players": 6, "faces": 15, "jokers": 1}, transitions=True) as env:
         for _ in range(50):
             batch = env.step(sample_legal(env.batch.mask_bits, np.random.default_rng(4)))
         assert env.num_actions == 380
@@ -143,6 +141,7 @@ def test_other_rules_have_other_widths(real_address: str) -> None:
         assert batch.transitions.before.observations.points.shape[1] == 6
 
 
+@pytest.mark.server
 def test_games_continue_from_a_record(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.create_room("to branch from", seats=[None, "greedy", "random", "random"])
@@ -161,11 +160,11 @@ def test_games_continue_from_a_record(real_address: str) -> None:
     assert refused.value.reason == "GAME_UNKNOWN"
 
 
-def test_games_start_with_given_hands(real_address: str) -> None:
+def test_games_start_with_given_hands(anywhere: str | None) -> None:
     rules = pb.RuleSet(players=2, faces=4, jokers=2)
     cards = [[1, 2, 3, 4, 4, 5], [2, 3, 3, 4, 4, 5]]
     hands = [pb.SeatCards(seat=seat, cards=held, golden=seat == 1) for seat, held in enumerate(cards)]
-    with VectorEnv(real_address, 2, rules=rules, hands=pb.ScriptedShift(hands=hands)) as env:
+    with VectorEnv(anywhere, 2, rules=rules, hands=pb.ScriptedShift(hands=hands)) as env:
         assert env.batch.seats.tolist() == [1, 1]
         assert env.batch.observations.hands.tolist() == [[0, 1, 2, 2, 1]] * 2
         assert env.batch.observations.golden.tolist() == [1, 1]
@@ -181,15 +180,15 @@ def test_games_start_with_given_hands(real_address: str) -> None:
         ({"rules": "no such preset"}, "RULE_SET_REFUSED", "no such preset"),
     ],
 )
-def test_setups_are_refused_with_their_reason(real_address: str, options: Any, reason: str, says: str) -> None:
+def test_setups_are_refused_with_their_reason(anywhere: str | None, options: Any, reason: str, says: str) -> None:
     with pytest.raises(ChefsHatError, match=says) as refused:
-        VectorEnv(real_address, **options)
+        VectorEnv(anywhere, **options)
     assert refused.value.reason == reason
     assert not refused.value.retryable
 
 
-def test_an_illegal_action_is_reported_with_its_row(real_address: str) -> None:
-    with VectorEnv(real_address, 4, seed=1) as env:
+def test_an_illegal_action_is_reported_with_its_row(anywhere: str | None) -> None:
+    with VectorEnv(anywhere, 4, seed=1) as env:
         actions = env.batch.masks.argmax(axis=1)
         actions[2] = env.batch.masks[2].argmin()
         with pytest.raises(ChefsHatError) as refused:

@@ -1,0 +1,77 @@
+"""The engine of Chef's Hat: vector environments in the process of the client.
+
+`chefshat.VectorEnv` is the documented way to it. Setups, resets and records are serialized messages of the protocol.
+"""
+
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class Refused(Exception):
+    """A refused request. Its arguments are the reason in UPPER_SNAKE, the reason in words, and metadata."""
+
+    args: tuple[str, str, dict[str, str]]
+
+class Games:
+    """Many games of one client, stepped together."""
+
+    @staticmethod
+    def begin(setup: bytes) -> tuple[Games, Batch]:
+        """Begins the games of a serialized `VectorSetup`; returns them with their first batch."""
+
+    @property
+    def started(self) -> bytes:
+        """The serialized `VectorStarted`."""
+
+    def step(self, actions: NDArray[np.uint16]) -> Batch:
+        """Takes one action for each row of the latest batch and returns the next batch."""
+
+    def reset(self, reset: bytes) -> Batch:
+        """Executes a serialized `VectorReset` and returns the next batch."""
+
+    def sample(self, seed: int, first: int) -> NDArray[np.uint16]:
+        """Draws a legal action for each row of the latest batch: row i takes the draw `first + i` of the seed."""
+
+    def __reduce__(self) -> NoReturn: ...
+
+class Batch:
+    """The open decisions, and what happened since the previous batch.
+
+    A table is the number of its rows, its columns one after the other, and where each begins. Every table is handed over once.
+    """
+
+    @property
+    def step(self) -> int:
+        """Number of the batch, from 1."""
+
+    @property
+    def rows(self) -> int:
+        """Number of open decisions."""
+
+    @property
+    def done(self) -> bool:
+        """Whether all games are over and none follows."""
+
+    def decisions(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+        """Hands over the open decisions."""
+
+    def endings(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+        """Hands over the episodes that have ended."""
+
+    def beginnings(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+        """Hands over the games that have begun."""
+
+    def shifts(self) -> tuple[int, NDArray[np.uint8], dict[str, int]] | None:
+        """Hands over the Shifts that have ended, if statistics are enabled."""
+
+    def totals(self) -> tuple[int, int, int, int, int]:
+        """Returns decisions of the client and of all seats, invalid attempts of the client, Shifts and games."""
+
+    def records(self) -> list[tuple[int, int, list[bytes]]]:
+        """Returns the records of games that have ended: game, index and serialized `RecordLine`s of each."""
+
+def action_texts(faces: int) -> list[str]:
+    """Returns the texts of all actions of a deck with this number of faces, 4..=15."""

@@ -1,0 +1,228 @@
+//! Games that a program steps in its own process.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, TryLockError};
+
+use chefshat_engine::{ActionId, ActionSpace};
+use chefshat_proto::v1;
+use chefshat_record::convert::FieldProblem;
+use chefshat_simulation::vector::{Batch as Columns, VectorGames};
+use chefshat_vector::{
+    Limits, Request, RequestError, record_lines, seeds_from_setup, setup_from_proto,
+    start_from_proto, started_to_proto,
+};
+use numpy::{PyArray1, PyReadonlyArray1};
+use prost::Message;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use rand::TryRng as _;
+
+use crate::tables::{Batch, Record};
+
+/// As a server's, so that a setup that is accepted here is accepted there.
+const LIMITS: Limits = Limits {
+    seeds: 16_384,
+    recorded_games: 256,
+    recorded_shifts: 1_000,
+};
+
+create_exception!(
+    chefshat_native,
+    Refused,
+    PyException,
+    "A refused request: its reason in UPPER_SNAKE, the reason in words, and metadata."
+);
+
+/// Many games of one client, stepped together. See `VectorService` for what the messages mean.
+#[pyclass(module = "chefshat_native", frozen)]
+#[derive(Debug)]
+pub(crate) struct Games {
+    /// `None` once a step has failed for good.
+    state: Mutex<Option<VectorGames>>,
+    started: Vec<u8>,
+}
+
+#[pymethods]
+impl Games {
+    /// Begins the games of a serialized `VectorSetup`; returns them with their first batch.
+    #[staticmethod]
+    fn begin(py: Python<'_>, setup: &[u8]) -> PyResult<(Self, Batch)> {
+        let message = decode::<v1::VectorSetup>("setup", setup)?;
+        let begun = py.detach(|| {
+            caught(|| {
+                let seeds = seeds_from_setup(&message, &LIMITS, random_seed)?;
+                let (rules, start) = start_from_proto(&message)?.ok_or_else(no_records_here)?;
+                let setup = setup_from_proto(&message, rules, start, seeds, &LIMITS)?;
+                let started = started_to_proto(&setup).encode_to_vec();
+                let (games, mut columns) = VectorGames::new(setup);
+                let records = records(&games, &mut columns);
+                Ok((games, started, columns, records))
+            })
+        });
+        let (games, started, columns, records) = begun?.map_err(|error| refused(py, error))?;
+        let batch = Batch::new(columns, records, games.setup());
+        let state = Mutex::new(Some(games));
+        Ok((Self { state, started }, batch))
+    }
+
+    /// The serialized `VectorStarted`.
+    #[getter]
+    fn started<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.started)
+    }
+
+    /// Takes one action for each row of the latest batch and returns the next batch.
+    fn step(&self, py: Python<'_>, actions: PyReadonlyArray1<'_, u16>) -> PyResult<Batch> {
+        let actions = actions.as_array().into_iter().copied();
+        let request = Request::Actions(actions.map(ActionId::new).collect());
+        self.execute(py, request)
+    }
+
+    /// Executes a serialized `VectorReset` and returns the next batch.
+    fn reset(&self, py: Python<'_>, reset: &[u8]) -> PyResult<Batch> {
+        let message = decode::<v1::VectorReset>("reset", reset)?;
+        let request = Request::reset(&message, &LIMITS).map_err(|error| refused(py, error))?;
+        self.execute(py, request)
+    }
+
+    /// Draws a legal action for each row of the latest batch: row i takes the draw `first + i` of
+    /// the seed.
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        seed: u64,
+        first: u64,
+    ) -> PyResult<Bound<'py, PyArray1<u16>>> {
+        let state = self.lock()?;
+        let games = state.as_ref().ok_or_else(|| ended(py))?;
+        let mut actions = Vec::with_capacity(games.rows());
+        games.sample(seed, first, |action| actions.push(action.index()));
+        Ok(PyArray1::from_vec(py, actions))
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "running games cannot be pickled or copied: begin them again with the same seed",
+        ))
+    }
+}
+
+impl Games {
+    /// Executes a request without holding the interpreter.
+    fn execute(&self, py: Python<'_>, request: Request) -> PyResult<Batch> {
+        let mut state = self.lock()?;
+        // Taken out: it does not return if the step fails for good.
+        let mut games = state.take().ok_or_else(|| ended(py))?;
+        let done = py.detach(|| {
+            caught(move || {
+                let stepped = request.execute(&mut games).map(|mut columns| {
+                    let records = records(&games, &mut columns);
+                    (columns, records)
+                });
+                (games, stepped)
+            })
+        });
+        let (games, stepped) = done?;
+        match stepped {
+            Ok((columns, records)) => {
+                let batch = Batch::new(columns, records, games.setup());
+                *state = Some(games);
+                Ok(batch)
+            }
+            // As over the network, a refused request ends the games.
+            Err(error) => Err(refused(py, error.into())),
+        }
+    }
+
+    fn lock(&self) -> PyResult<MutexGuard<'_, Option<VectorGames>>> {
+        self.state.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => PyErr::new::<Refused, _>((
+                "GAMES_IN_USE",
+                "another thread is stepping these games, or was when this process was forked: use one env for each thread and process",
+                Vec::<(String, String)>::new(),
+            )),
+            TryLockError::Poisoned(_) => panicked(),
+        })
+    }
+}
+
+/// The texts of all actions of a deck with this number of faces, 4..=15.
+#[pyfunction]
+pub(crate) fn action_texts(faces: u8) -> PyResult<Vec<String>> {
+    let space = ActionSpace::new(faces)
+        .ok_or_else(|| PyValueError::new_err(format!("{faces} is not in 4..=15")))?;
+    let texts = (0..space.size()).filter_map(|index| space.text(ActionId::new(index)));
+    Ok(texts.collect())
+}
+
+/// The records of games that ended, taken from their columns.
+fn records(games: &VectorGames, columns: &mut Columns) -> Vec<Record> {
+    let played = std::mem::take(&mut columns.played);
+    let record = |played| Record {
+        lines: record_lines(games.setup(), played)
+            .iter()
+            .map(Message::encode_to_vec)
+            .collect(),
+        game: played.game,
+        index: played.index,
+    };
+    played.iter().map(record).collect()
+}
+
+fn decode<M: Message + Default>(name: &str, bytes: &[u8]) -> PyResult<M> {
+    M::decode(bytes).map_err(|error| {
+        let words = format!("the {name} is not a message: {error}");
+        PyValueError::new_err(words)
+    })
+}
+
+/// Runs work; a panic becomes an error, so that it does not end the interpreter.
+fn caught<T>(work: impl FnOnce() -> T) -> PyResult<T> {
+    // The state of the work is dropped, so it is never seen half done.
+    catch_unwind(AssertUnwindSafe(work)).map_err(|_| panicked())
+}
+
+fn panicked() -> PyErr {
+    let words =
+        "an internal error, which is a bug of chefshat-native; the standard error has the details";
+    PyErr::new::<Refused, _>(("INTERNAL", words, Vec::<(String, String)>::new()))
+}
+
+fn ended(py: Python<'_>) -> PyErr {
+    let message = "these games have ended with an earlier error; begin others".to_owned();
+    let (reason, metadata) = ("GAMES_ENDED", Vec::new());
+    refused(
+        py,
+        RequestError {
+            reason,
+            message,
+            metadata,
+        },
+    )
+}
+
+fn no_records_here() -> RequestError {
+    let words =
+        "recorded games are stored by a server: give the address of the one that has the game";
+    RequestError::field("BRANCH_REFUSED", &FieldProblem::new("branch", words))
+}
+
+fn refused(py: Python<'_>, error: RequestError) -> PyErr {
+    let metadata = PyDict::new(py);
+    for (key, value) in error.metadata {
+        if let Err(error) = metadata.set_item(key, value) {
+            return error;
+        }
+    }
+    PyErr::new::<Refused, _>((error.reason, error.message, metadata.unbind()))
+}
+
+fn random_seed() -> u64 {
+    let mut bytes = [0; 8];
+    rand::rngs::SysRng
+        .try_fill_bytes(&mut bytes)
+        .expect("the operating system provides random bytes");
+    u64::from_le_bytes(bytes)
+}

@@ -1,0 +1,270 @@
+"""`VectorEnv` in this process: it equals a server's, and works or refuses with a reason where processes and threads are shared."""
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import chefshat
+from chefshat import ChefsHatError, VectorEnv, pb
+from chefshat.columns import Table
+from chefshat.vector import Batch
+
+pytest.importorskip("chefshat_native")
+
+SOURCE = Path(chefshat.__file__).parents[1]
+# Time limit in seconds.
+WAIT_S = 60
+
+AGENTS = ["random", "greedy", "random_unmasked", "trained"]
+
+
+def random_options(rng: np.random.Generator) -> dict[str, Any]:
+    """Draws options that a setup accepts."""
+    players = int(rng.integers(2, 7))
+    seats = sorted(rng.permutation(players)[: rng.integers(1, players + 1)].tolist())
+    decisions = str(rng.choice(["all", "turns"]))
+    options: dict[str, Any] = {
+        "games": int(rng.integers(1, 6)),
+        "client_seats": seats,
+        "opponents": str(rng.choice(AGENTS)) if rng.random() < 0.5 else rng.choice(AGENTS, players - len(seats)).tolist(),
+        "rewards": str(rng.choice(["validity", "paper", "paper_intended", "winning", "points"])),
+        "episode": str(rng.choice(["shift", "game"])),
+        "decisions": decisions,
+        "skip_forced": bool(rng.integers(2)),
+        "invalid": "ask_again",
+        "max_invalid_attempts": int(rng.integers(1, 30)),
+        "seed": int(rng.integers(2**63)),
+        "rules": {"players": players, "faces": int(rng.integers(7, 12)), "target_shifts": int(rng.integers(1, 4))},
+        "shift_statistics": bool(rng.integers(2)),
+        "records": True,
+        "transitions": True,
+    }
+    if decisions == "turns" and rng.random() < 0.5:
+        options["other_decisions"] = "greedy"
+    if rng.random() < 0.3:
+        options["total_games"] = options["games"] + int(rng.integers(5))
+    return options
+
+
+def columns(table: Table | None) -> dict[str, bytes]:
+    """Returns the columns of a table as bytes, with their types and shapes in the names."""
+    if table is None:
+        return {}
+    return {f"{name} {array.dtype} {array.shape}": array.tobytes() for name, array in table.as_dict().items()}
+
+
+def content(batch: Batch) -> dict[str, Any]:
+    """Returns everything in a batch, comparable."""
+    transitions = batch.transitions
+    return {
+        "step": batch.step,
+        "done": batch.done,
+        "rows": columns(batch),
+        "observations": columns(batch.observations),
+        "endings": columns(batch.endings),
+        "final": columns(batch.endings.observations),
+        "beginnings": columns(batch.beginnings),
+        "shifts": columns(batch.shifts),
+        "totals": batch.totals,
+        "records": batch.records,
+        "transitions": columns(transitions),
+        "before": columns(transitions.before) | columns(transitions.before.observations),
+        "after": columns(transitions.after) | columns(transitions.after.observations),
+    }
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("number", range(12))
+def test_both_ways_to_the_games_are_equal(real_address: str, number: int) -> None:
+    rng = np.random.default_rng(number)
+    options = random_options(rng)
+    with VectorEnv(**options) as here, VectorEnv(real_address, **options) as there:
+        assert here.server is None
+        assert str(there.server) == real_address
+        for name in ("rules", "sizes", "client_seats", "built_in_agents", "base_seed"):
+            assert getattr(here, name) == getattr(there, name)
+        assert here.action_texts == there.action_texts
+        ended = 0
+        for step in range(150):
+            assert content(here.batch) == content(there.batch), (options, step)
+            ended += len(here.batch.records)
+            if here.batch.done or rng.random() < 0.02:
+                seed = int(rng.integers(2**63)) if rng.random() < 0.5 or here.batch.done else None
+                games = None if seed is not None else rng.integers(0, here.games, 2)
+                here.reset(seed, games=games)
+                there.reset(seed, games=games)
+                continue
+            actions = here.sample(step)
+            assert (actions == there.sample(step)).all()
+            wild = rng.random(len(actions)) < 0.1
+            actions[wild] = rng.integers(0, here.num_actions, wild.sum())
+            here.step(actions)
+            there.step(actions)
+        assert ended > 0 or options["rules"]["target_shifts"] > 1
+
+
+@pytest.mark.server
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"games": 0},
+        {"games": 16385, "client_seats": [0]},
+        {"client_seats": [1, 0]},
+        {"client_seats": [0], "opponents": "nobody"},
+        {"client_seats": [0], "opponents": ["greedy", "greedy"]},
+        {"max_invalid_attempts": 3},
+        {"total_games": 1, "games": 2},
+        {"records": True, "games": 257},
+        {"records": True, "rules": {"target_points": 1001}},
+        {"records": True, "invalid": "ask_again"},
+        {"rules": {"faces": 40}},
+        {"rules": "nothing"},
+        {"hands": pb.ScriptedShift(hands=[pb.SeatCards(seat=9)])},
+    ],
+    ids=lambda options: "-".join(options),
+)
+def test_refusals_have_the_same_words(real_address: str, options: dict[str, Any]) -> None:
+    refusals = []
+    for address in (None, real_address):
+        with pytest.raises(ChefsHatError) as refused:
+            VectorEnv(address, **options)
+        refusals.append((refused.value.reason, refused.value.message, refused.value.metadata))
+    assert refusals[0] == refusals[1]
+
+
+def test_draws_are_legal_uniform_and_repeatable() -> None:
+    with VectorEnv(games=1000, seed=[b"x" * 32]) as env:
+        # All games are the same one.
+        while env.batch.masks[0].sum() < 5:
+            env.step(env.batch.masks.argmax(axis=1))
+        drawn = np.concatenate([env.sample(1), *(env.sample() for _ in range(99))])
+        again = np.concatenate([env.sample(1), *(env.sample() for _ in range(99))])
+        assert (drawn == again).all()
+        assert (env.sample(2) != drawn[:1000]).any()
+        legal = np.flatnonzero(env.batch.masks[0])
+        counts = np.bincount(drawn, minlength=env.num_actions)
+        assert counts.sum() == counts[legal].sum() == 100_000
+        expected = 100_000 / len(legal)
+        # Chi-square of the fixed draws: far below a limit of mean plus six standard deviations.
+        assert ((counts[legal] - expected) ** 2 / expected).sum() < len(legal) + 6 * np.sqrt(2 * len(legal))
+        with pytest.raises(ValueError, match="seed is 0"):
+            env.sample(2**64)
+
+
+def test_columns_are_read_only() -> None:
+    with VectorEnv(games=2) as env:
+        for array in (env.batch.games, env.batch.observations.hands, env.batch.beginnings.seeds):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 0
+
+
+def test_batches_outlive_their_games() -> None:
+    with VectorEnv(games=3, seed=4) as env:
+        first = env.batch
+        env.step(env.sample(1))
+    with VectorEnv(games=3, seed=4) as env:
+        assert columns(first.observations) == columns(env.batch.observations)
+        assert columns(first.beginnings) == columns(env.batch.beginnings)
+
+
+def test_a_recorded_game_needs_its_server() -> None:
+    with pytest.raises(ChefsHatError, match=r"BRANCH_REFUSED.*address"):
+        VectorEnv(branch=pb.BranchPoint(game_id="0" * 32, decisions=1))
+
+
+def test_an_env_cannot_be_copied() -> None:
+    with VectorEnv() as env:
+        for copied in (pickle.dumps, copy.copy, copy.deepcopy):
+            with pytest.raises(TypeError, match="create another one"):
+                copied(env)
+        env.step(env.sample())
+
+
+def test_the_way_to_the_games_is_visible() -> None:
+    with VectorEnv() as env:
+        assert env.server is None
+        assert "in process, open" in repr(env)
+    assert "in process, ENV_CLOSED" in repr(env)
+
+
+def test_threads_play_side_by_side() -> None:
+    found: dict[int, list[int]] = {}
+
+    def play(number: int) -> None:
+        with VectorEnv(games=64, seed=9) as env:
+            env.sample(9)
+            found[number] = [int(env.step(env.sample()).observations.hands.sum()) for _ in range(200)]
+
+    threads = [threading.Thread(target=play, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(WAIT_S)
+    assert len(found) == 4
+    assert all(found[number] == found[0] for number in found)
+
+
+FORKED = """
+import os, numpy as np
+from chefshat import VectorEnv
+
+def play(env, steps):
+    for _ in range(steps):
+        env.step(env.sample())
+    return env.batch.observations.hands.tobytes()
+
+parent = VectorEnv(games=4096, seed=1, client_seats=[0], opponents="greedy")
+parent.sample(1)
+play(parent, 3)
+child = os.fork()
+continued = play(parent, 3)
+with VectorEnv(games=4096, seed=2, client_seats=[0], opponents="greedy") as env:
+    env.sample(2)
+    other = play(env, 3)
+if child == 0:
+    os.write(1, b"child " + str(hash(continued) ^ hash(other)).encode() + b"\\n")
+    os._exit(0)
+assert os.waitpid(child, 0)[1] == 0
+os.write(1, b"parent " + str(hash(continued) ^ hash(other)).encode() + b"\\n")
+"""
+
+
+def test_a_forked_process_plays_on() -> None:
+    paths = os.pathsep.join([str(SOURCE), *sys.path])
+    environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": paths}
+    done = subprocess.run(
+        [sys.executable, "-c", FORKED], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    lines = dict(line.split() for line in done.stdout.splitlines())
+    assert lines["child"] == lines["parent"]
+
+
+def test_games_in_process_need_neither_grpc_nor_a_server() -> None:
+    program = (
+        "import sys; sys.modules['grpc'] = None; sys.path[:0] = sys.argv[1:]\n"
+        "import chefshat\nwith chefshat.make('vector', games=2) as env:\n    env.step(env.sample())\n"
+        "print(env, 'chefshat.channels' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(SOURCE), *sys.path], capture_output=True, text=True, timeout=WAIT_S, check=False
+    )
+    assert "in process" in done.stdout, done.stderr
+    assert done.stdout.endswith("False\n")
+
+
+@pytest.mark.server
+def test_without_the_module_a_local_server_plays(monkeypatch: pytest.MonkeyPatch, real_binary: Path) -> None:
+    monkeypatch.setattr("chefshat.vector.importlib.util.find_spec", lambda _: None)
+    with VectorEnv(games=2) as env:
+        assert str(env.server).startswith("127.0.0.1:")
+        assert f"on {env.server}" in repr(env)
+        env.step(env.sample())
