@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 import chefshat
 from chefshat.columns import Situations
 from chefshat.envs import ENV_ID, ChefsHatEnv, ChefsHatVectorEnv, chefshat_v1
+from chefshat.envs import illegal as illegal_actions
 from chefshat.learn import features
 
 
@@ -167,6 +168,44 @@ def test_an_episode_of_one_seat(toy: FakeVector) -> None:
     env.reset(seed=5)
     assert toy.requests[-1].reset.base_seed == 5
     env.close()
+
+
+def test_illegal_actions_are_limited_and_cost_what_the_caller_says(anywhere: str | None) -> None:
+    env = ChefsHatEnv(anywhere, rewards=None, invalid_penalty=2.5)
+    _, info = env.reset(seed=1)
+    assert env.action_masks().tolist() == info["action_mask"].astype(bool).tolist()
+    illegal = int(np.argmin(env.action_masks()))
+    for attempt in range(1, illegal_actions.MAX_INVALID_ATTEMPTS):
+        _, reward, _, _, info = env.step(illegal)
+        assert (reward, info["invalid_attempts"]) == (-2.5, attempt)
+    # The default action is taken, and another decision follows.
+    _, reward, _, _, info = env.step(illegal)
+    assert (reward, info["invalid_attempts"]) == (-2.5, 0)
+    assert env.step(int(np.argmax(env.action_masks())))[1] == 0
+    with pytest.raises(ValueError, match="actions are 0"):
+        env.step(1000)
+    env.close()
+
+
+def test_illegal_actions_cost_the_same_in_all_environments(anywhere: str | None) -> None:
+    many = ChefsHatVectorEnv(anywhere, 3, rewards=None, invalid_penalty=2.5, max_invalid_attempts=1)
+    many.reset(seed=1)
+    actions = many.action_masks().argmax(axis=1)
+    actions[1] = many.action_masks()[1].argmin()
+    _, rewards, _, _, infos = many.step(actions)
+    assert rewards.tolist() == [0, -2.5, 0]
+    assert infos["invalid_attempts"].tolist() == [0, 0, 0]
+    many.close()
+    everyone = chefshat_v1.env(anywhere, rewards=None, invalid_penalty=2.5, max_invalid_attempts=2)
+    everyone.reset(seed=1)
+    agent = everyone.agent_selection
+    illegal = int(everyone.last()[0]["action_mask"].argmin())
+    everyone.step(illegal)
+    assert (everyone.agent_selection, everyone.last()[1]) == (agent, -2.5)
+    everyone.step(illegal)
+    assert everyone.rewards[agent] == -2.5
+    assert everyone.infos[everyone.agent_selection]["invalid_attempts"] == 0
+    everyone.close()
 
 
 def test_the_next_episode_starts_in_the_same_step(toy: FakeVector) -> None:

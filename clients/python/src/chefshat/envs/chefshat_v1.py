@@ -18,6 +18,7 @@ except ImportError as error:
 
 from chefshat.columns import Situations
 from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
+from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.vector import Batch, VectorEnv
@@ -38,7 +39,8 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
     unless the agent decides next. The observation of another agent is that of its last decision. `infos` have "kind" (a value of
     `pb.DecisionKind`), "invalid_attempts", and at the end "place", from 1.
 
-    An illegal action is an invalid attempt: it gets the reward of the scheme, and the same agent decides again. An agent gets the
+    An illegal action is an invalid attempt: it gets the reward of the scheme less `invalid_penalty`, and the same agent decides
+    again; after 10 of them (`max_invalid_attempts`) the default action is taken. An agent gets the
     rewards since its last decision at its next decision, or at the end of the episode. Then all agents are done; `reset()` starts
     the next Shift of the same game, or the next game if that is the episode. In the middle of an episode, or with a seed, it starts
     a new game.
@@ -58,6 +60,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         observation: str | ObservationFunction = "classic",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
+        invalid_penalty: float = 0.0,
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
@@ -67,7 +70,8 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         if "client_seats" in options or "games" in options:
             raise ValueError("this environment has one game and all seats; otherwise use chefshat.VectorEnv")
         self.render_mode = render_mode
-        self.vector = VectorEnv(address, 1, rewards=rewards, invalid=invalid, **options)
+        self.vector = VectorEnv(address, 1, rewards=rewards, **with_limit(invalid, options))
+        self._invalid_penalty = invalid_penalty
         sizes = self.vector.sizes
         self.possible_agents = [f"player_{seat}" for seat in range(sizes.players)]
         self.agents: list[str] = []
@@ -124,7 +128,9 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)
             return
-        self.vector.step(np.asarray([action]))
+        actions = np.asarray([action])
+        penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
+        self.vector.step(actions)
         self._stepped = True
         wait_for_a_row(self.vector, or_an_end=True)
         batch = self.vector.batch
@@ -135,6 +141,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         else:
             self._take_turn(batch)
             self.rewards[self.agent_selection] = float(batch.rewards[0])
+        self.rewards[agent] -= penalty
         self._accumulate_rewards()
         if self.render_mode == "human":
             self.render()

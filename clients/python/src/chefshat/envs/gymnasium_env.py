@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
 from chefshat.columns import Situations
+from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.errors import ChefsHatError
@@ -40,8 +41,10 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
     """One seat of a game; the other seats are built-in agents of the server.
 
     An action is the index of one of A actions (default 214). `info["action_mask"]` has A numbers, 1 where an action is legal;
-    dictionary observations have it, too. `action_space.sample(info["action_mask"])` draws a legal action. An illegal action is an
-    invalid attempt: it gets the reward of the scheme (-1 by "validity" and the paper's), and the decision is asked again.
+    dictionary observations have it, too, and `action_masks()` returns it as booleans, as sb3-contrib requires.
+    `action_space.sample(info["action_mask"])` draws a legal action. An illegal action is an invalid attempt: it gets the reward of
+    the scheme (-1 by "validity" and the paper's) less `invalid_penalty`, and the decision is asked again; after 10 of them
+    (`max_invalid_attempts`) the default action is taken.
 
     An episode is a Shift, or a game. After the end of a Shift `reset()` continues with the next Shift of the same game; in the
     middle of an episode, or with a seed, it starts a new game. `terminated` means that the episode has ended with places, also if
@@ -59,6 +62,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         observation: str | ObservationFunction = "classic",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
+        invalid_penalty: float = 0.0,
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
@@ -70,14 +74,17 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
             observation: "classic", "table", "columns", or a function. See `Form`.
             rewards: the scheme; see `VectorOptions`. With "winning", 1 for finishing first, else -0.001 for each turn.
             invalid: effect of an illegal action; see `VectorOptions`.
+            invalid_penalty: subtracted from the reward of an illegal action.
             render_mode: "ansi": `render()` returns a text; "human": each step prints it.
-            options: further arguments of `VectorEnv`: `token`, `opponents`, `episode`, `decisions`, `rules`, `reward_function`.
+            options: further arguments of `VectorEnv`: `token`, `opponents`, `episode`, `decisions`, `rules`,
+                `reward_function`, `max_invalid_attempts` (default 10; 0: unlimited).
         """
         check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
             raise ValueError("this environment has one game and one seat: choose it with seat=, or use chefshat.VectorEnv")
         self.render_mode = render_mode
-        self.vector = VectorEnv(address, 1, client_seats=[seat], rewards=rewards, invalid=invalid, **options)
+        self.vector = VectorEnv(address, 1, client_seats=[seat], rewards=rewards, **with_limit(invalid, options))
+        self._invalid_penalty = invalid_penalty
         sizes = self.vector.sizes
         self.action_space = spaces.Discrete(sizes.num_actions)
         self._form = Form(observation, sizes, self.vector.batch)
@@ -109,7 +116,9 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         check_open(self.vector)
         if not self._running:
             raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
-        self.vector.step(np.asarray([action]))
+        actions = np.asarray([action])
+        penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
+        self.vector.step(actions)
         self._stepped = True
         wait_for_a_row(self.vector, or_an_end=True)
         batch = self.vector.batch
@@ -121,13 +130,17 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         else:
             self._now = batch
         truncated = ended and bool(batch.endings.truncated[0])
-        reward = float(batch.endings.rewards[0] if ended else batch.rewards[0])
+        reward = float(batch.endings.rewards[0] if ended else batch.rewards[0]) - penalty
         info = self._info()
         if ended:
             info["place"] = int(batch.endings.places_taken[0])
         if self.render_mode == "human":
             self.render()
         return self._observation(), reward, ended and not truncated, truncated, info
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Returns whether each of the A actions is legal now."""
+        return np.array(self._now.masks[0], np.bool_)
 
     def render(self) -> str | None:
         """Formats the seat's situation as text: returned with "ansi", printed with "human"."""

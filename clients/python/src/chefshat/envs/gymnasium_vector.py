@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chefshat.address import ServerAddress
 from chefshat.columns import Endings
 from chefshat.envs.gymnasium_env import check_open
+from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction, Observed
 from chefshat.vector import Batch, VectorEnv
 
@@ -47,6 +48,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         observation: str | ObservationFunction = "classic",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
+        invalid_penalty: float = 0.0,
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
@@ -59,6 +61,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             observation: the form of observations.
             rewards: the scheme.
             invalid: effect of an illegal action.
+            invalid_penalty: subtracted from the reward of an illegal action.
             render_mode: only None: there is no rendering.
             options: further arguments of `VectorEnv`, except for `total_games`: new games follow without limit.
         """
@@ -67,7 +70,8 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if {"client_seats", "games", "total_games"} & options.keys():
             raise ValueError("give seat= and num_envs= instead of client_seats, games and total_games, or use chefshat.VectorEnv")
         self.num_envs = num_envs
-        self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, invalid=invalid, **options)
+        self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, **with_limit(invalid, options))
+        self._invalid_penalty = invalid_penalty
         sizes = self.vector.sizes
         self.single_action_space = spaces.Discrete(sizes.num_actions)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -113,6 +117,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         waiting = self.vector.batch
         if len(waiting) < self.num_envs and chosen.shape == (self.num_envs,):
             chosen = chosen[waiting.games]
+        rows, cost = waiting.games, penalties(waiting, chosen, self._invalid_penalty)
         batch = self.vector.step(chosen)
         rewards = np.zeros(self.num_envs, np.float64)
         rewards[batch.games] = batch.rewards
@@ -125,7 +130,12 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             terminations[endings.games] = ~endings.truncated
             truncations[endings.games] = endings.truncated
             self._add_endings(infos, endings)
+        rewards[rows] -= cost
         return observed, rewards, terminations, truncations, infos
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Returns whether each of the A actions is legal now, one row per game."""
+        return self._masks.astype(np.bool_)
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401 - As Gymnasium has it.
         """Ends the games."""
