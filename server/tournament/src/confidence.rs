@@ -8,6 +8,12 @@
 //! luck cancels out in the difference. Summing each occasion first covers all these cases: if both
 //! played once on every occasion, the result is the paired difference; if they shared none, it is
 //! Welch's.
+//!
+//! The standings themselves decide who is the upper participant, so a test of "the upper one is
+//! better" that ignores this finds twice as many differences between equals as it admits. The
+//! confidence is therefore two-sided: of equal participants, at most one pair in twenty reaches
+//! 95 %. Nor is it ever higher than a few occasions allow: n tosses of a coin all show the same
+//! side with probability 2^(1 - n), so four occasions give at most 87.5 %.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,9 +39,10 @@ pub struct OrderConfidence {
     /// Standard error of the difference; 0 with fewer than two occasions each, or if all occasions
     /// agree.
     pub standard_error: f64,
-    /// Probability by Student's distribution that the order is right, 0..=1: 0.5 if nothing is
-    /// known, less if the scores contradict the order (in a knockout a participant who got further
-    /// may have scored less).
+    /// Confidence that the order is right, 0..=1. Above 0.5 it is the probability that two equal
+    /// participants would differ less, in either direction; 0.5 if hardly anything is known; less
+    /// if the scores contradict the order (in a knockout a participant who got further may have
+    /// scored less).
     pub confidence: f64,
     /// Further games each needs to reach [`SURE`], if the difference and the share of common
     /// occasions stay the same. `None` if it is reached or cannot be estimated.
@@ -55,8 +62,8 @@ pub struct Neighbours {
 
 /// Confidence from which an order counts as settled.
 pub const SURE: f64 = 0.95;
-/// The normal distribution's 95 % point.
-const Z_SURE: f64 = 1.644_853_626_951_472_2;
+/// 95 % of a normal distribution lie within this many deviations of the mean.
+const Z_SURE: f64 = 1.959_963_984_540_054;
 
 /// Scores are whole numbers, so a smaller standard error is a rounding error.
 const ROUNDING: f64 = 1e-9;
@@ -79,32 +86,36 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
         };
     }
     let standard_error = standard_error(upper, lower, means);
-    let confidence = if standard_error > 0.0 {
-        below(difference / standard_error, few - 1)
-    } else {
-        // All occasions agree. For two equal participants each would have gone either way.
-        let other_way = 0.5f64.powi(i32::try_from(few).unwrap_or(i32::MAX));
-        match difference.total_cmp(&0.0) {
-            std::cmp::Ordering::Greater => 1.0 - other_way,
-            std::cmp::Ordering::Less => other_way,
-            std::cmp::Ordering::Equal => 0.5,
-        }
+    // Without a standard error all occasions agree.
+    let as_different = match standard_error > 0.0 {
+        true => 2.0 * below(-difference.abs() / standard_error, few - 1),
+        false => 0.0,
+    };
+    let by_chance = as_different.max(all_the_same(few));
+    let confidence = match difference.total_cmp(&0.0) {
+        std::cmp::Ordering::Greater => (1.0 - by_chance).max(0.5),
+        std::cmp::Ordering::Less => by_chance.min(0.5),
+        std::cmp::Ordering::Equal => 0.5,
     };
     OrderConfidence {
         difference,
         standard_error,
         confidence,
         more_games: (difference > 0.0 && confidence < SURE).then(|| {
-            let needed = if standard_error > 0.0 {
-                let games = games[0].max(games[1]) as f64;
-                games * (Z_SURE * standard_error / difference).powi(2) - games
-            } else {
-                (1.0 - SURE).log(0.5) - few as f64
-            };
+            let games = games[0].max(games[1]) as f64;
+            let by_error = games * (Z_SURE * standard_error / difference).powi(2) - games;
+            let missing = (few..).take_while(|&occasions| all_the_same(occasions) > 1.0 - SURE);
+            let by_occasions = missing.count() as f64 * games / few as f64;
             // The cast saturates.
-            needed.ceil().max(1.0) as u64
+            by_error.max(by_occasions).ceil().max(1.0) as u64
         }),
     }
+}
+
+/// The probability that this many tosses of a coin all show the same side: no difference found on
+/// so few occasions is less likely by chance.
+fn all_the_same(occasions: usize) -> f64 {
+    0.5f64.powi(i32::try_from(occasions - 1).unwrap_or(i32::MAX))
 }
 
 impl Tournament {
@@ -229,8 +240,13 @@ mod tests {
         // The differences are 2, 2, 2, 1, 0: mean 1.4, variance 0.8.
         close(sure.difference, 1.4);
         close(sure.standard_error, (0.8f64 / 5.0).sqrt());
-        // 3.5 standard errors, 4 degrees of freedom.
-        assert!((sure.confidence - 0.987_551_9).abs() < 1e-6, "{sure:?}");
+        // 3.5 standard errors, 4 degrees of freedom: 97.5 %, but these are only five occasions.
+        assert_eq!((sure.confidence, sure.more_games), (0.9375, Some(1)));
+        let longer = |values: &[f64]| scores(0, &[values, &[3.0, 3.0]].concat());
+        let sure = order_confidence(&longer(&UPPER), &longer(&LOWER));
+        // The differences have the mean 1 and the variance 1: 2.65 standard errors, 6 degrees.
+        close(sure.difference, 1.0);
+        assert!((sure.confidence - 0.961_756).abs() < 1e-5, "{sure:?}");
         assert_eq!(sure.more_games, None);
     }
 
@@ -307,12 +323,14 @@ mod tests {
         let by_rounding = order_confidence(&scores(0, &UPPER), &scores(0, &shifted));
         assert_eq!(
             (by_rounding.standard_error, by_rounding.confidence),
-            (0.0, 0.968_75)
+            (0.0, 0.9375)
         );
-        assert_eq!(always(3).confidence, 0.875);
-        assert_eq!(always(3).more_games, Some(2));
-        assert!(always(5).confidence > SURE);
+        assert_eq!(always(2).confidence, 0.5);
+        assert_eq!(always(3).confidence, 0.75);
+        assert_eq!(always(4).confidence, 0.875);
+        assert_eq!(always(3).more_games, Some(3));
+        assert!(always(6).confidence > SURE);
         let against = order_confidence(&scores(0, &[3.0; 3]), &scores(0, &[5.0; 3]));
-        assert_eq!((against.confidence, against.more_games), (0.125, None));
+        assert_eq!((against.confidence, against.more_games), (0.25, None));
     }
 }

@@ -599,8 +599,10 @@ class OrderConfidence(_message.Message):
     standard_error: _builtins.float
     """Standard error of the difference; 0 with fewer than two games each."""
     confidence: _builtins.float
-    """Confidence that the order is right, 0..=1, by Student's t-distribution: 0.5 if nothing is
-    known, less if the scores contradict the order, as they may in a knockout.
+    """Confidence that the order is right, 0..=1. Above 0.5 it is the probability that two equal
+    participants would differ less, in either direction: of equal participants, at most one pair in
+    twenty reaches 0.95. 0.5 if hardly anything is known, less if the scores contradict the order,
+    as they may in a knockout.
     """
     more_games: _builtins.int
     """Number of further games of each that would raise it to 0.95 if the difference stays; unset if
