@@ -116,6 +116,23 @@ impl BuiltInAgent {
         }
     }
 
+    /// How many random words the agent has drawn; `None` if it has no generator. With its seed, this
+    /// is its complete state.
+    pub fn position(&self) -> Option<u128> {
+        match &self.mind {
+            Mind::Kind(_, chance) if self.has_generator() => Some(chance.0.get_word_pos()),
+            _ => None,
+        }
+    }
+
+    /// Continues after this many random words, modulo 2^68, the period of the generator. Does
+    /// nothing without a generator.
+    pub fn set_position(&mut self, position: u128) {
+        if let Mind::Kind(_, chance) = &mut self.mind {
+            chance.0.set_word_pos(position);
+        }
+    }
+
     /// Chooses an action: one of `legal`, except that `random_unmasked` may choose any of the T
     /// actions at a turn.
     ///

@@ -50,12 +50,14 @@ pub use deal::{Card, Deal, Seed};
 pub use event::{Event, ShiftEnd, Viewer};
 pub use exchange::ExchangePair;
 pub use game::{
-    ActionError, Board, Decision, DecisionKind, Game, GiftRequirement, PlayRequirement, Refusal,
-    Requirement, Script, ScriptError,
+    ActionError, Board, Decision, DecisionKind, Game, GameState, GiftRequirement, PlayRequirement,
+    Refusal, Requirement, Script, ScriptError, Stage, StateError,
 };
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
-pub use metrics::{MetricsRecorder, SeatMetrics, SeatStatistics, ShiftMetrics};
+pub use metrics::{
+    MetricsRecorder, RecorderState, SeatCounts, SeatMetrics, SeatStatistics, ShiftMetrics,
+};
 pub use observation::Observation;
 pub use order::{SeatOrder, Standings};
 pub use played::{PlayedDecision, RecordedDecision, TakenOver};

@@ -2,7 +2,8 @@
 //! printing are left to others.
 
 use crate::{
-    BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, ShiftEnd, SpecialAction, Viewer,
+    BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, ShiftEnd, SpecialAction,
+    StateError, Viewer,
 };
 
 /// Metrics of one seat in one Shift.
@@ -84,6 +85,30 @@ pub struct ShiftMetrics {
     pub seats: BySeat<SeatMetrics>,
 }
 
+/// What a [`MetricsRecorder`] has counted of one seat in the current Shift.
+#[derive(Copy, Clone, PartialEq, Debug, Default)]
+pub struct SeatCounts {
+    /// Plays.
+    pub plays: u32,
+    /// Passes.
+    pub passes: u32,
+    /// Invalid attempts at turns.
+    pub wrong: u32,
+    /// Sum of the rewards; 0 without a scheme.
+    pub reward_sum: f64,
+    /// Sum of 10 * points / pizzas over the Shifts that ended.
+    pub performance_sum: f64,
+}
+
+/// The complete state of a [`MetricsRecorder`], beside its game's.
+#[derive(Copy, Clone, PartialEq, Debug)]
+pub struct RecorderState {
+    /// Shifts that ended.
+    pub shifts: u32,
+    /// Counts of each seat.
+    pub seats: BySeat<SeatCounts>,
+}
+
 /// Collects metrics from a game's events, and from wrong actions, which are not events.
 #[derive(Copy, Clone, Debug)]
 pub struct MetricsRecorder {
@@ -119,9 +144,80 @@ impl MetricsRecorder {
         }
     }
 
+    /// The complete state, to continue with [`MetricsRecorder::resuming`].
+    pub fn state(&self) -> RecorderState {
+        RecorderState {
+            shifts: self.shifts,
+            seats: BySeat::from_fn(self.seats.len(), |seat| {
+                let metrics = &self.seats[seat];
+                SeatCounts {
+                    plays: metrics.plays,
+                    passes: metrics.passes,
+                    wrong: metrics.wrong,
+                    reward_sum: metrics.reward_sum,
+                    performance_sum: self.performance_sum[seat],
+                }
+            }),
+        }
+    }
+
+    /// A recorder that continues one of the same scheme, whose game is this one.
+    ///
+    /// # Errors
+    /// If no recorder of this game can have this state.
+    pub fn resuming(
+        game: &Game,
+        scheme: Option<RewardScheme>,
+        state: &RecorderState,
+    ) -> Result<MetricsRecorder, StateError> {
+        let joining = MetricsRecorder::joining(game, scheme);
+        let ended = game.shift() - u32::from(!game.is_over());
+        let turns = if game.is_over() {
+            0
+        } else {
+            game.shift_turns()
+        };
+        let counted = |counts: &SeatCounts| u64::from(counts.plays) + u64::from(counts.passes);
+        let counts: u64 = state.seats.values().map(counted).sum();
+        let sound = |counts: &SeatCounts| {
+            counts.reward_sum.is_finite()
+                && counts.performance_sum.is_finite()
+                && (scheme.is_some() || counts.reward_sum == 0.0)
+        };
+        if state.seats.len() != game.rules().players()
+            || state.shifts > ended
+            || counts > u64::from(turns)
+            || !state.seats.values().all(sound)
+        {
+            return Err(StateError("the metrics do not fit the game"));
+        }
+        Ok(MetricsRecorder {
+            seats: state.seats.map(|counts| {
+                let valid = counts.plays + counts.passes;
+                SeatMetrics {
+                    valid,
+                    plays: counts.plays,
+                    passes: counts.passes,
+                    wrong: counts.wrong,
+                    reward_sum: counts.reward_sum,
+                    reward_count: match scheme {
+                        Some(_) => valid.saturating_add(counts.wrong),
+                        None => 0,
+                    },
+                    ..SeatMetrics::default()
+                }
+            }),
+            finished: if game.is_over() { 0 } else { joining.finished },
+            shifts: state.shifts,
+            performance_sum: state.seats.map(|counts| counts.performance_sum),
+            ..joining
+        })
+    }
+
     /// Counts an invalid attempt of a seat at a turn. Attempts at other decisions are not counted.
     pub fn wrong(&mut self, seat: Seat) {
-        self.seats[seat].wrong += 1;
+        let wrong = &mut self.seats[seat].wrong;
+        *wrong = wrong.saturating_add(1);
         if let Some(scheme) = self.scheme {
             self.reward(seat, scheme.invalid(), 1);
         }
@@ -205,6 +301,7 @@ impl MetricsRecorder {
 
     fn reward(&mut self, seat: Seat, reward: f32, count: u32) {
         self.seats[seat].reward_sum += f64::from(reward);
-        self.seats[seat].reward_count += count;
+        let rewarded = &mut self.seats[seat].reward_count;
+        *rewarded = rewarded.saturating_add(count);
     }
 }

@@ -109,10 +109,10 @@ fn read(
         .with_invalid_actions(invalid)
         .with_total_games(NonZeroU64::new(message.total_games))
         .map_err(problem)?
-        .with_start(start)
-        .map_err(problem)?
         .with_statistics(message.shift_statistics)
-        .with_records(message.records);
+        .with_records(message.records)
+        .with_start(start)
+        .map_err(problem)?;
     if message.records {
         check_records(&setup, dealt, limits)?;
     }
@@ -254,6 +254,7 @@ fn problem(error: SetupError) -> FieldProblem {
         SetupError::Total { .. } => "total_games",
         SetupError::NoSeeds => "game_seeds",
         SetupError::Script(_) => "scripted",
+        SetupError::NoSaved | SetupError::Saved { .. } => "states",
     };
     FieldProblem::new(field, error.to_string())
 }

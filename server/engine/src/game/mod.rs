@@ -1,15 +1,18 @@
 //! A game as a value: its open decision, applying an action, and reading its state. The modules:
 //! `decision` (the open decision and its requirements), `start` (deal, special action, exchange),
 //! `turn` (plays, passes, pizzas), `end` (places, points), `shift_state` (board and turn order),
-//! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands).
+//! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands),
+//! `state` (the complete state as a value), `restore` (from a state to a game).
 
 mod decision;
 mod end;
 mod error;
 mod legal;
+mod restore;
 mod script;
 mod shift_state;
 mod start;
+mod state;
 mod turn;
 mod view;
 
@@ -17,30 +20,13 @@ pub use decision::{Decision, DecisionKind, GiftRequirement, PlayRequirement, Req
 pub use error::{ActionError, Refusal};
 pub use script::{Script, ScriptError};
 pub use shift_state::Board;
+pub use state::{GameState, Stage, StateError};
 
 use crate::{
     Action, ActionId, BySeat, Cards, Deal, Event, Role, RuleSet, Seat, SeatOrder, Seed,
     SpecialAction, Standings, Stop,
 };
 use shift_state::ShiftState;
-
-/// Where a game stands within a Shift.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
-enum Stage {
-    /// This seat was dealt two jokers and may declare a special action.
-    Special(Seat),
-    /// This seat gives a card. The numbers of gifts that the Chef and the Sous-Chef still give
-    /// include this one.
-    Exchange {
-        giver: Seat,
-        chef_left: u8,
-        sous_chef_left: u8,
-    },
-    /// This seat plays or passes.
-    Turn(Seat),
-    /// The game has ended.
-    Over,
-}
 
 /// A game in progress or ended. Has a fixed size and no heap memory, so a clone is a memory copy.
 #[derive(Clone, Eq, PartialEq, Debug)]

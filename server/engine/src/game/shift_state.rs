@@ -46,7 +46,7 @@ pub(super) struct ShiftState {
     pub(super) places: BySeat<u8>,
     /// The seats that have finished, by place.
     pub(super) order: SeatOrder,
-    players: u8,
+    pub(super) players: u8,
 }
 
 impl ShiftState {

@@ -23,6 +23,7 @@ mod rules_page;
 mod scripts;
 mod secrecy;
 mod start;
+mod states;
 mod support;
 mod twins;
 mod vectors;

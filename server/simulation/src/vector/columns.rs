@@ -15,7 +15,7 @@ const FINISHED: u8 = 1;
 const NO_SEAT: u8 = u8::MAX;
 
 /// The tables of one step.
-#[derive(Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Batch {
     /// Number of the batch, from 1.
     pub step: u64,
@@ -52,7 +52,7 @@ pub struct Batch {
 }
 
 /// Observations, one per row. Cards are F+1 counts, seats N values.
-#[derive(Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct ObservationColumns {
     /// u32.
     pub shifts: Vec<u8>,
@@ -83,7 +83,7 @@ pub struct ObservationColumns {
 }
 
 /// Episodes of the client's seats that ended.
-#[derive(Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Endings {
     /// Number of rows.
     pub rows: u32,
@@ -107,7 +107,7 @@ pub struct Endings {
 }
 
 /// Games that began.
-#[derive(Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Beginnings {
     /// Number of rows.
     pub rows: u32,
@@ -120,7 +120,7 @@ pub struct Beginnings {
 }
 
 /// Shifts that ended.
-#[derive(Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Shifts {
     /// Number of rows.
     pub rows: u32,

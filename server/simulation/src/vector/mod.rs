@@ -1,76 +1,30 @@
 //! Vector environments: many games of one client, stepped together. A step takes one action for
 //! each open decision of the client, advances all games with built-in agents, and returns the next
 //! open decisions as columns. `setup` has the options, `slot` advances one game, `columns` is the
-//! output. There are no threads here; several environments can be stepped in parallel.
+//! output, `saved` has complete states of games. There are no threads here; several environments
+//! can be stepped in parallel.
 
 mod columns;
+mod error;
+mod running;
 mod sampling;
+mod saved;
 mod setup;
 mod slot;
+mod terms;
 
-use chefshat_engine::{ActionId, Seat};
-use thiserror::Error;
+use chefshat_engine::ActionId;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
-pub use setup::{
-    Decisions, Episode, InvalidActions, MAX_SEATS_PLAYED, Seeds, SetupError, Start, VectorSetup,
-};
+pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
+pub use saved::SavedGame;
+pub use setup::{Episode, MAX_SEATS_PLAYED, Seeds, SetupError, Start, VectorSetup};
 use slot::Slot;
+pub use terms::{Decisions, Difference, InvalidActions};
 
 /// Maximum number of decisions and invalid attempts of built-in agents within one step, over all
 /// games: about a second. Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
-/// Maximum number of decisions and invalid attempts kept for records of running games: about 64 MB.
-pub const MAX_RECORDED: u64 = 2_000_000;
-
-/// Why a step fails. Except for `RecordsTooLong`, the games are unchanged.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
-pub enum StepError {
-    /// The number of actions is not the number of rows.
-    #[error("{given} actions for a batch of {rows} rows: give one for each row, in the same order")]
-    Actions {
-        /// Actions given.
-        given: usize,
-        /// Rows of the batch.
-        rows: usize,
-    },
-    /// An illegal action, if that is an error.
-    #[error(
-        "row {row} (game {game}, seat {seat}): action {} is not legal; choose one of the row's mask, or set invalid_actions to ASK_AGAIN",
-        action.index()
-    )]
-    Illegal {
-        /// The row, from 0.
-        row: usize,
-        /// Its game.
-        game: u32,
-        /// Its seat.
-        seat: Seat,
-        /// The action.
-        action: ActionId,
-    },
-    /// There is no such game to reset.
-    #[error("game {game} does not exist: the games are 0 to {last}")]
-    NoGame {
-        /// The game named.
-        game: u32,
-        /// The last game.
-        last: u32,
-    },
-    /// Games to reset are repeated or out of order.
-    #[error("game {game} is repeated or out of order: list games ascending, each once")]
-    Order {
-        /// The game named.
-        game: u32,
-    },
-    /// Records of running games exceed the limit. The games have advanced and cannot be used any
-    /// more.
-    #[error(
-        "the records of running games exceed {MAX_RECORDED} decisions and invalid attempts: play fewer or shorter games at a time, or without records"
-    )]
-    RecordsTooLong,
-}
-
 /// The games of one client.
 #[derive(Debug)]
 pub struct VectorGames {
@@ -173,6 +127,75 @@ impl VectorGames {
     /// # Errors
     /// If there is no such game, or the order is not ascending.
     pub fn reset_some(&mut self, games: &[u32]) -> Result<Batch, StepError> {
+        self.check_games(games)?;
+        Ok(self.begin_some(games))
+    }
+
+    /// The complete states of these games, in the order given.
+    ///
+    /// # Errors
+    /// If there is no such game.
+    pub fn save(&self, games: &[u32]) -> Result<Vec<SavedGame>, StepError> {
+        let last = self.setup.games() - 1;
+        let saved = games.iter().map(|&game| {
+            let slot = self.slots.get(game as usize);
+            let slot = slot.ok_or(StepError::NoGame { game, last })?;
+            Ok(slot.save(&self.setup))
+        });
+        saved.collect()
+    }
+
+    /// Replaces these games, in ascending order, by saved ones. Each continues exactly as the saved
+    /// game would, with its index. The batch contains all open decisions; a restored game has not
+    /// begun anew, so it is not among the beginnings.
+    ///
+    /// # Errors
+    /// If the games do not exist or are not ascending, or a state cannot be continued here. Then
+    /// nothing has changed.
+    pub fn restore(&mut self, games: &[u32], states: Vec<SavedGame>) -> Result<Batch, StateError> {
+        self.check_games(games)?;
+        if games.len() != states.len() {
+            return Err(StateError::Count {
+                games: games.len(),
+                states: states.len(),
+            });
+        }
+        states
+            .iter()
+            .try_for_each(|state| self.setup.check(state))?;
+        let replaced = |game: u32| games.binary_search(&game).is_ok();
+        let slots = (0..).zip(&self.slots).filter(|(game, _)| !replaced(*game));
+        let kept: u64 = slots.map(|(_, slot)| slot.kept()).sum();
+        if kept + states.iter().map(SavedGame::kept).sum::<u64>() > MAX_RECORDED {
+            return Err(StepError::RecordsTooLong.into());
+        }
+        for (&game, state) in games.iter().zip(states) {
+            self.slots[game as usize].restore(state);
+        }
+        Ok(self.begin_some(&[]))
+    }
+
+    /// `times` copies of each of these games as games of their own, with the first batch: game i is
+    /// a copy of the one at i modulo the number of `games`. [`VectorSetup::forked`] explains
+    /// `seeds`. These games are unchanged.
+    ///
+    /// # Errors
+    /// If a game does not exist or is over, or there are too many copies.
+    pub fn fork(
+        &self,
+        games: &[u32],
+        times: u32,
+        seeds: Option<Seeds>,
+    ) -> Result<(VectorGames, Batch), SetupError> {
+        let saved = self.save(games).map_err(|error| SetupError::Saved {
+            entry: 0,
+            error: error.into(),
+        })?;
+        let setup = self.setup.forked(saved, times, seeds)?;
+        Ok(VectorGames::new(setup))
+    }
+
+    fn check_games(&self, games: &[u32]) -> Result<(), StepError> {
         let last = self.setup.games() - 1;
         if let Some(&game) = games.iter().find(|game| **game > last) {
             return Err(StepError::NoGame { game, last });
@@ -180,7 +203,7 @@ impl VectorGames {
         if let Some(pair) = games.windows(2).find(|pair| pair[0] >= pair[1]) {
             return Err(StepError::Order { game: pair[1] });
         }
-        Ok(self.begin_some(games))
+        Ok(())
     }
 
     /// Restarts some games, in ascending order, with their next indices.

@@ -8,6 +8,10 @@ use thiserror::Error;
 
 use chefshat_agents::{AgentKind, game_seed};
 
+use super::error::StateError;
+use super::saved::SavedGame;
+use super::terms::{Decisions, InvalidActions, Terms};
+
 /// Maximum number of seats of one client: games times its seats in each.
 pub const MAX_SEATS_PLAYED: u32 = 16_384;
 
@@ -19,33 +23,6 @@ pub enum Episode {
     Shift,
     /// A game.
     Game,
-}
-
-/// Which decisions of its seats the client takes.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
-pub enum Decisions {
-    /// All.
-    #[default]
-    All,
-    /// Only turns.
-    Turns {
-        /// The agent for other decisions; `None` for the default decision.
-        others: Option<AgentKind>,
-    },
-}
-
-/// How illegal actions of the client are handled. The limit of attempts applies to built-in agents
-/// too.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
-pub enum InvalidActions {
-    /// The step fails.
-    #[default]
-    Error,
-    /// The action counts as an invalid attempt, and the decision is asked again.
-    AskAgain {
-        /// Attempts after which the default decision is taken; `None` for no limit.
-        limit: Option<NonZeroU32>,
-    },
 }
 
 /// The seeds of the games.
@@ -79,6 +56,16 @@ pub enum Start {
         /// The game.
         game: Box<Game>,
         /// Whether later Shifts are dealt from this game's seed instead of each game's own.
+        same_deals: bool,
+    },
+    /// Copies of saved games: the game with index i is a copy of the saved game at i modulo their
+    /// number.
+    Saved {
+        /// The games.
+        games: Arc<[SavedGame]>,
+        /// Whether a copy continues as the saved game would: with its seed, and its agents'
+        /// generators where they were. Otherwise later Shifts are dealt and agents choose by each
+        /// game's own seed.
         same_deals: bool,
     },
 }
@@ -139,6 +126,17 @@ pub enum SetupError {
     /// The script is invalid.
     #[error("{0}")]
     Script(#[from] ScriptError),
+    /// The list of saved games is empty.
+    #[error("the list of saved games is empty: give at least one")]
+    NoSaved,
+    /// A saved game cannot be continued with these options.
+    #[error("saved game {entry}: {error}")]
+    Saved {
+        /// The game at fault, from 0.
+        entry: usize,
+        /// Why.
+        error: StateError,
+    },
 }
 
 impl VectorSetup {
@@ -239,15 +237,61 @@ impl VectorSetup {
         VectorSetup { seeds, ..self }
     }
 
-    /// Sets the start of each game.
+    /// Sets the start of each game. Saved games are checked with the options set before.
     ///
     /// # Errors
-    /// If a script is invalid under the rule set.
-    pub fn with_start(self, start: Start) -> Result<VectorSetup, SetupError> {
-        if let Start::Script(script) = &start {
-            Game::scripted(self.rules, Seed([0; 32]), script, |_| {})?;
+    /// If a script is invalid under the rule set, or a saved game cannot be continued.
+    pub fn with_start(self, mut start: Start) -> Result<VectorSetup, SetupError> {
+        match &mut start {
+            Start::Script(script) => {
+                Game::scripted(self.rules, Seed([0; 32]), script, |_| {})?;
+            }
+            Start::Saved { games, .. } => {
+                if games.is_empty() {
+                    return Err(SetupError::NoSaved);
+                }
+                let terms = self.terms();
+                let checked = games.iter().cloned().enumerate().map(|(entry, saved)| {
+                    let error = |error| SetupError::Saved { entry, error };
+                    saved.into_start(&terms).map_err(error)
+                });
+                *games = checked.collect::<Result<_, _>>()?;
+            }
+            Start::Deal | Start::Point { .. } => {}
         }
         Ok(VectorSetup { start, ..self })
+    }
+
+    /// Options for `times` copies of each of these games, otherwise the same. With seeds, copies
+    /// differ in later deals and in the random choices of built-in agents; without, they continue
+    /// as the saved games would. If the number of games is limited, none follows a copy. Decisions
+    /// are not kept for records.
+    ///
+    /// # Errors
+    /// If there are too many copies, or a game cannot be continued.
+    pub fn forked(
+        &self,
+        games: Vec<SavedGame>,
+        times: u32,
+        seeds: Option<Seeds>,
+    ) -> Result<VectorSetup, SetupError> {
+        let copies = u32::try_from(games.len()).unwrap_or(u32::MAX);
+        let copies = copies.saturating_mul(times);
+        let (agents, same_deals) = (self.agents.as_slice(), seeds.is_none());
+        let seeds = seeds.unwrap_or_else(|| self.seeds.clone());
+        let sized = VectorSetup::new(self.rules, copies, agents, seeds)?;
+        VectorSetup {
+            games: copies,
+            seeds: sized.seeds,
+            total_games: self.total_games.and(NonZeroU64::new(copies.into())),
+            records: false,
+            start: Start::Deal,
+            ..self.clone()
+        }
+        .with_start(Start::Saved {
+            games: games.into(),
+            same_deals,
+        })
     }
 
     /// Sets whether batches contain the Shifts that ended.
@@ -342,7 +386,35 @@ impl VectorSetup {
         self.seeds.of(index)
     }
 
-    /// A game with this seed at its start.
+    /// What the state of a game depends on.
+    pub(super) fn terms(&self) -> Terms {
+        Terms {
+            rules: self.rules,
+            agents: self.agents,
+            scheme: self.scheme,
+            decisions: self.decisions,
+            invalid: self.invalid,
+            statistics: self.statistics,
+            records: self.records,
+        }
+    }
+
+    /// Checks that a saved game can continue with these options.
+    pub(super) fn check(&self, saved: &SavedGame) -> Result<(), StateError> {
+        saved.check(&self.terms())?;
+        let copies = matches!(self.start, Start::Saved { .. });
+        if self.records && !copies && !saved.is_played_from(|seed| self.begin(seed)) {
+            return Err(StateError::Record);
+        }
+        Ok(())
+    }
+
+    /// The start of each game.
+    pub(super) fn start(&self) -> &Start {
+        &self.start
+    }
+
+    /// A game with this seed at its start, which is not a saved one.
     pub(super) fn begin(&self, seed: Seed) -> Game {
         match &self.start {
             Start::Deal => Game::new(self.rules, seed, |_| {}),
@@ -355,6 +427,7 @@ impl VectorSetup {
                 }
                 game
             }
+            Start::Saved { .. } => unreachable!("copies of saved games begin as they were saved"),
         }
     }
 }

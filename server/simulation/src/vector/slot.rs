@@ -2,13 +2,15 @@
 //! agents to the client's next decision, and writes rewards, ended episodes and counts.
 
 use chefshat_engine::{
-    Action, ActionId, BySeat, Decision, Event, Game, MAX_SEATS, Mask, MetricsRecorder, Seat, Seed,
-    Standings, Viewer,
+    Action, ActionId, BySeat, Decision, Event, Mask, MetricsRecorder, Seat, Standings, Viewer,
 };
 
 use super::columns::{Batch, Ending, PlayedGame, Row, Totals, places_taken};
-use super::{Decisions, Episode, VectorSetup};
-use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed, ask, is_wrong_action};
+use super::running::{Open, RunningGame};
+use super::saved::SavedGame;
+use super::setup::{Episode, Start, VectorSetup};
+use super::terms::Decisions;
+use chefshat_agents::{ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;
 
 /// Maximum number of Shifts that end in one game within one step, not counting one that the
@@ -22,37 +24,6 @@ pub(super) struct Slot {
     index: u64,
     /// `None` once the last game is over.
     running: Option<RunningGame>,
-}
-
-/// A game being played.
-#[derive(Debug)]
-struct RunningGame {
-    seed: Seed,
-    game: Game,
-    /// Agents by seat. On the client's seats they take the decisions that the client does not.
-    agents: [Option<BuiltInAgent>; MAX_SEATS],
-    /// Collects statistics of Shifts, if enabled.
-    recorder: Option<MetricsRecorder>,
-    /// Rewards since each seat last decided.
-    rewards: BySeat<f32>,
-    /// The decision open for the client.
-    open: Option<Open>,
-    /// The events of the last decision.
-    events: Vec<Event>,
-    /// Invalid attempts at the current decision, if records are enabled.
-    attempts: Vec<ActionId>,
-    decisions: Vec<PlayedDecision>,
-    /// Number of decisions and attempts in `decisions`.
-    kept: u64,
-}
-
-#[derive(Debug)]
-struct Open {
-    decision: Decision,
-    legal: Mask,
-    attempts: u32,
-    /// The rewards shown in the row, until the client answers.
-    reward: f32,
 }
 
 impl Slot {
@@ -70,7 +41,7 @@ impl Slot {
     /// Ends or abandons the game and begins the one with the next index, if there is one.
     pub(super) fn begin_next(&mut self, setup: &VectorSetup, batch: &mut Batch) {
         self.running = None;
-        let next = self.index + u64::from(setup.games());
+        let next = self.index.saturating_add(setup.games().into());
         if setup.has_game(next) {
             self.index = next;
             self.begin(setup, batch);
@@ -78,11 +49,22 @@ impl Slot {
     }
 
     fn begin(&mut self, setup: &VectorSetup, batch: &mut Batch) {
-        let running = RunningGame::new(setup, setup.game_seed(self.index));
+        let running = RunningGame::begin(setup, self.index);
         batch
             .beginnings
             .push(self.number, self.index, &running.seed.0);
         self.running = Some(running);
+    }
+
+    /// The state of the game.
+    pub(super) fn save(&self, setup: &VectorSetup) -> SavedGame {
+        SavedGame::new(setup.terms(), self.index, self.running.clone())
+    }
+
+    /// Replaces the game.
+    pub(super) fn restore(&mut self, saved: SavedGame) {
+        self.index = saved.index();
+        self.running = saved.into_running();
     }
 
     /// Whether the last game is over.
@@ -123,7 +105,7 @@ impl Slot {
         let (decision, legal) = (open.decision, &open.legal);
         let mut taken = action;
         if !legal.contains(action) {
-            open.attempts += 1;
+            open.attempts = open.attempts.saturating_add(1);
             open.reward = 0.0;
             let attempts = open.attempts;
             totals.invalid_attempts += 1;
@@ -284,28 +266,22 @@ impl Slot {
 }
 
 impl RunningGame {
-    fn new(setup: &VectorSetup, seed: Seed) -> RunningGame {
+    /// Begins the game with this index.
+    fn begin(setup: &VectorSetup, index: u64) -> RunningGame {
+        let seed = setup.game_seed(index);
+        if let Start::Saved { games, same_deals } = setup.start() {
+            let saved = &games[(index % games.len() as u64) as usize];
+            return saved.begin((!same_deals).then_some(seed));
+        }
         let game = setup.begin(seed);
-        let players = setup.rules().players();
-        let others = match setup.decisions() {
-            Decisions::All | Decisions::Turns { others: None } => None,
-            Decisions::Turns { others } => others,
-        };
-        // An array, because agents with their generators are not `Copy`.
-        let agents = std::array::from_fn(|index| {
-            let seat = Seat::new(index);
-            let kind: Option<AgentKind> =
-                setup.agents().get(seat).and_then(|agent| agent.or(others));
-            kind.map(|kind| BuiltInAgent::new(kind, agent_seed(seed, seat)))
-        });
         RunningGame {
             seed,
             recorder: setup
                 .statistics()
                 .then(|| MetricsRecorder::joining(&game, setup.scheme())),
             game,
-            agents,
-            rewards: BySeat::filled(players, 0.0),
+            agents: RunningGame::agents(&setup.terms(), seed),
+            rewards: BySeat::filled(setup.rules().players(), 0.0),
             open: None,
             events: Vec::with_capacity(8),
             attempts: Vec::new(),

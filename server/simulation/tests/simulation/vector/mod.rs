@@ -3,6 +3,7 @@
 mod episodes;
 mod limits;
 mod play;
+mod states;
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, Mask, RuleSet, RuleSetSpec};
