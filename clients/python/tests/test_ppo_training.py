@@ -17,6 +17,7 @@ from chefshat.learn.runs import full_rules
 
 pytestmark = pytest.mark.server
 
+CLASSIC = Path(__file__).parents[3] / "tests" / "fixtures" / "network" / "classic-turns.safetensors"
 SMALL = {"players": 2, "faces": 4}
 PLAN = Plan(games=64, steps=32, learning_rate=2e-3, hyper=Hyperparameters(policy_widths=(32,), value_widths=(32,), minibatches=4))
 
@@ -80,6 +81,31 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     assert command.main(["evaluate", str(out), "--opponents", "greedy", "--games", "3", "--address", real_address, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["opponents"], found["games"], sum(found["places"])) == (["greedy"] * 3, 3, found["shifts"])
+
+
+def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = ["--steps", "16", "--minibatches", "2", "--evaluations", "1", "--evaluation-games", "2", "--address", real_address]
+    first, second = tmp_path / "first.safetensors", tmp_path / "second.safetensors"
+    assert command.main(["ppo", "--out", str(first), "--games", "8", "--width", "8", "--decisions", "128", *small]) == 0
+    capsys.readouterr()
+    begun = network.load(first)
+    plan = replace(PLAN, hyper=replace(PLAN.hyper, policy_widths=(8, 8)))
+    begin = ppo_checkpoint.begin(plan, 1, full_rules("paper", real_address), "a test", begun).network("begun")
+    for old, new in zip(begun.layers, begin.layers, strict=True):
+        np.testing.assert_array_equal(old.weight, new.weight)
+        np.testing.assert_array_equal(old.bias, new.bias)
+
+    best_response = ["ppo", "--out", str(second), "--games", "0", "--decisions", "128", *small]
+    assert command.main(best_response) == 1
+    assert "--opponent-games must be at least 1" in capsys.readouterr().err
+    best_response += ["--opponent-games", "8", "--opponents", "trained", "--json"]
+    assert command.main([*best_response, "--begin-with", str(CLASSIC)]) == 1
+    assert "is not a policy of `ppo`" in json.loads(capsys.readouterr().out)["message"]
+    assert command.main([*best_response, "--begin-with", str(first)]) == 0
+    trained = json.loads(capsys.readouterr().out)
+    assert trained["decisions"] == 128
+    assert [evaluation["opponents"][0] for evaluation in trained["evaluations"]] == ["greedy", "random", "trained"]
+    assert [layer.bias.shape for layer in network.load(second).layers] == [layer.bias.shape for layer in begun.layers]
 
 
 def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ from chefshat import join_options
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
+  python -m chefshat.learn ppo --out exploiter.safetensors --games 0 --opponent-games 256 --opponents trained --minutes 30
   python -m chefshat.learn curve strong.jsonl --out strong.png
   python -m chefshat.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
   python -m chefshat.learn tune --out tuned.json --trials 50 --shifts 250
@@ -93,6 +94,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     _common(command)
     command.add_argument("--name", default="ppo", help="name of the agent, written into the network")
     command.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set")
+    command.add_argument("--begin-with", type=Path, metavar="FILE", help="a network of `ppo` to begin with (default: a new one)")
     command.add_argument(
         "--resume", action="store_true", help="resume from the checkpoint, with its plan; the budget counts from the first start"
     )
@@ -103,7 +105,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     command.add_argument("--evaluations", "--looks", type=_count, default=20, help="number of evaluations and checkpoints")
     plan = command.add_argument_group("plan (stored in the checkpoint)")
     plan.add_argument("--evaluation-games", type=_count, default=400, help="games against greedy and random in each evaluation")
-    plan.add_argument("--games", type=_count, default=256, help="parallel games of self-play")
+    plan.add_argument("--games", type=_natural, default=256, help="parallel games of self-play; 0: learn a best response")
     plan.add_argument("--opponent-games", type=_natural, default=0, help="further games with one seat against built-in agents")
     plan.add_argument("--opponents", default="greedy", help="the built-in agent in these")
     plan.add_argument("--steps", type=_count, default=128, help="decisions in each game between two updates")

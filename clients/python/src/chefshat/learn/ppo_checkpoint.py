@@ -9,9 +9,12 @@ import os
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+import jax
+
 from chefshat import pb
 from chefshat.learn import mlp, ppo, training_file
 from chefshat.learn.features import num_actions, table_width
+from chefshat.learn.mlp import Params
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters, Learner
 from chefshat.learn.training_file import network_info, opened
@@ -26,7 +29,7 @@ class Plan:
     """The settings of a training.
 
     Attributes:
-        games: parallel games of self-play.
+        games: parallel games of self-play; 0: only those against the opponents, for a best response to them.
         opponent_games: further games, in which the policy plays only seat 0.
         opponents: the built-in agent of the other seats of these.
         steps: decisions in each game between two updates.
@@ -102,9 +105,20 @@ class Training:
         return Network(layers, network_info(self.rules, name, self.trained_by, input="table", output="actions", masked=True))
 
 
-def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str) -> Training:
-    """Returns a new training. `rules` has every field set."""
+def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str, begin_with: Network | None = None) -> Training:
+    """Returns a new training.
+
+    Args:
+        plan: the settings.
+        seed: the seed.
+        rules: the rule set, every field set.
+        trained_by: the command.
+        begin_with: the initial policy, with the hidden layers of the plan; None: a new one.
+    """
     learner = ppo.start(seed, table_width(rules.players, rules.faces), num_actions(rules.faces), plan.hyper)
+    if begin_with is not None:
+        policy: Params = jax.tree.map(lambda leaf: leaf[0], mlp.stack([begin_with.layers]))
+        learner = learner._replace(params=learner.params._replace(policy=policy))
     return Training(plan, seed, rules, learner, Progress(), trained_by)
 
 

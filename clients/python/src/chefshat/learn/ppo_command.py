@@ -19,10 +19,11 @@ import numpy as np
 from google.protobuf import json_format
 from tqdm import tqdm
 
-from chefshat import join_options
+from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
+from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
 from chefshat.learn.ppo_training import Trainer
@@ -56,6 +57,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _start(options: argparse.Namespace) -> Training:
+    if options.games + options.opponent_games == 0:
+        raise ValueError("there are no games to play: --games or --opponent-games must be at least 1")
+    rules = runs.full_rules(options.rules, join_options.server_if_any(options))
+    begin_with = None if options.begin_with is None else _policy(options.begin_with, rules)
+    widths = (options.width,) * 2 if begin_with is None else tuple(len(layer.bias) for layer in begin_with.layers[:-1])
     plan = Plan(
         games=options.games,
         opponent_games=options.opponent_games,
@@ -67,7 +73,7 @@ def _start(options: argparse.Namespace) -> Training:
         gae_lambda=options.gae_lambda,
         evaluation_games=options.evaluation_games,
         hyper=Hyperparameters(
-            policy_widths=(options.width,) * 2,
+            policy_widths=widths,
             value_widths=(options.value_width,) * 2,
             clip=options.clip,
             minibatches=options.minibatches,
@@ -77,8 +83,17 @@ def _start(options: argparse.Namespace) -> Training:
         raise ValueError(
             f"{plan.steps} steps of {plan.games + plan.opponent_games} games do not split into {plan.hyper.minibatches} parts"
         )
-    rules = runs.full_rules(options.rules, join_options.server_if_any(options))
-    return ppo_checkpoint.begin(plan, options.seed, rules, runs.trained_by("", options.trained_by))
+    return ppo_checkpoint.begin(plan, options.seed, rules, runs.trained_by("", options.trained_by), begin_with)
+
+
+def _policy(file: Path, rules: pb.RuleSet) -> Network:
+    """Reads the initial policy of a training under these rules."""
+    policy = network.load(file)
+    info = policy.info
+    sizes = info.players, info.faces, info.jokers
+    if (info.input, info.output) != ("table", "actions") or sizes != (rules.players, rules.faces, rules.jokers):
+        raise ValueError(f"{file} is not a policy of `ppo` for {rules.players} players, {rules.faces} faces, {rules.jokers} jokers")
+    return policy
 
 
 def _resume(state: Path, options: argparse.Namespace) -> Training:
@@ -124,7 +139,8 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     began = time.monotonic()
     training = trainer.training
     current = training.network(options.name)
-    games = training.plan.evaluation_games
+    plan = training.plan
+    games = plan.evaluation_games
     evaluations = [
         evaluate(
             current,
@@ -134,7 +150,7 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
             rules=training.rules,
             address=join_options.server_if_any(options),
         )
-        for opponents in OPPONENTS
+        for opponents in dict.fromkeys((*OPPONENTS, *([plan.opponents] if plan.opponent_games else [])))
     ]
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)
     trainer.training = dataclasses.replace(training, progress=progress)

@@ -34,13 +34,14 @@ class Trainer:
         self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
         # Every resumption plays other games.
         first_seed = training.seed + SEED_STEP * runs
-        kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {})]
-        if plan.opponent_games:
-            kinds.append((plan.opponent_games, {"client_seats": [0], "opponents": plan.opponents}))
+        alone = {"client_seats": [0], "opponents": plan.opponents}
+        kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
         self._envs: list[VectorEnv] = []
         self._collectors: list[Collector] = []
         try:
             for number, (games, others) in enumerate(kinds):
+                if games == 0:
+                    continue
                 settings = {"episode": "shift", "skip_forced": True, "rules": training.rules, **others}
                 # Seeds of trainings are below 2^31, so no two environments share one.
                 self._envs.append(VectorEnv(address, games, seed=first_seed + SEED_STEP // 2 * number, **settings))
