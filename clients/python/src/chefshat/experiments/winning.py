@@ -1,11 +1,13 @@
 """Experiment 3: agents that know the rules learn to win, one against three random agents, and four against each other.
 
-Every agent starts with the network of Experiment 2 for its seed. Memory, optimiser and exploration are new, because the rewards
-differ. The paper defines a reward for illegal actions in this experiment, too, and its discussion says that the agents could not be
-kept from them: so its agents choose among all 200 actions, and so does our first one. But under the printed reward such an agent
-unlearns the rules (every state is worth less than the lowest tanh output, and so is every illegal action) and would spend thousands
-of attempts in a Shift: after `WRONG_LIMIT` illegal actions at one decision it takes a random legal one, as the environment
-published with the paper does for it. The second agent is the same with a mask.
+Every agent starts with the network of Experiment 2 for its seed, unless the condition says otherwise. Memory, optimiser and
+exploration are new, because the rewards differ. The paper defines a reward for illegal actions in this experiment, too, and its
+discussion says that the agents could not be kept from them: so its agents choose among all 200 actions, and so does our first one.
+But under the printed reward such an agent unlearns the rules (every state is worth less than the lowest tanh output, and so is every
+illegal action) and would spend thousands of attempts in a Shift: after `WRONG_LIMIT` illegal actions at one decision it takes a
+random legal one, as the environment published with the paper does for it. The second agent is the same with a mask. It plays with a
+new network, too: that of Experiment 2 values passing so highly that its tanh is flat there, and a masked agent, which never meets
+the large errors of illegal actions, cannot unlearn it.
 
 The reward is used as printed (`paper`), with the share of cards shed, which it seems to mean (`paper_intended`), and as the paper's
 program seems to have had it (`program`).
@@ -65,18 +67,32 @@ COUNTED = ("paper", "paper_intended")
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition: the agent, the reward scheme, and whether four of them learn or one."""
+    """A condition: the agent, the reward scheme, and whether four of them learn or one.
+
+    Attributes:
+        agent: a key of `AGENTS`, or of `baselines.POLICIES`.
+        rewards: a key of `REWARDS`.
+        four: whether all four seats have such an agent, or one.
+        gifts: how these seats decide in the exchange.
+        new_network: whether learners begin with a new network instead of that of Experiment 2.
+    """
 
     agent: str
     rewards: str
     four: bool
     gifts: str = learning.DEFAULT_GIFTS
+    new_network: bool = False
+
+    @property
+    def learner(self) -> str:
+        """Name of the learner: without the number of agents and their gifts."""
+        return f"{self.agent}, {self.rewards}{', new network' if self.new_network else ''}"
 
     @property
     def name(self) -> str:
         """Name, without the number of agents."""
         gifts = "" if self.gifts == learning.DEFAULT_GIFTS else f", {self.gifts}"
-        return f"{self.agent}, {self.rewards}{gifts}"
+        return f"{self.learner}{gifts}"
 
     @property
     def seats(self) -> tuple[int, ...]:
@@ -86,6 +102,7 @@ class Condition:
 
 ONE = (
     *(Condition(agent, rewards, four=False) for agent in AGENTS for rewards in REWARDS),
+    *(Condition("mask", rewards, four=False, new_network=True) for rewards in REWARDS),
     Condition("mask", "paper", four=False, gifts=learning.RANDOM_GIFTS),
 )
 # Omits four agents without a mask under `paper_intended`, which rewards every turn: they only learn to draw a Shift out, to some
@@ -111,7 +128,7 @@ def run(config: Config, progress: Progress) -> Result:
             rewards=REWARDS[condition.rewards],
             seats=condition.seats,
             gifts=condition.gifts,
-            begin_with=begin_with,
+            begin_with=None if condition.new_network else begin_with,
         )
         for condition in (*ONE, *FOUR)
     }
@@ -160,7 +177,7 @@ def _one(config: Config, learned: Mapping[Condition, Learned], others: Mapping[C
         randoms = np.mean([each.wins(seat) for seat in rules.RANDOM], axis=0).tolist()
         rows.append(
             [
-                condition.agent if condition in others else f"{condition.agent}, {condition.rewards}",
+                condition.agent if condition in others else condition.learner,
                 "default" if condition.gifts == learning.DEFAULT_GIFTS else "random",
                 learning.count(config, each, each.wins(LEARNER)),
                 learning.count(config, each, randoms),
@@ -266,8 +283,6 @@ def _behaviour(config: Config, learned: Mapping[Condition, Learned], others: Map
 
 
 def _figure_of_one(learned: Mapping[Condition, Learned], others: Mapping[Condition, Counts]) -> Figure:
-    wins = [_share_won(condition.name, learned[condition].won[:, :, LEARNER]) for condition in ONE]
-
     def share_of(agent: str) -> float:
         return float(100 * others[Condition(agent, COUNTED[0], four=False)].won[:, :, LEARNER].mean())
 
@@ -275,19 +290,23 @@ def _figure_of_one(learned: Mapping[Condition, Learned], others: Mapping[Conditi
         *(Level(agent, share_of(agent)) for agent in (baselines.RANDOM, baselines.NEVER_IDLE)),
         Level("paper, all 250", 100 * paper.WINNING_WINS_LEARNER / paper.SHIFTS),
     ]
-    panels = [Panel("Shifts won by the learner", "Shift", "share (%)", lines=wins, levels=levels, y_range=(-3, 103))]
+    panels = []
+    for title, new_network in (("Experiment 2's network", False), ("new network", True)):
+        of_title = [each for each in ONE if each.new_network == new_network and each.gifts == learning.DEFAULT_GIFTS]
+        lines = [_share_won(f"{each.agent}, {each.rewards}", learned[each].won[:, :, LEARNER]) for each in of_title]
+        panels.append(Panel(f"Shifts won, {title}", "Shift", "share (%)", lines=lines, levels=levels, y_range=(-3, 103)))
     for rewards in COUNTED:
         lines = []
         for agent in AGENTS:
             of_seats = learned[Condition(agent, rewards, four=False)].rewards()
             lines.append(learning.curve(f"learner, {agent}", of_seats[:, :, LEARNER]))
         lines.append(learning.curve("random agents", of_seats[:, :, 1:].mean(axis=2)))
-        panels.append(Panel(f"Mean reward, {rewards}", "Shift", "reward of an action", lines=lines))
+        panels.append(Panel(f"Mean reward, {rewards}, Experiment 2's network", "Shift", "reward of an action", lines=lines))
     return Figure(
         name="one",
         title=f"One learner against three random agents: means of {SMOOTHED} Shifts (rewards: {learning.SMOOTHED}), all seeds",
         panels=panels,
-        columns=3,
+        columns=2,
     )
 
 
