@@ -3,11 +3,11 @@
 Every agent starts with the network of Experiment 2 for its seed, unless the condition says otherwise. Memory, optimiser and
 exploration are new, because the rewards differ. The paper defines a reward for illegal actions in this experiment, too, and its
 discussion says that the agents could not be kept from them: so its agents choose among all 200 actions, and so does our first one.
-But under the printed reward such an agent unlearns the rules (every state is worth less than the lowest tanh output, and so is every
-illegal action) and would spend thousands of attempts in a Shift: after `WRONG_LIMIT` illegal actions at one decision it takes a
-random legal one, as the environment published with the paper does for it. The second agent is the same with a mask. It plays with a
-new network, too: that of Experiment 2 values passing so highly that its tanh is flat there, and a masked agent, which never meets
-the large errors of illegal actions, cannot unlearn it.
+But under the printed reward such an agent unlearns the rules (every state is worth less than the lowest tanh output, and so is
+every illegal action) and would spend thousands of attempts in a Shift: after `WRONG_LIMIT` illegal actions at one decision it takes
+a random legal one, as the environment published with the paper does for it. The second agent is the same with a mask. It plays with
+a new network, too: that of Experiment 2 values passing so highly that its tanh is flat there, and a masked agent, which lacks the
+large errors of illegal actions, hardly unlearns it.
 
 The reward is used as printed (`paper`), with the share of cards shed, which it seems to mean (`paper_intended`), and as the paper's
 program seems to have had it (`program`).
