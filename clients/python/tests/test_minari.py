@@ -1,0 +1,60 @@
+"""Export to Minari: the episodes of a dataset are those of the transitions. Runs where Minari is installed."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import chefshat
+from chefshat.transitions import Transitions, concatenate
+
+pytest.importorskip("minari")
+pytest.importorskip("chefshat_native")
+
+
+def played() -> Transitions:
+    """All transitions of a few games."""
+    rng = np.random.default_rng(1)
+    parts = []
+    with chefshat.VectorEnv(games=3, transitions=True, rewards="points", total_games=3, episode="shift", seed=1) as env:
+        batch = env.batch
+        while not batch.done:
+            batch = env.step(chefshat.sample_legal(batch.mask_bits, rng))
+            parts.append(batch.transitions)
+    return concatenate(parts)
+
+
+@pytest.mark.parametrize("observation", ["table", "columns"])
+def test_episodes_are_those_of_the_seats(observation: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    module = importlib.import_module("chefshat.replay.minari")
+    transitions = played()
+    dataset: Any = module.to_minari(transitions, "chefshat/test-v0", observation=observation, author="Ada")
+    assert dataset.total_steps == len(transitions)
+    assert dataset.total_episodes == int(transitions.ended.sum())
+    total = 0.0
+    for episode in dataset.iterate_episodes():
+        masks = episode.infos["action_mask"]
+        assert len(masks) == len(episode.actions) + 1
+        # Every action was legal, and there is none at the end.
+        assert masks[np.arange(len(episode.actions)), episode.actions].all()
+        assert not masks[-1].any()
+        assert episode.terminations[-1]
+        assert not episode.terminations[:-1].any()
+        total += float(episode.rewards.sum())
+    assert total == pytest.approx(float(transitions.rewards.sum()))
+
+
+def test_an_episode_without_its_end_is_truncated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    module = importlib.import_module("chefshat.replay.minari")
+    transitions = played()
+    some = transitions.take(np.flatnonzero((transitions.games == 0) & (transitions.seats == 0))[:2])
+    dataset: Any = module.to_minari(some, "chefshat/some-v0")
+    (episode,) = dataset.iterate_episodes()
+    assert episode.truncations.tolist() == [False, True]
+    assert not episode.terminations.any()
+    with pytest.raises(ValueError, match="no transitions"):
+        module.to_minari(some.take(np.zeros(0, np.intp)), "chefshat/none-v0")
