@@ -96,6 +96,7 @@ def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path
         np.testing.assert_array_equal(old.bias, new.bias)
 
     best_response = ["ppo", "--out", str(second), "--games", "0", "--decisions", "128", *small]
+    best_response += ["--tensorboard", str(tmp_path / "curves")]
     assert command.main(best_response) == 1
     assert "--opponent-games must be at least 1" in capsys.readouterr().err
     best_response += ["--opponent-games", "8", "--opponents", "trained", "--json"]
@@ -106,6 +107,8 @@ def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path
     assert trained["decisions"] == 128
     assert [evaluation["opponents"][0] for evaluation in trained["evaluations"]] == ["greedy", "random", "trained"]
     assert [layer.bias.shape for layer in network.load(second).layers] == [layer.bias.shape for layer in begun.layers]
+    (curves,) = (tmp_path / "curves").iterdir()
+    assert all(tag in curves.read_bytes() for tag in (b"losses/entropy", b"points_per_shift/trained"))
 
 
 def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

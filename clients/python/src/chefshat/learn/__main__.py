@@ -27,7 +27,7 @@ Without --address the command starts a server of its own.
 exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments, 130 interrupted
 """
 # Packages of the extra. A missing module of any other package is a bug.
-EXTRA = ("flax", "jax", "jaxlib", "optax", "optuna", "safetensors", "tqdm")
+EXTRA = ("flax", "jax", "jaxlib", "optax", "optuna", "safetensors", "tensorboardX", "tqdm")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -103,6 +103,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
         "--log", type=Path, metavar="FILE", help="JSON lines of the setup and the evaluations (default: OUT as .jsonl)"
     )
     command.add_argument("--evaluations", "--looks", type=_count, default=20, help="number of evaluations and checkpoints")
+    command.add_argument("--tensorboard", type=Path, metavar="DIR", help="write losses and evaluations there, for TensorBoard")
     plan = command.add_argument_group("plan (stored in the checkpoint)")
     plan.add_argument("--evaluation-games", type=_count, default=400, help="games against greedy and random in each evaluation")
     plan.add_argument("--games", type=_natural, default=256, help="parallel games of self-play; 0: learn a best response")

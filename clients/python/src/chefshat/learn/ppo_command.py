@@ -27,6 +27,7 @@ from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
 from chefshat.learn.ppo_training import Trainer
+from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
 
 LOG = logging.getLogger("chefshat.learn")
@@ -44,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
         training = _resume(state, options) if options.resume else _start(options)
         with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
             LOG.info(json.dumps(_setup(trainer.training)))
-            evaluations = _train(trainer, options, state)
+            with Scalars(options.tensorboard) as scalars:
+                evaluations = _train(trainer, options, state, scalars)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:
@@ -106,7 +108,7 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     return dataclasses.replace(training, trained_by=runs.trained_by(training.trained_by, options.trained_by))
 
 
-def _train(trainer: Trainer, options: argparse.Namespace, state: Path) -> list[Evaluation]:
+def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: Scalars) -> list[Evaluation]:
     """Trains until the budget is used up, or until Ctrl-C. Returns the last evaluations."""
     next_evaluation = _share_done(options, trainer.training.progress)
     losses: dict[str, float] = {}
@@ -114,16 +116,17 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path) -> list[E
         while (done := _share_done(options, trainer.training.progress)) < 1:
             if done >= next_evaluation:
                 next_evaluation += 1 / options.evaluations
-                _evaluate(trainer, options, losses)
+                _evaluate(trainer, options, losses, scalars)
                 ppo_checkpoint.save(state, trainer.training)
             losses = trainer.update(done)
+            scalars.add("losses", losses, trainer.training.progress.decisions)
             bar.n = round(1000 * done)
             bar.set_postfix_str(f"{trainer.training.progress.decisions:,} decisions, entropy {losses['entropy']:.2f}")
     # Saves first: a second Ctrl-C may interrupt the last evaluation.
     ppo_checkpoint.save(state, trainer.training)
     trained = trainer.training.network(options.name)
     network.save(options.out, trained.layers, trained.info, dtype=np.float16)
-    evaluations = _evaluate(trainer, options, losses)
+    evaluations = _evaluate(trainer, options, losses, scalars)
     ppo_checkpoint.save(state, trainer.training)
     return evaluations
 
@@ -134,7 +137,7 @@ def _share_done(options: argparse.Namespace, progress: Progress) -> float:
     return float(min(share, 1.0))
 
 
-def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, float]) -> list[Evaluation]:
+def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, float], scalars: Scalars) -> list[Evaluation]:
     """Plays against the built-in agents, and logs the results."""
     began = time.monotonic()
     training = trainer.training
@@ -154,6 +157,8 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     ]
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)
     trainer.training = dataclasses.replace(training, progress=progress)
+    points = {",".join(evaluation.opponents): evaluation.points for evaluation in evaluations}
+    scalars.add("points_per_shift", points, progress.decisions)
     LOG.info(json.dumps({"event": "evaluation", **_summary(trainer.training, evaluations), "losses": losses}))
     return evaluations
 
