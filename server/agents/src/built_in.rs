@@ -4,7 +4,9 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Mask, Observation};
+use chefshat_engine::{
+    ActionId, ActionSpace, DecisionKind, Event, Mask, Observation, RuleSet, Seat,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
@@ -51,6 +53,34 @@ impl AgentKind {
     }
 }
 
+/// An agent of an upper crate, which follows the events of the game besides its observations.
+pub trait Following: std::fmt::Debug + Send + Sync {
+    /// The name in messages and commands.
+    fn name(&self) -> &'static str;
+
+    /// Called for every event of the game. The agent may use only what `seat`, which it plays, may
+    /// see of it ([`Event::seen_by`]).
+    fn on_event(&mut self, seat: Seat, event: &Event);
+
+    /// Chooses one of the legal actions.
+    fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId;
+
+    /// A copy that decides alike.
+    fn boxed_clone(&self) -> Box<dyn Following>;
+}
+
+impl Clone for Box<dyn Following> {
+    fn clone(&self) -> Self {
+        self.boxed_clone()
+    }
+}
+
+/// Creates agents of an upper crate: [`BuiltInAgent::following`] ones.
+pub trait AgentMaker: std::fmt::Debug + Send + Sync {
+    /// The agent for a seat of a game under these rules. `seed` determines its random choices.
+    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent;
+}
+
 /// A built-in agent.
 #[derive(Debug, Clone)]
 pub struct BuiltInAgent {
@@ -69,6 +99,8 @@ enum Mind {
     Replay(Arc<RecordedPlayer>),
     /// Plays by a network.
     Network(Arc<Network>),
+    /// An agent of an upper crate.
+    Following(Box<dyn Following>),
 }
 
 impl BuiltInAgent {
@@ -98,12 +130,32 @@ impl BuiltInAgent {
         }
     }
 
+    /// An agent of an upper crate.
+    pub fn following(agent: Box<dyn Following>) -> Self {
+        Self {
+            mind: Mind::Following(agent),
+        }
+    }
+
     /// The name in messages and commands.
     pub fn name(&self) -> &'static str {
         match &self.mind {
             Mind::Kind(kind, _) => kind.name(),
             Mind::Replay(_) => Self::REPLAY,
             Mind::Network(_) => Self::NETWORK,
+            Mind::Following(agent) => agent.name(),
+        }
+    }
+
+    /// Whether it must see the events of the game ([`BuiltInAgent::on_event`]).
+    pub fn follows_events(&self) -> bool {
+        matches!(self.mind, Mind::Following(_))
+    }
+
+    /// Shows an event of the game to the agent of a seat, which uses only what the seat may see.
+    pub fn on_event(&mut self, seat: Seat, event: &Event) {
+        if let Mind::Following(agent) = &mut self.mind {
+            agent.on_event(seat, event);
         }
     }
 
@@ -113,6 +165,7 @@ impl BuiltInAgent {
         match &self.mind {
             Mind::Kind(kind, _) => matches!(kind, AgentKind::Random | AgentKind::RandomUnmasked),
             Mind::Replay(_) | Mind::Network(_) => false,
+            Mind::Following(_) => true,
         }
     }
 
@@ -152,6 +205,7 @@ impl BuiltInAgent {
             Mind::Kind(AgentKind::Trained, _) => Network::trained().decide(observation, legal),
             Mind::Replay(player) => player.decide(observation, legal),
             Mind::Network(network) => network.decide(observation, legal),
+            Mind::Following(agent) => agent.decide(observation, legal),
         }
     }
 }

@@ -9,11 +9,11 @@ mod play;
 mod recorded;
 mod seeds;
 
-pub use built_in::{AgentKind, BuiltInAgent};
+pub use built_in::{AgentKind, AgentMaker, BuiltInAgent, Following};
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
 };
 pub use participant::ParticipantKind;
-pub use play::{Answer, Listener, ask, is_wrong_action, play};
+pub use play::{Answer, Listener, ask, is_wrong_action, play, play_agents};
 pub use recorded::{MAX_MODELS, RecordedPlayer};
 pub use seeds::{agent_seed, game_seed, seating_agent_seed};

@@ -1,12 +1,15 @@
 //! Plays one game offline, from its deal to its end. Batches of games and their metrics are in
 //! `chefshat-simulation`.
 
+use std::cell::RefCell;
 use std::num::NonZeroU32;
 
 use chefshat_engine::{
     ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, RuleSet, Seat, Seed,
     Standings, Viewer,
 };
+
+use crate::BuiltInAgent;
 
 /// Receives everything that happens in a game, private events included. Each method does nothing by
 /// default.
@@ -56,6 +59,59 @@ pub fn play(
             .expect("an action of the mask is legal");
     }
     game.standings().expect("the game has ended")
+}
+
+/// Plays a game of built-in agents, by seat, to its end: like [`play`], but the agents follow its
+/// events.
+///
+/// # Panics
+/// If there are fewer agents than seats.
+pub fn play_agents(
+    rules: RuleSet,
+    seed: Seed,
+    max_invalid_attempts: Option<NonZeroU32>,
+    agents: &mut [BuiltInAgent],
+    listener: &mut impl Listener,
+) -> Standings {
+    let agents = &mut agents[..rules.players()];
+    let follow = agents.iter().any(BuiltInAgent::follows_events);
+    let agents = RefCell::new(agents);
+    let mut showing = Showing {
+        agents: follow.then_some(&agents),
+        listener,
+    };
+    play(
+        rules,
+        seed,
+        max_invalid_attempts,
+        |seat, observation, legal| agents.borrow_mut()[seat.index()].decide(observation, legal),
+        &mut showing,
+    )
+}
+
+/// Shows events to agents before a listener.
+struct Showing<'a, 'b, L> {
+    agents: Option<&'a RefCell<&'b mut [BuiltInAgent]>>,
+    listener: &'a mut L,
+}
+
+impl<L: Listener> Listener for Showing<'_, '_, L> {
+    fn on_event(&mut self, event: &Event) {
+        if let Some(agents) = self.agents {
+            for (seat, agent) in agents.borrow_mut().iter_mut().enumerate() {
+                agent.on_event(Seat::new(seat), event);
+            }
+        }
+        self.listener.on_event(event);
+    }
+
+    fn on_decision(&mut self, decision: Decision, action: ActionId) {
+        self.listener.on_decision(decision, action);
+    }
+
+    fn on_invalid(&mut self, decision: Decision, action: ActionId) {
+        self.listener.on_invalid(decision, action);
+    }
 }
 
 /// The action taken at a decision.

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, Network};
+use chefshat_search::MonteCarlo;
 use chefshat_simulation::{
     Comparison, Contender, Duplicate, DuplicateError, Figure, RulesForm, SeatPlan,
 };
@@ -36,7 +37,7 @@ Examples:
   chefshat compare trained.safetensors greedy --deals 500 --seed 7
   chefshat compare deep_q.safetensors random --seats one --preset original2020 --json
 
-The same seed gives the same output, on any number of threads.";
+The same seed gives the same output, on any number of threads, unless monte_carlo has a budget in milliseconds.";
 
 /// Compare two agents on duplicate deals: the same deals for both, in all seats.
 #[derive(Debug, Args)]
@@ -46,7 +47,8 @@ The same seed gives the same output, on any number of threads.";
     mut_arg("target_shifts", |arg| arg.hide(true))
 )]
 pub(super) struct Compare {
-    /// A built-in agent or a network file.
+    /// A built-in agent or a network file. monte_carlo takes a budget for each decision and the
+    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:2000:trained (rollouts).
     a: String,
     /// The agent to compare it with.
     b: String,
@@ -145,11 +147,20 @@ impl Entrant {
                 contender: Contender::Kind(kind),
             });
         }
+        if given.split(':').next() == Some(MonteCarlo::NAME) {
+            let agent: MonteCarlo = given.parse().map_err(|error| format!("{error}"))?;
+            return Ok(Entrant {
+                given: given.to_owned(),
+                label: MonteCarlo::NAME.to_owned(),
+                contender: Contender::Made(Arc::new(agent)),
+            });
+        }
         let path = Path::new(given);
         if !path.exists() {
             let known = AgentKind::ALL.map(AgentKind::name).join(", ");
             return Err(format!(
-                "{given}: neither a built-in agent ({known}) nor a file that exists"
+                "{given}: neither a built-in agent ({known}, {}) nor a file that exists",
+                MonteCarlo::NAME
             )
             .into());
         }
@@ -318,6 +329,7 @@ fn signed(number: f64) -> String {
 fn entrant_json(entrant: &Entrant) -> Value {
     match &entrant.contender {
         Contender::Kind(kind) => json!({"agent": kind.name()}),
+        Contender::Made(_) => json!({"agent": entrant.given}),
         Contender::Network(network) => {
             let info = network.info();
             json!({

@@ -162,7 +162,24 @@ impl Knowledge {
             && (self.observation.shift == 1) == self.last_order.is_none()
             && (self.kind == DecisionKind::Turn
                 || (self.gifts.is_empty() && self.turns.is_empty()));
-        sound.then_some(()).ok_or(KnowledgeError::Inconsistent)
+        let complete = self.kind != DecisionKind::Turn || self.exchange_is_complete();
+        (sound && complete)
+            .then_some(())
+            .ok_or(KnowledgeError::Inconsistent)
+    }
+
+    /// Whether each pair that exchanges cards has done so, and nobody else.
+    fn exchange_is_complete(&self) -> bool {
+        let pairs = self.pairs();
+        let gift = |giver: Seat, receiver: Seat| {
+            let fits = |gift: &&Gift| gift.giver == giver && gift.receiver == receiver;
+            self.gifts.iter().find(fits).map_or(0, |gift| gift.count)
+        };
+        self.gifts.len() == 2 * pairs.len()
+            && pairs.iter().all(|pair| {
+                let count = gift(pair.chooser, pair.forced);
+                (1..=pair.size).contains(&count) && count == gift(pair.forced, pair.chooser)
+            })
     }
 
     /// The seat.

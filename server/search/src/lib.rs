@@ -2,12 +2,17 @@
 //! on from them, and what its actions are worth. `docs/search.md` says how it works and what is
 //! exact.
 
+mod agent;
+mod evaluate;
 mod history;
 mod holders;
 mod knowledge;
+mod rollout;
 mod sampler;
 mod table;
 
+pub use agent::{Budget, MonteCarlo, MonteCarloError};
+pub use evaluate::{Allocation, Estimate, Method, evaluate, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
 pub use sampler::{Chance, Sampler};

@@ -1,6 +1,6 @@
 //! Draws deals that are consistent with what a seat knows, each equally likely.
 
-use chefshat_engine::{BySeat, Cards, Face, Game, Seat, Seed};
+use chefshat_engine::{BySeat, Cards, Face, Game, Mask, Seat, Seed};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
@@ -54,6 +54,7 @@ struct Case {
 #[derive(Clone, Debug)]
 pub struct Sampler {
     knowledge: Knowledge,
+    legal: Mask,
     cases: Vec<Case>,
     ways: f64,
 }
@@ -72,8 +73,9 @@ impl Sampler {
             }
         }
         let ways = cases.iter().map(|case| case.table.ways()).sum();
-        let sampler = Sampler {
+        let mut sampler = Sampler {
             knowledge,
+            legal: Mask::EMPTY,
             cases,
             ways,
         };
@@ -83,8 +85,14 @@ impl Sampler {
         // What the rules say about the rest of the history shows in one deal as in all.
         let mut chance = Chance::new([0; 32]);
         let world = sampler.world(&mut chance);
-        sampler.knowledge.game(&world, Seed([0; 32]))?;
+        let game = sampler.knowledge.game(&world, Seed([0; 32]))?;
+        sampler.legal = game.legal_actions();
         Ok(sampler)
+    }
+
+    /// The legal actions of the seat's decision.
+    pub fn legal_actions(&self) -> Mask {
+        self.legal
     }
 
     /// What the seat knows.

@@ -224,28 +224,23 @@ impl Table {
                 ControlFlow::Continue(())
             };
         }
-        let is_last = block + 1 == blocks;
         if let Some(pair) = pairs.get(block) {
             let [chooser, forced, gifts] = [2 * block, 2 * block + 1, self.gifts_variable(block)];
             let due = pair.count - pair.count.min(state[forced]);
-            for first in portions(left, false) {
-                let Some(next) = self.dealt(kind, &so_far, chooser, first) else {
-                    continue;
-                };
-                for second in portions(remainder(left, first), is_last) {
-                    let Some(mut next) = self.dealt(kind, &next, forced, second) else {
-                        continue;
-                    };
+            for first in self.portions(kind, state, chooser, left) {
+                let next = so_far.with(chooser, first);
+                let rest = remainder(left, first);
+                for second in self.portions(kind, state, forced, rest) {
+                    let mut next = next.with(forced, second);
+                    let rest = remainder(rest, second);
                     for given in 0..=first.total().min(pair.count - state[gifts]) {
-                        if !pair.allows(kind, faces, [first, second], given, due) {
-                            continue;
-                        }
                         let total = state[gifts] + given;
-                        if !self.is_in_range(kind, gifts, total) {
+                        let (fewest, _) = self.variables[gifts].ranges[kind + 1];
+                        let possible = pair.allows(kind, faces, [first, second], given, due);
+                        if !possible || total < fewest {
                             continue;
                         }
                         next.next[gifts] = total;
-                        let rest = remainder(remainder(left, first), second);
                         let weighted = Split {
                             weight: next.weight * choose(first.total(), given),
                             ..next
@@ -257,12 +252,10 @@ impl Table {
         } else {
             let single = &self.holders.singles[block - pairs.len()];
             let variable = block + pairs.len();
-            for dealt in portions(left, is_last) {
-                if !single.allows(kind, faces, dealt) {
-                    continue;
-                }
-                if let Some(next) = self.dealt(kind, &so_far, variable, dealt) {
+            for dealt in self.portions(kind, state, variable, left) {
+                if single.allows(kind, faces, dealt) {
                     let rest = remainder(left, dealt);
+                    let next = so_far.with(variable, dealt);
                     self.split_among(kind, state, block + 1, rest, next, found)?;
                 }
             }
@@ -275,32 +268,51 @@ impl Table {
         self.holders.pairs.len() * 2 + self.holders.singles.len() + pair
     }
 
-    /// A split with cards dealt to a holder; `None` if that leads nowhere.
-    fn dealt(&self, kind: usize, so_far: &Split, variable: usize, dealt: Dealt) -> Option<Split> {
-        let mut split = *so_far;
-        let value = split.next[variable] + dealt.total();
-        split.next[variable] = value;
-        split.weight *= INVERSE_FACTORIALS[usize::from(dealt.plain)];
-        if dealt.golden {
-            split.golden = Some(variable as u8);
-        }
-        self.is_in_range(kind, variable, value).then_some(split)
+    /// How many cards of a kind can be dealt to a holder.
+    fn room(&self, kind: usize, state: &State, holder: usize) -> (u8, u8) {
+        let (low, high) = self.variables[holder].ranges[kind + 1];
+        let value = state[holder];
+        (low.saturating_sub(value), high.saturating_sub(value))
     }
 
-    /// Whether a variable may have this value after a kind.
-    fn is_in_range(&self, kind: usize, variable: usize, value: u8) -> bool {
-        let (low, high) = self.variables[variable].ranges[kind + 1];
-        (low..=high).contains(&value)
+    /// The ways to deal a holder its part of what is left of a kind, so that the holders after it
+    /// have room for the rest.
+    fn portions(
+        &self,
+        kind: usize,
+        state: &State,
+        holder: usize,
+        left: Dealt,
+    ) -> impl Iterator<Item = Dealt> + use<> {
+        let (low, high) = self.room(kind, state, holder);
+        let holders = self.holders.pairs.len() * 2 + self.holders.singles.len();
+        let later: u8 = (holder + 1..holders)
+            .map(|holder| self.room(kind, state, holder).1)
+            .fold(0, u8::saturating_add);
+        let low = low.max(left.total().saturating_sub(later));
+        [false, left.golden]
+            .into_iter()
+            .take(1 + usize::from(left.golden))
+            .flat_map(move |golden| {
+                let is_golden = u8::from(golden);
+                let fewest = low.saturating_sub(is_golden);
+                // An empty range if there is no room for the Golden card.
+                let most = (high + 1).saturating_sub(is_golden).min(left.plain + 1);
+                (fewest..most).map(move |plain| Dealt { plain, golden })
+            })
     }
 }
 
-/// The ways to take a part of the cards of a kind; only all of them if `all`.
-fn portions(left: Dealt, all: bool) -> impl Iterator<Item = Dealt> {
-    let fewest = if all { left.plain } else { 0 };
-    let plain = move |golden| (fewest..=left.plain).map(move |plain| Dealt { plain, golden });
-    let without = (!all || !left.golden).then(|| plain(false));
-    let with = left.golden.then(|| plain(true));
-    without.into_iter().chain(with).flatten()
+impl Split {
+    /// With cards dealt to a holder.
+    fn with(mut self, variable: usize, dealt: Dealt) -> Split {
+        self.next[variable] += dealt.total();
+        self.weight *= INVERSE_FACTORIALS[usize::from(dealt.plain)];
+        if dealt.golden {
+            self.golden = Some(variable as u8);
+        }
+        self
+    }
 }
 
 fn remainder(left: Dealt, taken: Dealt) -> Dealt {

@@ -1,5 +1,6 @@
 //! Tests of the crate's public interface: one binary.
 
 mod enumeration;
+mod evaluation;
 mod sampler;
 mod scenario;

@@ -11,6 +11,7 @@ pub(crate) struct Moment {
     pub(crate) seat: Seat,
     pub(crate) kind: DecisionKind,
     pub(crate) action: ActionId,
+    pub(crate) legal: Mask,
     pub(crate) observation: Observation,
     pub(crate) history: ShiftHistory,
 }
@@ -108,6 +109,7 @@ impl Scenario {
                 seat: decision.seat,
                 kind: decision.kind,
                 action,
+                legal,
                 observation: game.observe(Viewer::Seat(decision.seat)),
                 history: histories[decision.seat.index()].clone(),
             });
@@ -123,6 +125,11 @@ impl Scenario {
             script,
             moments,
         }
+    }
+
+    /// What is legal at a decision.
+    pub(crate) fn legal(&self, number: usize) -> Mask {
+        self.moments[number].legal
     }
 
     /// What the seat of a decision knows there.

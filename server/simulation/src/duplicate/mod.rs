@@ -20,7 +20,9 @@ use thiserror::Error;
 
 use crate::fold::fold_in_order;
 use chefshat_agents::seating_agent_seed;
-use chefshat_agents::{AgentKind, BuiltInAgent, Listener, Network, game_seed, play};
+use chefshat_agents::{
+    AgentKind, AgentMaker, BuiltInAgent, Listener, Network, game_seed, play_agents,
+};
 use figures::Tally;
 pub use figures::{Comparison, Figure};
 pub use same_seat::{Candidate, Measured, SameSeat};
@@ -36,14 +38,17 @@ pub enum Contender {
     Kind(AgentKind),
     /// A network.
     Network(Arc<Network>),
+    /// An agent of another crate, such as one that searches.
+    Made(Arc<dyn AgentMaker>),
 }
 
 impl Contender {
     /// Creates the agent for one game.
-    fn agent(&self, seed: [u8; 32]) -> BuiltInAgent {
+    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
         match self {
             Contender::Kind(kind) => BuiltInAgent::new(*kind, seed),
             Contender::Network(network) => BuiltInAgent::network(Arc::clone(network)),
+            Contender::Made(maker) => maker.agent(rules, seed),
         }
     }
 }
@@ -193,15 +198,9 @@ impl Duplicate {
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
             let contender = &self.contenders[usize::from(!seats.is_a(seat))];
-            contender.agent(seating_agent_seed(seed, seating, seat))
+            contender.agent(&self.rules, seating_agent_seed(seed, seating, seat))
         });
-        play(
-            self.rules,
-            seed,
-            None,
-            |seat, observation, legal| agents[seat.index()].decide(observation, legal),
-            listener,
-        )
+        play_agents(self.rules, seed, None, &mut agents, listener)
     }
 
     /// Plays all games on the current rayon pool and returns the totals. `progress` is called from

@@ -109,7 +109,7 @@ impl SameSeat {
             } else {
                 &self.others
             };
-            contender.agent(seating_agent_seed(seed, who, seat))
+            contender.agent(&self.rules, seating_agent_seed(seed, who, seat))
         });
         let percent = (100.0 * candidate.epsilon).round() as u64;
         // No agent has this seed: agents use the first two seatings.

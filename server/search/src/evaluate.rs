@@ -1,0 +1,236 @@
+//! Estimates what each legal action is worth, by rollouts in deals that are consistent with what the
+//! seat knows. Every action is tried in the same deals with the same random choices of the agents,
+//! so that luck cancels out of their differences.
+
+use std::ops::RangeInclusive;
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::ActionId;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use crate::rollout::{Worth, rollout};
+use crate::{Chance, Sampler};
+
+/// Deals that are played before the first look whether to stop, and most of them between two looks.
+/// In between it is an eighth of those played so far. Never depends on the number of threads.
+const BATCH: RangeInclusive<u64> = 4..=256;
+
+/// What one action is worth.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub struct Estimate {
+    /// The action.
+    pub action: ActionId,
+    /// Rollouts that began with it.
+    pub rollouts: u64,
+    points: u64,
+    points_squared: u64,
+    places: u64,
+    /// Sum of its points minus those of the reference action, and of their squares.
+    gain: i64,
+    gain_squared: u64,
+}
+
+impl Estimate {
+    fn new(action: ActionId) -> Estimate {
+        Estimate {
+            action,
+            rollouts: 0,
+            points: 0,
+            points_squared: 0,
+            places: 0,
+            gain: 0,
+            gain_squared: 0,
+        }
+    }
+
+    fn add(&mut self, worth: Worth, reference: Worth) {
+        let (points, gain) = (
+            u64::from(worth.points),
+            i64::from(worth.points) - i64::from(reference.points),
+        );
+        self.rollouts += 1;
+        self.points += points;
+        self.points_squared += points * points;
+        self.places += u64::from(worth.place);
+        self.gain += gain;
+        self.gain_squared += gain.unsigned_abs() * gain.unsigned_abs();
+    }
+
+    fn merge(&mut self, other: &Estimate) {
+        self.rollouts += other.rollouts;
+        self.points += other.points;
+        self.points_squared += other.points_squared;
+        self.places += other.places;
+        self.gain += other.gain;
+        self.gain_squared += other.gain_squared;
+    }
+
+    /// Mean points of the Shift; 0 without rollouts.
+    pub fn points(&self) -> f64 {
+        self.points as f64 / self.count()
+    }
+
+    /// Mean place, from 1; 0 without rollouts.
+    pub fn place(&self) -> f64 {
+        self.places as f64 / self.count()
+    }
+
+    /// Standard error of [`Estimate::points`]; infinite with fewer than two rollouts.
+    pub fn standard_error(&self) -> f64 {
+        standard_error(self.rollouts, self.points(), self.points_squared as f64)
+    }
+
+    /// Mean of the points that the action gained over the first of the actions in the same deals.
+    pub fn gain(&self) -> f64 {
+        self.gain as f64 / self.count()
+    }
+
+    /// Standard error of [`Estimate::gain`]; infinite with fewer than two rollouts.
+    pub fn gain_error(&self) -> f64 {
+        standard_error(self.rollouts, self.gain(), self.gain_squared as f64)
+    }
+
+    fn count(&self) -> f64 {
+        self.rollouts.max(1) as f64
+    }
+}
+
+/// The standard error of a mean of `n` numbers, from the sum of their squares.
+fn standard_error(n: u64, mean: f64, squares: f64) -> f64 {
+    if n < 2 {
+        return f64::INFINITY;
+    }
+    let n = n as f64;
+    ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt()
+}
+
+/// How rollouts are shared among the actions.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub enum Allocation {
+    /// All actions get as many.
+    Uniform,
+    /// Sequential halving: the budget is spent in rounds, and after each the worse half of the
+    /// actions is dropped. The first action stays.
+    Halving,
+}
+
+/// How an evaluation works.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub struct Method {
+    /// The agents of the rollouts, on all seats.
+    pub policy: AgentKind,
+    /// How rollouts are shared among the actions.
+    pub allocation: Allocation,
+}
+
+/// Estimates what actions are worth at the sampler's decision: first those of `actions[0]`, to which
+/// the gains of the others refer. `progress` gets the number of rollouts so far and says which part
+/// of the budget is spent; the evaluation ends when it is 1 or more. A pool of threads does not
+/// change the result.
+///
+/// # Panics
+/// If `actions` is empty, or one of them is not legal.
+pub fn evaluate(
+    sampler: &Sampler,
+    actions: &[ActionId],
+    method: Method,
+    seed: [u8; 32],
+    pool: Option<&ThreadPool>,
+    progress: impl Fn(u64) -> f64,
+) -> Vec<Estimate> {
+    let mut estimates: Vec<Estimate> = actions.iter().map(|id| Estimate::new(*id)).collect();
+    let mut active: Vec<usize> = (0..actions.len()).collect();
+    let rounds = match method.allocation {
+        Allocation::Uniform => 1,
+        Allocation::Halving => actions.len().next_power_of_two().trailing_zeros().max(1),
+    };
+    let (mut worlds, mut rollouts) = (0u64, 0u64);
+    for round in 1..=rounds {
+        let part = f64::from(round) / f64::from(rounds);
+        while progress(rollouts) < part {
+            let tried: Vec<ActionId> = active.iter().map(|&index| actions[index]).collect();
+            let batch = worlds..worlds + (worlds / 8).clamp(*BATCH.start(), *BATCH.end());
+            let in_world = |world| evaluate_in(sampler, &tried, method.policy, seed, world);
+            let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
+                all.iter_mut()
+                    .zip(&more)
+                    .for_each(|(all, more)| all.merge(more));
+                all
+            };
+            let empty = || tried.iter().map(|id| Estimate::new(*id)).collect();
+            let found: Vec<Estimate> = match pool {
+                Some(pool) => pool.install(|| {
+                    batch
+                        .clone()
+                        .into_par_iter()
+                        .map(in_world)
+                        .reduce(empty, merged)
+                }),
+                None => batch.clone().map(in_world).fold(empty(), merged),
+            };
+            for (&index, found) in active.iter().zip(&found) {
+                estimates[index].merge(found);
+                rollouts += found.rollouts;
+            }
+            worlds = batch.end;
+        }
+        if round < rounds {
+            halve(&mut active, &estimates);
+        }
+    }
+    estimates
+}
+
+/// Drops the worse half of the actions, but not the first.
+fn halve(active: &mut Vec<usize>, estimates: &[Estimate]) {
+    active.sort_by(|&a, &b| {
+        let points = |index: usize| estimates[index].points();
+        (a != 0)
+            .cmp(&(b != 0))
+            .then(points(b).total_cmp(&points(a)))
+            .then(a.cmp(&b))
+    });
+    active.truncate(active.len().div_ceil(2).max(2));
+}
+
+/// Tries actions in one deal.
+fn evaluate_in(
+    sampler: &Sampler,
+    actions: &[ActionId],
+    policy: AgentKind,
+    seed: [u8; 32],
+    world: u64,
+) -> Vec<Estimate> {
+    let mut chance = Chance::stream(seed, world);
+    let game = sampler.game(&mut chance).closing_copy();
+    let (agents, seat) = (chance.seed(), sampler.knowledge().seat());
+    let mut reference = None;
+    actions
+        .iter()
+        .map(|&action| {
+            let worth = rollout(game.clone(), action, seat, policy, agents);
+            let mut estimate = Estimate::new(action);
+            estimate.add(worth, *reference.get_or_insert(worth));
+            estimate
+        })
+        .collect()
+}
+
+/// Expected cards in each hand, by seat and kind (faces ascending, then jokers), over `deals` deals.
+pub fn likely_hands(sampler: &Sampler, seed: [u8; 32], deals: u64) -> Vec<Vec<f64>> {
+    let rules = sampler.knowledge().rules();
+    let mut sums = vec![vec![0u64; usize::from(rules.faces()) + 1]; rules.players()];
+    for world in 0..deals {
+        let game = sampler.game(&mut Chance::stream(seed, world));
+        for (sums, hand) in sums.iter_mut().zip(game.hands().values()) {
+            for (sum, count) in sums.iter_mut().zip(hand.counts(rules.faces())) {
+                *sum += u64::from(count);
+            }
+        }
+    }
+    let mean = |sum: u64| sum as f64 / deals.max(1) as f64;
+    (sums.into_iter())
+        .map(|sums| sums.into_iter().map(mean).collect())
+        .collect()
+}

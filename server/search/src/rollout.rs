@@ -1,0 +1,61 @@
+//! Plays a possible game on, to the end of its Shift, and says what that was worth.
+
+use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_engine::{ActionId, Event, Game, MAX_SEATS, Seat, ShiftEnd, Viewer};
+
+/// What a Shift was worth to a seat.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub(crate) struct Worth {
+    pub(crate) points: u32,
+    /// From 1.
+    pub(crate) place: u8,
+}
+
+/// Applies an action to a game that ends with its Shift, then lets agents of a kind play all seats
+/// until the place of `seat` is known. `seed` determines their random choices.
+///
+/// # Panics
+/// If the action is not legal.
+pub(crate) fn rollout(
+    mut game: Game,
+    action: ActionId,
+    seat: Seat,
+    policy: AgentKind,
+    seed: [u8; 32],
+) -> Worth {
+    let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
+        let mut seed = seed;
+        seed[0] ^= index as u8;
+        BuiltInAgent::new(policy, seed)
+    });
+    let mut place = None;
+    let mut action = action;
+    loop {
+        game.apply(action, |event| match event {
+            Event::SeatFinished {
+                seat: finished,
+                place: reached,
+            } if finished == seat => place = Some(reached),
+            Event::ShiftEnded(end) => place = place.or(place_of(&end, seat)),
+            _ => {}
+        })
+        .expect("a legal action");
+        if let Some(place) = place {
+            return Worth {
+                points: game.rules().points(place),
+                place,
+            };
+        }
+        let decision = game.decision().expect("the Shift goes on");
+        let legal = game.legal_actions();
+        let observation = game.observe(Viewer::Seat(decision.seat));
+        action = match legal.len() {
+            1 => legal.nth(0).expect("a legal action"),
+            _ => agents[decision.seat.index()].decide(&observation, &legal),
+        };
+    }
+}
+
+fn place_of(end: &ShiftEnd, seat: Seat) -> Option<u8> {
+    end.order.place_of(seat)
+}

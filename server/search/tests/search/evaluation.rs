@@ -1,0 +1,225 @@
+//! Estimates of actions, and the agent that plays by them.
+
+use chefshat_agents::{AgentKind, AgentMaker as _, BuiltInAgent};
+use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
+use chefshat_search::{
+    Allocation, Budget, Estimate, Method, MonteCarlo, Sampler, evaluate, likely_hands,
+};
+
+use crate::scenario::{Moment, Scenario};
+
+const MAX_STEPS: u64 = 10_000_000;
+const METHOD: Method = Method {
+    policy: AgentKind::Greedy,
+    allocation: Allocation::Uniform,
+};
+
+fn rules(faces: u8, players: u8) -> RuleSet {
+    let spec = RuleSetSpec {
+        faces,
+        players,
+        ..RuleSetSpec::default()
+    };
+    spec.validate().expect("a rule set")
+}
+
+fn sampler(scenario: &Scenario, moment: usize) -> Sampler {
+    Sampler::new(scenario.knowledge(moment), MAX_STEPS).expect("a deal")
+}
+
+/// Spends this many rollouts.
+fn spend(all: u64) -> impl Fn(u64) -> f64 {
+    move |rollouts| rollouts as f64 / all as f64
+}
+
+/// A Shift of two players: the first plays its Golden card, the other passes, and the first holds
+/// two cards more.
+fn nearly_won() -> Scenario {
+    let rules = rules(4, 2);
+    let hand = |counts: &[u8], golden| Cards::from_counts(4, counts, golden).expect("a hand");
+    let hands = [hand(&[0, 0, 1, 4, 1], true), hand(&[1, 2, 2, 0, 1], false)];
+    let script = Script::first_shift(BySeat::from_slice(&hands).expect("two hands"));
+    let space = rules.actions();
+    let mut actions = ["C4;Q4;J0", "pass"]
+        .map(|text| space.parse(text).expect("an action"))
+        .into_iter();
+    let last = space.parse("C3;Q1;J1").expect("an action");
+    Scenario::played(rules, script, |_, _| Some(actions.next().unwrap_or(last)))
+}
+
+#[test]
+fn a_winning_play_is_worth_the_first_place() {
+    let scenario = nearly_won();
+    let moment = 2;
+    let wins = scenario.moments[moment].action;
+    let pass = scenario.rules.actions().pass();
+    let sampler = sampler(&scenario, moment);
+    let found = evaluate(&sampler, &[wins, pass], METHOD, [1; 32], None, spend(400));
+    assert_eq!((found[0].points(), found[0].standard_error()), (5.0, 0.0));
+    assert_eq!(found[0].place(), 1.0);
+    assert!(
+        found[1].points() < 5.0 && found[1].gain() < 0.0,
+        "{found:?}"
+    );
+    assert_eq!(found[0].rollouts, found[1].rollouts);
+    assert!((400..=440).contains(&(found[0].rollouts * 2)));
+}
+
+#[test]
+fn the_result_does_not_depend_on_threads() {
+    let scenario = Scenario::random(rules(6, 4), 3, Some(&[2, 0, 3, 1]));
+    let moment = busiest(&scenario);
+    let sampler = sampler(&scenario, moment);
+    let legal: Vec<ActionId> = scenario.legal(moment).iter().collect();
+    let pool = |threads| {
+        let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        builder.build().expect("threads start")
+    };
+    let run = |threads: Option<usize>, allocation| {
+        let pool = threads.map(pool);
+        let method = Method {
+            allocation,
+            ..METHOD
+        };
+        evaluate(&sampler, &legal, method, [5; 32], pool.as_ref(), spend(300))
+    };
+    let count = |estimates: &[Estimate]| estimates.iter().map(|found| found.rollouts).sum::<u64>();
+    for allocation in [Allocation::Uniform, Allocation::Halving] {
+        assert_eq!(run(None, allocation), run(Some(3), allocation));
+    }
+    // Halving gives the first action and the best of the others most.
+    let (uniform, halving) = (
+        run(None, Allocation::Uniform),
+        run(None, Allocation::Halving),
+    );
+    assert!(count(&uniform) >= 300 && count(&halving) >= 300);
+    assert!(
+        uniform
+            .iter()
+            .all(|found| found.rollouts == uniform[0].rollouts)
+    );
+    assert!(
+        halving
+            .iter()
+            .all(|found| found.rollouts <= halving[0].rollouts)
+    );
+    assert!(halving[0].rollouts > uniform[0].rollouts);
+}
+
+#[test]
+fn likely_hands_add_up_to_the_hidden_cards() {
+    let scenario = Scenario::random(rules(6, 4), 2, Some(&[2, 0, 3, 1]));
+    let moment = busiest(&scenario);
+    let seen = scenario.moments[moment].observation;
+    let hands = likely_hands(&sampler(&scenario, moment), [2; 32], 200);
+    for (hand, (_, left)) in hands.iter().zip(seen.cards_left.iter()) {
+        assert!(
+            (hand.iter().sum::<f64>() - f64::from(*left)).abs() < 1e-9,
+            "{hand:?}"
+        );
+    }
+    let own: Vec<f64> = seen.hand.counts(6).map(f64::from).collect();
+    assert_eq!(hands[scenario.moments[moment].seat.index()], own);
+}
+
+/// The turn with the most legal actions.
+fn busiest(scenario: &Scenario) -> usize {
+    (0..scenario.moments.len())
+        .max_by_key(|&moment| scenario.legal(moment).len())
+        .expect("a decision")
+}
+
+fn agent(rules: &RuleSet) -> BuiltInAgent {
+    let plays = MonteCarlo {
+        budget: Budget::Rollouts(200),
+        prior: AgentKind::Random,
+        ..MonteCarlo::default()
+    };
+    plays.agent(rules, [4; 32])
+}
+
+/// What the agent does at a decision if it has followed the Shift.
+fn decides(agent: &mut BuiltInAgent, scenario: &Scenario, moment: usize) -> ActionId {
+    let Moment {
+        seat,
+        observation,
+        history,
+        ..
+    } = &scenario.moments[moment];
+    (history.events().iter()).for_each(|event| agent.on_event(*seat, event));
+    agent.decide(observation, &scenario.legal(moment))
+}
+
+#[test]
+fn the_agent_takes_the_win() {
+    let scenario = nearly_won();
+    let action = decides(&mut agent(&scenario.rules), &scenario, 2);
+    assert_eq!(action, scenario.moments[2].action);
+}
+
+#[test]
+fn the_agent_plays_by_what_its_seat_knows_alone() {
+    let rules = rules(5, 4);
+    let mut compared = 0;
+    for number in 1..5 {
+        let scenario = Scenario::random(rules, number, Some(&[2, 0, 3, 1]));
+        for moment in (0..scenario.moments.len()).step_by(3) {
+            let mut chance = chefshat_search::Chance::new([8; 32]);
+            let hands = sampler(&scenario, moment).world(&mut chance).dealt;
+            let Some(other) = scenario.with_deal(hands, moment) else {
+                continue;
+            };
+            let again = other.moments.len() - 1;
+            assert_eq!(
+                decides(&mut agent(&rules), &scenario, moment),
+                decides(&mut agent(&rules), &other, again)
+            );
+            compared += usize::from(hands != scenario.script.hands);
+        }
+    }
+    assert!(compared > 10, "{compared}");
+}
+
+#[test]
+fn agents_are_named_with_their_budget() {
+    let check = |text: &str, expected: Option<&str>| {
+        let named = text
+            .parse::<MonteCarlo>()
+            .ok()
+            .map(|agent| agent.to_string());
+        assert_eq!(named.as_deref(), expected, "{text}");
+    };
+    let own = MonteCarlo::default().rollouts.name();
+    check("monte_carlo", Some(&format!("monte_carlo:50ms:{own}")));
+    check("monte_carlo:20ms", Some(&format!("monte_carlo:20ms:{own}")));
+    check("monte_carlo:300:random", Some("monte_carlo:300:random"));
+    for wrong in [
+        "greedy",
+        "monte_carlo:",
+        "monte_carlo:0",
+        "monte_carlo:0ms",
+        "monte_carlo:61000ms",
+        "monte_carlo:5:random_unmasked",
+        "monte_carlo:5:greedy:",
+    ] {
+        check(wrong, None);
+    }
+}
+
+#[test]
+fn without_the_history_the_agent_plays_as_its_prior() {
+    let scenario = nearly_won();
+    let plays = MonteCarlo {
+        prior: AgentKind::Greedy,
+        ..MonteCarlo::default()
+    };
+    let mut agent = plays.agent(&scenario.rules, [0; 32]);
+    let moment = &scenario.moments[1];
+    let legal = scenario.legal(1);
+    let mut greedy = BuiltInAgent::new(AgentKind::Greedy, [0; 32]);
+    assert_eq!(
+        agent.decide(&moment.observation, &legal),
+        greedy.decide(&moment.observation, &legal)
+    );
+    assert_eq!(moment.seat, Seat::new(1));
+}
