@@ -6,15 +6,15 @@ other seeds.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from chefshat.experiments import learning
-from chefshat.experiments.learning import Counts
+from chefshat.experiments import learning, stats
+from chefshat.experiments.learning import Counts, Learned
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Config
 from chefshat.learn.deep_q_training import Mask, ShiftLog, without_idle_passes
@@ -105,13 +105,19 @@ def repetitions_of(config: Config) -> int:
     return QUICK_REPETITIONS if config.quick else REPETITIONS
 
 
-def note(config: Config) -> str:
-    """Returns the sentences about these rows for the note of a table."""
+def note(config: Config, rows: Iterable[Counts]) -> str:
+    """Returns the sentences about agents that do not learn for the note of a table with these rows; others are left out."""
     games = len(config.seeds) * repetitions_of(config)
-    return (
+    text = (
         f"Agents that do not learn: means over {games} games, {len(config.seeds)} of them with the learners' deals. After ±: "
-        "standard errors, clustered by game."
+        "standard errors, clustered by game"
     )
+    won = [counts.won[:, :, 0] for counts in rows if not isinstance(counts, Learned)]
+    # A few games may all have the same number of victories.
+    ratios = [stats.cluster_ratio(each) for each in won if np.ptp(each.sum(axis=1))]
+    if not ratios:
+        return f"{text}."
+    return f"{text}; those of seat 1's victories are {min(ratios):.2f} to {max(ratios):.2f} times those of independent Shifts."
 
 
 def values(config: Config, counts: Counts) -> dict[str, object]:

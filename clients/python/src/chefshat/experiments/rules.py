@@ -180,7 +180,8 @@ def _rewards(config: Config, agents: Mapping[str, Counts]) -> Table:
         title=f"Experiment 2: mean reward of an action in {learning.shifts_of(config)} Shifts",
         columns=["agent of seat 1", "its mean reward", f"in the first {width}", f"in the last {width}", "of the best random agent"],
         rows=rows,
-        note=f"The mean reward is per action in a Shift, averaged over Shifts. {learning.note(config)} {baselines.note(config)}",
+        note="The mean reward is per action in a Shift, averaged over Shifts. "
+        f"{learning.note(config)} {baselines.note(config, agents.values())}",
     )
 
 

@@ -200,7 +200,7 @@ def _one(config: Config, learned: Mapping[Condition, Learned], others: Mapping[C
         ],
         rows=rows,
         note="“By a random agent” is the mean of three, whose gifts are random. Default gifts: the highest faces; special "
-        f"actions are declined. {learning.note(config)} {baselines.note(config)}",
+        f"actions are declined. {learning.note(config)} {baselines.note(config, _played(others, four=False))}",
     )
 
 
@@ -233,7 +233,7 @@ def _four(config: Config, learned: Mapping[Condition, Learned], others: Mapping[
         columns=["agents, reward", *(f"seat {seat + 1}" for seat in ALL_SEATS), "best seat", "last seat", "starter wins"],
         rows=rows,
         note="The seats differ only by chance; “best” and “last” are determined for each game. The paper's 30% is that of random "
-        f"agents. {learning.note(config)} {baselines.note(config)}",
+        f"agents. {learning.note(config)} {baselines.note(config, _played(others, four=True))}",
     )
 
 
@@ -278,8 +278,12 @@ def _behaviour(config: Config, learned: Mapping[Condition, Learned], others: Map
         ],
         rows=rows,
         note=f"Means over the agents, not the random ones. Default gifts unless another kind is named. {learning.note(config)} "
-        f"{baselines.note(config)}",
+        f"{baselines.note(config, ())}",
     )
+
+
+def _played(others: Mapping[Condition, Counts], *, four: bool) -> list[Counts]:
+    return [counts for condition, counts in others.items() if condition.four == four]
 
 
 def _figure_of_one(learned: Mapping[Condition, Learned], others: Mapping[Condition, Counts]) -> Figure:
