@@ -90,6 +90,40 @@ impl VectorGames {
         self.ask(Request::Reset(reset)).await
     }
 
+    /// The states of these games, in any order: everything that determines how they continue,
+    /// hidden cards included. The batch still requires a reply. As cancel safe as
+    /// [`step`](Self::step).
+    ///
+    /// # Errors
+    /// `STATES_REFUSED`, `STATES_TOO_LARGE`, which end the games. `STEP_GIVEN_UP`.
+    pub async fn save(&mut self, games: &[u32]) -> Result<Vec<Vec<u8>>, Error> {
+        if std::mem::replace(&mut self.given_up, true) {
+            return Err(Error::step_given_up());
+        }
+        let games = column(games);
+        send(&self.requests, Request::Save(v1::VectorSave { games })).await;
+        let Some(Response::States(saved)) = next(&mut self.responses).await? else {
+            return Err(Error::incomplete("states"));
+        };
+        self.given_up = false;
+        Ok(saved.states)
+    }
+
+    /// Replaces these games, in ascending order, by saved ones, and returns the next batch. As
+    /// cancel safe as [`step`](Self::step).
+    ///
+    /// # Errors
+    /// `STATES_REFUSED`, which ends the games. `STEP_GIVEN_UP`.
+    pub async fn restore(
+        &mut self,
+        games: &[u32],
+        states: Vec<Vec<u8>>,
+    ) -> Result<Box<v1::VectorBatch>, Error> {
+        let games = column(games);
+        self.ask(Request::Restore(v1::VectorRestore { games, states }))
+            .await
+    }
+
     /// The parts of records received since the last call, in order, if the setup requests records.
     /// They are stored until then.
     pub fn take_records(&mut self) -> Vec<v1::VectorRecord> {
@@ -111,10 +145,20 @@ impl VectorGames {
             match next(&mut self.responses).await? {
                 Some(Response::Batch(batch)) => return Ok(batch),
                 Some(Response::Record(record)) => self.records.push(record),
-                Some(Response::Started(_)) | None => return Err(Error::incomplete("batch")),
+                Some(Response::Started(_) | Response::States(_)) | None => {
+                    return Err(Error::incomplete("batch"));
+                }
             }
         }
     }
+}
+
+/// A column of u32.
+fn column(numbers: &[u32]) -> Vec<u8> {
+    numbers
+        .iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect()
 }
 
 async fn send(requests: &mpsc::Sender<v1::RunRequest>, request: Request) {

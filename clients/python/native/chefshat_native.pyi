@@ -32,6 +32,12 @@ class Games:
     def reset(self, reset: bytes) -> Batch:
         """Executes a serialized `VectorReset` and returns the next batch."""
 
+    def save(self, save: bytes) -> bytes:
+        """Executes a serialized `VectorSave` and returns serialized `VectorStates`."""
+
+    def restore(self, restore: bytes) -> Batch:
+        """Executes a serialized `VectorRestore` and returns the next batch."""
+
     def sample(self, seed: int, first: int) -> NDArray[np.uint16]:
         """Draws a legal action for each row of the latest batch: row i takes the draw `first + i` of the seed."""
 

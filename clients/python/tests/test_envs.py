@@ -282,7 +282,7 @@ def test_make_creates_every_kind(toy: FakeVector, kind: Any) -> None:
     ("make", "says"),
     [
         (lambda address: chefshat.make("gym", address=address), "'gymnasium_vector'"),
-        (lambda address: ChefsHatEnv(address, observation="picture"), "'classic', 'table', 'columns'"),
+        (lambda address: ChefsHatEnv(address, observation="picture"), "'table', 'columns', 'classic'"),
         (lambda address: ChefsHatEnv(address, observation=lambda seen: np.zeros(3)), "one row for each"),
         (lambda address: ChefsHatEnv(address, observation=lambda seen: seen.masks), "booleans"),
         (lambda address: ChefsHatEnv(address, games=2), "VectorEnv"),

@@ -56,6 +56,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SETUP_MISSING",
     "SETUP_REFUSED",
     "SETUP_TOO_LATE",
+    "STATES_TOO_LARGE",
     "STREAM_SILENT",
     "TOO_MANY_COMMANDS",
     "TOO_MANY_SEATS",

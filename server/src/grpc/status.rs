@@ -49,7 +49,7 @@ fn with_reason(
 /// The status for a refused request of a vector stream.
 pub fn vector_refused(error: RequestError) -> Status {
     let code = match error.reason {
-        "RECORDS_TOO_LONG" => Code::ResourceExhausted,
+        "RECORDS_TOO_LONG" | "STATES_TOO_LARGE" => Code::ResourceExhausted,
         _ => Code::InvalidArgument,
     };
     let metadata = error.metadata.into_iter();

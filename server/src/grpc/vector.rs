@@ -16,8 +16,8 @@ use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::FieldProblem;
 use chefshat_simulation::vector::{Decisions, Start, VectorGames, VectorSetup};
 use chefshat_vector::{
-    Limits, Request as VectorRequest, batch_to_proto, record_parts, seeds_from_setup,
-    setup_from_proto, start_from_proto, started_to_proto,
+    Limits, Request as VectorRequest, batch_to_proto, record_parts, saved_to_proto,
+    seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto,
 };
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -141,6 +141,14 @@ impl From<Status> for End {
     }
 }
 
+/// A request of a client.
+enum Command {
+    /// Answered by a batch.
+    Next(VectorRequest),
+    /// Answered by states.
+    Save(v1::VectorSave),
+}
+
 impl Runner {
     async fn run(self, mut requests: Streaming<v1::RunRequest>) {
         let closing = self.service.closing.clone();
@@ -188,8 +196,18 @@ impl Runner {
             let statistics = games.setup().statistics();
             let response = ResponseKind::Batch(Box::new(batch_to_proto(batch, statistics)));
             self.send(response).await?;
-            let Some(command) = self.next_command(requests).await? else {
-                return Err(End::Gone);
+            let command = loop {
+                match self.next_command(requests).await? {
+                    None => return Err(End::Gone),
+                    Some(Command::Next(request)) => break request,
+                    Some(Command::Save(message)) => {
+                        let save = move || (saved_to_proto(&message, &games), games);
+                        let saved;
+                        (saved, games) = self.run_on_pool(save).await?;
+                        let states = saved.map_err(vector_refused)?;
+                        self.send(ResponseKind::States(states)).await?;
+                    }
+                }
             };
             if let VectorRequest::Actions(actions) = &command {
                 let decisions = u64::try_from(actions.len()).unwrap_or(u64::MAX);
@@ -201,7 +219,7 @@ impl Runner {
                 true => caught(step).ok_or_else(internal)?,
                 false => self.run_on_pool(step).await?,
             };
-            batch = stepped.map_err(|error| vector_refused(error.into()))?;
+            batch = stepped.map_err(vector_refused)?;
         }
     }
 
@@ -209,26 +227,24 @@ impl Runner {
     async fn next_command(
         &self,
         requests: &mut Streaming<v1::RunRequest>,
-    ) -> Result<Option<VectorRequest>, End> {
+    ) -> Result<Option<Command>, End> {
         let message = timeout(VECTOR_IDLE_TIMEOUT, next(requests)).await;
-        match message.map_err(|_| client_idle())?? {
-            None => Ok(None),
-            Some(Some(RequestKind::Actions(message))) => Ok(Some(
-                VectorRequest::actions(&message).map_err(vector_refused)?,
-            )),
-            Some(Some(RequestKind::Reset(message))) => {
-                let reset = VectorRequest::reset(&message, &LIMITS);
-                Ok(Some(reset.map_err(vector_refused)?))
-            }
+        let request = match message.map_err(|_| client_idle())?? {
+            None => return Ok(None),
+            Some(Some(RequestKind::Save(message))) => return Ok(Some(Command::Save(message))),
+            Some(Some(RequestKind::Actions(message))) => VectorRequest::actions(&message),
+            Some(Some(RequestKind::Reset(message))) => VectorRequest::reset(&message, &LIMITS),
+            Some(Some(RequestKind::Restore(message))) => Ok(VectorRequest::Restore(message)),
             Some(Some(RequestKind::Setup(_))) => {
                 let words = "the games are already set up; open another stream for others";
-                Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into())
+                return Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into());
             }
             Some(None) => {
-                let words = "set a request: actions or reset";
-                Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into())
+                let words = "set a request: actions, reset, save or restore";
+                return Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into());
             }
-        }
+        };
+        Ok(Some(Command::Next(request.map_err(vector_refused)?)))
     }
 
     /// Runs work on the pool's threads. If the call is cancelled, the work completes and its result

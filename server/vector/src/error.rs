@@ -1,7 +1,7 @@
 //! Why a request is refused, with the same reasons and words over every way to the games.
 
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::StepError;
+use chefshat_simulation::vector::{StateError, StepError};
 use thiserror::Error;
 
 /// A refused request.
@@ -59,5 +59,21 @@ impl From<StepError> for RequestError {
             message: error.to_string(),
             metadata,
         }
+    }
+}
+
+impl From<StateError> for RequestError {
+    fn from(error: StateError) -> Self {
+        if error == StateError::Games(StepError::RecordsTooLong) {
+            return StepError::RecordsTooLong.into();
+        }
+        let field = match &error {
+            StateError::Games(_) | StateError::Count { .. } => "games",
+            _ => "states",
+        };
+        Self::field(
+            "STATES_REFUSED",
+            &FieldProblem::new(field, error.to_string()),
+        )
     }
 }

@@ -1,6 +1,6 @@
 //! Vector environments as messages: what `VectorService` and the Python package in one process
 //! share. `setup` reads setups, `request` later requests, `batch` writes batches, `record` records
-//! of finished games. `chefshat_simulation::vector` plays the games.
+//! of finished games, `states` saves games. `chefshat_simulation::vector` plays the games.
 
 mod batch;
 mod error;
@@ -8,9 +8,11 @@ pub mod policy;
 mod record;
 mod request;
 mod setup;
+mod states;
 
 pub use batch::{MAX_BATCH_BYTES, batch_to_proto};
 pub use error::RequestError;
 pub use record::{record_lines, record_parts};
 pub use request::{Request, Reset};
 pub use setup::{Limits, seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto};
+pub use states::saved_to_proto;

@@ -1,20 +1,23 @@
-//! Requests after the setup: actions, and resets.
+//! Requests after the setup: actions, resets, and states.
 
 use chefshat_engine::ActionId;
 use chefshat_proto::v1::{self, vector_reset};
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Batch, Seeds, StepError, VectorGames};
+use chefshat_simulation::vector::{Batch, Seeds, VectorGames};
 
 use crate::error::RequestError;
 use crate::setup::{Limits, seeds_from_proto};
+use crate::states::{numbers, states_from_proto};
 
-/// A request after the setup.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A request after the setup whose answer is a batch.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Request {
     /// The decisions of a batch.
     Actions(Vec<ActionId>),
     /// Games to begin again.
     Reset(Reset),
+    /// Games to replace by saved ones.
+    Restore(v1::VectorRestore),
 }
 
 /// The games to reset.
@@ -60,22 +63,26 @@ impl Request {
     /// Executes the request and returns the next batch.
     ///
     /// # Errors
-    /// See [`StepError`].
-    pub fn execute(self, games: &mut VectorGames) -> Result<Batch, StepError> {
+    /// The actions, games or states cannot be used.
+    pub fn execute(self, games: &mut VectorGames) -> Result<Batch, RequestError> {
         match self {
-            Self::Actions(actions) => games.step(&actions),
+            Self::Actions(actions) => Ok(games.step(&actions)?),
             Self::Reset(Reset::All(seeds)) => Ok(games.reset(seeds)),
-            Self::Reset(Reset::Some(some)) => games.reset_some(&some),
+            Self::Reset(Reset::Some(some)) => Ok(games.reset_some(&some)?),
+            Self::Restore(message) => restore(&message, games),
         }
     }
 }
 
+fn restore(message: &v1::VectorRestore, games: &mut VectorGames) -> Result<Batch, RequestError> {
+    let refused = |problem| RequestError::field("STATES_REFUSED", &problem);
+    let chosen = numbers("games", &message.games).map_err(refused)?;
+    let states = states_from_proto(&message.states).map_err(refused)?;
+    Ok(games.restore(&chosen, states)?)
+}
+
 fn reset_from_proto(message: &v1::VectorReset, limits: &Limits) -> Result<Reset, FieldProblem> {
-    let (games, rest) = message.games.as_chunks::<4>();
-    if !rest.is_empty() {
-        let words = "the column is incomplete: 4 bytes for each game";
-        return Err(FieldProblem::new("games", words));
-    }
+    let games = numbers("games", &message.games)?;
     let seeds = match &message.seeds {
         None => None,
         Some(_) if !message.all => {
@@ -92,6 +99,5 @@ fn reset_from_proto(message: &v1::VectorReset, limits: &Limits) -> Result<Reset,
     if message.all {
         return Ok(Reset::All(seeds));
     }
-    let games = games.iter().map(|bytes| u32::from_le_bytes(*bytes));
-    Ok(Reset::Some(games.collect()))
+    Ok(Reset::Some(games))
 }

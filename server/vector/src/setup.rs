@@ -15,6 +15,7 @@ use chefshat_simulation::vector::{
 
 use crate::error::RequestError;
 use crate::policy::agent_from_proto;
+use crate::states::states_from_proto;
 
 /// What a setup may ask for.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +48,7 @@ pub fn seeds_from_setup(
 /// The rules and the start of games that do not continue a recorded game; `None` if they do.
 ///
 /// # Errors
-/// The rule set or the hands are invalid.
+/// The rule set, the hands or the saved games are invalid.
 pub fn start_from_proto(
     message: &v1::VectorSetup,
 ) -> Result<Option<(RuleSet, Start)>, RequestError> {
@@ -62,6 +63,15 @@ pub fn start_from_proto(
             let script = script_from_proto(script, &rules)
                 .map_err(|problem| RequestError::field("SCRIPT_REFUSED", &problem))?;
             Ok(Some((rules, Start::Script(Box::new(script)))))
+        }
+        Some(vector_setup::Start::Saved(saved)) => {
+            let states = states_from_proto(&saved.states)
+                .map_err(|problem| RequestError::field("STATES_REFUSED", &problem))?;
+            let start = Start::Saved {
+                games: states.into(),
+                same_deals: saved.same_deals,
+            };
+            Ok(Some((rules()?, start)))
         }
         Some(vector_setup::Start::Branch(_)) => Ok(None),
     }
@@ -254,7 +264,7 @@ fn problem(error: SetupError) -> FieldProblem {
         SetupError::Total { .. } => "total_games",
         SetupError::NoSeeds => "game_seeds",
         SetupError::Script(_) => "scripted",
-        SetupError::NoSaved | SetupError::Saved { .. } => "states",
+        SetupError::NoSaved | SetupError::Saved { .. } => "saved",
     };
     FieldProblem::new(field, error.to_string())
 }

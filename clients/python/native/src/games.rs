@@ -8,8 +8,8 @@ use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
 use chefshat_simulation::vector::{Batch as Columns, VectorGames};
 use chefshat_vector::{
-    Limits, Request, RequestError, record_lines, seeds_from_setup, setup_from_proto,
-    start_from_proto, started_to_proto,
+    Limits, Request, RequestError, record_lines, saved_to_proto, seeds_from_setup,
+    setup_from_proto, start_from_proto, started_to_proto,
 };
 use numpy::{PyArray1, PyReadonlyArray1};
 use prost::Message;
@@ -87,6 +87,22 @@ impl Games {
         self.execute(py, request)
     }
 
+    /// Executes a serialized `VectorRestore` and returns the next batch.
+    fn restore(&self, py: Python<'_>, restore: &[u8]) -> PyResult<Batch> {
+        let message = decode::<v1::VectorRestore>("restore", restore)?;
+        self.execute(py, Request::Restore(message))
+    }
+
+    /// Executes a serialized `VectorSave` and returns serialized `VectorStates`.
+    fn save<'py>(&self, py: Python<'py>, save: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
+        let message = decode::<v1::VectorSave>("save", save)?;
+        let state = self.lock()?;
+        let games = state.as_ref().ok_or_else(|| ended(py))?;
+        let saved = caught(|| saved_to_proto(&message, games))?;
+        let states = saved.map_err(|error| refused(py, error))?;
+        Ok(PyBytes::new(py, &states.encode_to_vec()))
+    }
+
     /// Draws a legal action for each row of the latest batch: row i takes the draw `first + i` of
     /// the seed.
     fn sample<'py>(
@@ -132,7 +148,7 @@ impl Games {
                 Ok(batch)
             }
             // As over the network, a refused request ends the games.
-            Err(error) => Err(refused(py, error.into())),
+            Err(error) => Err(refused(py, error)),
         }
     }
 

@@ -31,6 +31,12 @@ class Games(Protocol):
     def reset(self, request: pb.VectorReset) -> Batch:
         """Abandons games, starts new ones and returns the next batch."""
 
+    def save(self, games: NDArray[np.uint32]) -> list[bytes]:
+        """Returns the states of games."""
+
+    def restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
+        """Replaces games, in ascending order, by saved ones and returns the next batch."""
+
     def sample(self, batch: Batch, seed: int, first: int) -> NDArray[np.uint16]:
         """Draws a legal action for each row of the latest batch; see `masks.sample_by`."""
 

@@ -74,6 +74,23 @@ class NativeGames:
         except chefshat_native.Refused as error:
             _raise(error)
 
+    def save(self, games: NDArray[np.uint32]) -> list[bytes]:
+        """Returns the states of games."""
+        request = pb.VectorSave(games=games.tobytes())
+        try:
+            saved = self._games.save(request.SerializeToString())
+        except chefshat_native.Refused as error:
+            _raise(error)
+        return list(pb.VectorStates.FromString(saved).states)
+
+    def restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
+        """Replaces games, in ascending order, by saved ones and returns the next batch."""
+        request = pb.VectorRestore(games=games.tobytes(), states=states)
+        try:
+            return self._batch(self._games.restore(request.SerializeToString()))
+        except chefshat_native.Refused as error:
+            _raise(error)
+
     def sample(self, batch: Batch, seed: int, first: int) -> NDArray[np.uint16]:
         """Draws a legal action for each row of the latest batch."""
         return self._games.sample(seed, first)

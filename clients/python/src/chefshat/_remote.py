@@ -20,6 +20,9 @@ from chefshat.network import grpc
 
 # Maximum bytes of a message: the largest batch has a quarter of them (`max_vector_batch_bytes`), a part of a record far fewer.
 MAX_BATCH_BYTES = 64 * 1024 * 1024
+# Most games whose states are asked for, and most bytes of states sent, in one message (`max_vector_message_bytes` is 1 MiB).
+SAVED_AT_ONCE = 4096
+RESTORED_BYTES = 900_000
 # An environment cannot reconnect and has no clock, so it is patient with a busy server. Times in milliseconds.
 PATIENT_CHANNEL = [
     ("grpc.max_receive_message_length", MAX_BATCH_BYTES),
@@ -100,6 +103,32 @@ class RemoteGames:
     def reset(self, request: pb.VectorReset) -> Batch:
         """Abandons games, starts new ones and returns the next batch."""
         self._outbox.put(pb.RunRequest(reset=request))
+        return self._receive_batch()
+
+    def save(self, games: NDArray[np.uint32]) -> list[bytes]:
+        """Returns the states of games."""
+        states: list[bytes] = []
+        for first in range(0, len(games), SAVED_AT_ONCE):
+            part = games[first : first + SAVED_AT_ONCE]
+            self._outbox.put(pb.RunRequest(save=pb.VectorSave(games=part.tobytes())))
+            response = self._receive()
+            if not response.HasField("states"):
+                raise ChefsHatError("PROTOCOL_VIOLATED", "the server did not send the states")
+            states.extend(response.states.states)
+        return states
+
+    def restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
+        """Replaces games, in ascending order, by saved ones and returns the next batch."""
+        first, size = 0, 0
+        for place, state in enumerate(states):
+            size += len(state)
+            if place > first and size > RESTORED_BYTES:
+                self._restore(games[first:place], states[first:place])
+                first, size = place, len(state)
+        return self._restore(games[first:], states[first:])
+
+    def _restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
+        self._outbox.put(pb.RunRequest(restore=pb.VectorRestore(games=games.tobytes(), states=states)))
         return self._receive_batch()
 
     def sample(self, batch: Batch, seed: int, first: int) -> NDArray[np.uint16]:

@@ -44,7 +44,7 @@ class Sizes:
     turn_actions: int
 
     @classmethod
-    def of(cls, started: pb.VectorStarted) -> Self:
+    def of(cls, started: pb.VectorStarted | pb.GameStarted) -> Self:
         """Returns the numbers of the games that have been started."""
         return cls(
             players=started.rules.players,

@@ -4,12 +4,13 @@ The view adds names and numpy arrays to the message, but no rules: the server de
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chefshat import pb
+from chefshat.columns import Observations, Situations, Sizes
 
 Counts: TypeAlias = NDArray[np.uint8]
 
@@ -243,16 +244,55 @@ class Decision:
     @property
     def hand_size(self) -> int:
         """H, the number of cards dealt to each seat: 17 by default. Raises ValueError before the start of the game has arrived."""
+        return self.sizes.hand_size
+
+    @property
+    def sizes(self) -> Sizes:
+        """The numbers that determine the widths of columns. Raises ValueError before the start of the game has arrived."""
         if self.seat_info.game_started is None:
             raise ValueError("the number of cards dealt is unknown: the start of the game has not arrived")
-        return self.seat_info.game_started.hand_size
+        return Sizes.of(self.seat_info.game_started)
+
+    def situations(self) -> Situations:
+        """Returns the decision as a table of one row, as a `VectorEnv`'s batch has it.
+
+        An observation function that works on `Situations`, such as `chefshat.learn.features.table_of`, takes both, so that a policy
+        plays live as it was trained:
+
+            scores = policy(table_of(decision.situations()))[0]
+            action = np.where(decision.mask, scores, -np.inf).argmax()
+        """
+        seen, sizes = self.request.observation, self.sizes
+        boards = [seen.board_face, seen.board_size, seen.board_jokers]
+        columns: dict[str, NDArray[Any]] = {
+            "shifts": np.array([seen.shift], np.uint32),
+            "pizzas": np.array([seen.pizza], np.uint32),
+            "golden": np.array([seen.golden], np.uint8),
+            "boards": np.array([boards], np.uint8),
+            "points": np.minimum([seen.points], np.iinfo(np.uint32).max).astype(np.uint32),
+        }
+        for name in ("hands", "cards_left", "passed", "places", "roles", "played", "gave", "received"):
+            sent = np.frombuffer(getattr(seen, "hand" if name == "hands" else name), np.uint8)
+            # Nothing given or received is sent as no bytes.
+            columns[name] = (sent if len(sent) else np.zeros(sizes.card_kinds, np.uint8))[np.newaxis]
+        situations = Situations.of(
+            1,
+            sizes,
+            {
+                "seats": np.array([self.seat], np.uint8),
+                "kinds": np.array([self.kind], np.uint8),
+                "mask_bits": np.frombuffer(self.request.action_mask, np.uint8)[np.newaxis],
+            },
+        )
+        situations.__dict__["observations"] = Observations.of(1, sizes, columns)
+        return situations
 
     def classic_vector(self) -> NDArray[np.float32]:
         """Computes the 228 numbers of the 2020 paper (F + H + T in general), each 0..=1.
 
         First the board, F slots: the cards of the play ascending with jokers as F+1, cut off after F slots; an empty board is F+2
         in the first slot; unused slots are 0. Then the hand, H slots, ascending, zeros first. Both are divided by F+2. Last the
-        first T entries of the mask as 0 or 1.
+        first T entries of the mask as 0 or 1. It hides what `chefshat.learn.features.classic` lists; `situations` hides nothing.
         """
         faces = self.faces
         joker = faces + 1

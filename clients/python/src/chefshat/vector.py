@@ -7,9 +7,10 @@ interfaces of Gymnasium and PettingZoo in `envs`.
 
 import importlib.util
 import secrets
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import NoReturn, Self, Unpack
+from typing import NoReturn, Self, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,8 +44,14 @@ __all__ = [
     "sample_legal",
 ]
 
+#: The most bytes of a setup that a server takes (`max_vector_message_bytes`).
+MAX_SETUP_BYTES = 1024 * 1024
 #: The address of the server shared by this process, which is started on demand.
 LOCAL = "local"
+
+
+# The arguments that say where games are played: address, token, certificates.
+_Place: TypeAlias = "tuple[str | ServerAddress | None, str | None, Path | str | None]"
 
 
 class VectorEnv:
@@ -91,13 +98,19 @@ class VectorEnv:
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
             options: see `VectorOptions`.
         """
-        setup = vector_setup(games, options)
+        self._start(vector_setup(games, options), (address, token, ca), transitions, reward_function)
+
+    def _start(self, setup: pb.VectorSetup, place: _Place, transitions: bool, reward_function: RewardFunction | None) -> None:
+        """Starts the games of a setup."""
+        self._setup = setup
+        self._place = place
         self._ended: ChefsHatError | None = None
-        self._games = _begin(setup, address, token, ca)
+        self._games = _begin(setup, *place)
         try:
-            self._set_attributes(self._games.started, games)
+            self._set_attributes(self._games.started, setup.games)
             self.server = self._games.server
-            self._memory = Memory(games, self.sizes) if transitions or reward_function is not None else None
+            keeps = transitions or reward_function is not None
+            self._memory = Memory(setup.games, self.sizes) if keeps else None
             self._reward_function = reward_function
             self.batch = self._completed(self._games.first())
         except BaseException:
@@ -206,9 +219,7 @@ class VectorEnv:
             chosen = np.unique(np.asarray(games))
             if chosen.size == 0:
                 return self.batch
-            if chosen.dtype.kind not in "iu" or chosen[0] < 0 or chosen[-1] >= self.games:
-                raise ValueError(f"games are integers 0..={self.games - 1}")
-            chosen = chosen.astype("<u4")
+            chosen = self._numbers(chosen)
             request.games = chosen.tobytes()
         if self._memory is not None:
             self._memory.forget(chosen)
@@ -222,6 +233,87 @@ class VectorEnv:
         self.batch = self._completed(batch)
         self._fresh = games is None
         return self.batch
+
+    def save(self, games: ArrayLike | None = None) -> list[bytes]:
+        """Returns the complete states of games: everything that determines how they continue.
+
+        A state has the cards of all seats: keep it from the agents that play. It is opaque, and the same on all platforms and on
+        both ways to the games. It has less than 2 KB, and with `records=True` also the decisions so far.
+
+        Args:
+            games: the games, 0..n-1, in any order, for instance `batch.games[rows]`; None: all.
+        """
+        self._check_open()
+        chosen = np.arange(self.games, dtype="<u4") if games is None else self._numbers(games)
+        try:
+            return self._games.save(chosen)
+        except BaseException as error:
+            self._fail(error)
+            raise
+
+    def restore(self, games: ArrayLike, states: Sequence[bytes]) -> Batch:
+        """Replaces games by saved ones and returns the next batch, which has every game that waits for a decision.
+
+        A restored game continues exactly as the saved one would: the same deals, the same random choices of built-in agents, and
+        later games with the same indices. Transitions that had begun in a replaced game are not completed.
+
+        Args:
+            games: the games to replace, each once.
+            states: the state of each, of an environment that differs at most in the number of games, seed, start (hands, branch),
+                episode and skip_forced. STATES_REFUSED says what else differs.
+        """
+        self._check_open()
+        chosen = self._numbers(games)
+        order = np.argsort(chosen)
+        if len(np.unique(chosen)) != len(chosen) or len(states) != len(chosen):
+            raise ValueError(f"name each game once and give one state for each: {len(chosen)} games and {len(states)} states")
+        if not len(chosen):
+            return self.batch
+        if self._memory is not None:
+            self._memory.forget(chosen)
+        try:
+            batch = self._games.restore(chosen[order], [states[place] for place in order])
+        except BaseException as error:
+            self._fail(error)
+            raise
+        self.batch = self._completed(batch)
+        self._fresh = False
+        return self.batch
+
+    def fork(self, games: ArrayLike | None = None, times: int = 1, *, seed: Seed = None) -> Self:
+        """Returns another environment with `times` copies of each of these games, and the same options otherwise.
+
+        Game i of it is a copy of `games[i % len(games)]`. After a reset, a copy begins again from the same state; likewise when its
+        game is over, unless `total_games` is set. Records are not kept. This environment is unchanged.
+
+        Args:
+            games: the games to copy, for instance `batch.games[rows]`; None: all. Their games must be running.
+            times: copies of each.
+            seed: later Shifts are dealt, and built-in agents choose at random, by these seeds, so that copies differ; the cards of
+                the current Shift stay the same. None: each copy continues exactly as its original would.
+        """
+        states = self.save(games)
+        setup = pb.VectorSetup()
+        setup.CopyFrom(self._setup)
+        setup.rules.CopyFrom(self.rules)
+        setup.games = len(states) * times
+        setup.saved.CopyFrom(pb.SavedStart(states=states, same_deals=seed is None))
+        setup.records = False
+        if setup.total_games:
+            setup.total_games = setup.games
+        put_seed(setup, seed)
+        if self.server is not None and setup.ByteSize() > MAX_SETUP_BYTES:
+            raise ValueError(f"{len(states)} games are too many to fork on a server at once: fork some of them at a time")
+        env = type(self).__new__(type(self))
+        env._start(setup, self._place, self._memory is not None, self._reward_function)
+        return env
+
+    def _numbers(self, games: ArrayLike) -> NDArray[np.uint32]:
+        """Checks and encodes numbers of games."""
+        chosen = np.atleast_1d(np.asarray(games))
+        if chosen.size and (chosen.ndim != 1 or chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= self.games):
+            raise ValueError(f"games are integers 0..={self.games - 1}")
+        return chosen.astype("<u4")
 
     def close(self) -> None:
         """Ends the games. Does nothing if it is closed."""

@@ -57,7 +57,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self,
         address: str | ServerAddress | None = None,
         *,
-        observation: str | ObservationFunction = "classic",
+        observation: str | ObservationFunction = "table",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,

@@ -59,7 +59,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         address: str | ServerAddress | None = None,
         *,
         seat: int = 0,
-        observation: str | ObservationFunction = "classic",
+        observation: str | ObservationFunction = "table",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,
@@ -71,7 +71,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         Args:
             address: the server; None: the server shared by this process, which is started on demand.
             seat: the seat of the agent.
-            observation: "classic", "table", "columns", or a function. See `Form`.
+            observation: "table", "columns", "classic", or a function. See `Form`.
             rewards: the scheme; see `VectorOptions`. With "winning", 1 for finishing first, else -0.001 for each turn.
             invalid: effect of an illegal action; see `VectorOptions`.
             invalid_penalty: subtracted from the reward of an illegal action.

@@ -45,7 +45,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         num_envs: int = 1,
         *,
         seat: int = 0,
-        observation: str | ObservationFunction = "classic",
+        observation: str | ObservationFunction = "table",
         rewards: str | None = "winning",
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,

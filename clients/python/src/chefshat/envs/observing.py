@@ -20,7 +20,7 @@ ObservationFunction: TypeAlias = Callable[[Situations], NDArray[Any]]
 Observed: TypeAlias = "NDArray[Any] | dict[str, NDArray[Any]]"
 """Observations of R situations: an array of R rows, or a dictionary of such arrays."""
 
-FORMS = ("classic", "table", "columns")
+FORMS = ("table", "columns", "classic")
 # Columns of `Situations` in the form "columns", besides those of `Observations`.
 _DECISION = ("seats", "kinds")
 
@@ -41,9 +41,10 @@ class Form:
         """Chooses a form.
 
         Args:
-            observation: "classic" (the paper's vector: F + H + T numbers of 0..=1, default 228), "table" (everything a seat may
-                know as numbers, default 334; see `chefshat.learn.features.table`), "columns" (a dictionary of the columns), or a
-                function.
+            observation: "table" (everything a seat may know at the moment as numbers, default 334; see
+                `chefshat.learn.features.table`), "columns" (a dictionary of the columns), "classic" (the paper's vector: F + H + T
+                numbers, default 228; it hides the kind of the decision and more, see `chefshat.learn.features.classic`), or
+                a function.
             sizes: the numbers that determine shapes.
             sample: some situations, to determine the space of a function.
         """

@@ -57,6 +57,10 @@ def classic(observations: Observations, mask_bits: Bytes, *, faces: int, hand_si
     Board (F slots): the cards of the play ascending, jokers as F+1, cut off after F slots; an empty board is F+2 in slot 0. Hand (H
     slots): ascending, zeros first. Both are divided by F+2. Then the first T bits of the mask as 0 or 1.
 
+    It hides the kind of the decision: gifts and special actions have an empty board and no legal action in it, so a policy that
+    sees only this vector cannot tell them apart. It also hides roles, points, places, who has passed, the cards of other seats, the
+    cards played and exchanged, and which card is the Golden one. Use it to compare with the paper, and `table` otherwise.
+
     Args:
         observations: R rows of columns.
         mask_bits: (R, ceil(A/8)), packed as in `Batch.mask_bits`.

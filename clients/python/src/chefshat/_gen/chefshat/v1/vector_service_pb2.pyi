@@ -137,13 +137,17 @@ Global___EpisodeEnd: _TypeAlias = EpisodeEnd  # noqa: Y015
 
 @_typing.final
 class RunRequest(_message.Message):
-    """A request of the client: one setup, then one reply to each batch."""
+    """A request of the client: one setup, then one reply to each batch, before which states may be
+    saved.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
     SETUP_FIELD_NUMBER: _builtins.int
     ACTIONS_FIELD_NUMBER: _builtins.int
     RESET_FIELD_NUMBER: _builtins.int
+    SAVE_FIELD_NUMBER: _builtins.int
+    RESTORE_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def setup(self) -> Global___VectorSetup:
         """The first message only."""
@@ -156,18 +160,28 @@ class RunRequest(_message.Message):
     def reset(self) -> Global___VectorReset:
         """Instead of decisions: abandons games and begins new ones."""
 
+    @_builtins.property
+    def save(self) -> Global___VectorSave:
+        """Asks for the states of games. The batch still requires a reply."""
+
+    @_builtins.property
+    def restore(self) -> Global___VectorRestore:
+        """Instead of decisions: replaces games by saved ones."""
+
     def __init__(
         self,
         *,
         setup: Global___VectorSetup | None = ...,
         actions: Global___VectorActions | None = ...,
         reset: Global___VectorReset | None = ...,
+        save: Global___VectorSave | None = ...,
+        restore: Global___VectorRestore | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["actions", b"actions", "request", b"request", "reset", b"reset", "setup", b"setup"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["actions", b"actions", "request", b"request", "reset", b"reset", "restore", b"restore", "save", b"save", "setup", b"setup"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["actions", b"actions", "request", b"request", "reset", b"reset", "setup", b"setup"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["actions", b"actions", "request", b"request", "reset", b"reset", "restore", b"restore", "save", b"save", "setup", b"setup"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_request: _TypeAlias = _typing.Literal["setup", "actions", "reset"]  # noqa: Y015
+    _WhichOneofReturnType_request: _TypeAlias = _typing.Literal["setup", "actions", "reset", "save", "restore"]  # noqa: Y015
     _WhichOneofArgType_request: _TypeAlias = _typing.Literal["request", b"request"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_request) -> _WhichOneofReturnType_request | None: ...
 
@@ -198,6 +212,40 @@ class GameSeeds(_message.Message):
 Global___GameSeeds: _TypeAlias = GameSeeds  # noqa: Y015
 
 @_typing.final
+class SavedStart(_message.Message):
+    """Saved games as the start of games. In copies decisions are not kept for records."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STATES_FIELD_NUMBER: _builtins.int
+    SAME_DEALS_FIELD_NUMBER: _builtins.int
+    same_deals: _builtins.bool
+    """Whether a copy continues exactly as the saved game would: with its seed, and with the random
+    choices of its built-in agents. Otherwise later Shifts are dealt, and built-in agents choose, by
+    the seed of each game; the cards of the current Shift stay the same.
+    """
+    @_builtins.property
+    def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
+        """States, as in VectorStates, of running games with the same rules, seats, rewards, decisions,
+        rule for invalid actions and shift_statistics. The game with index i is a copy of the state at
+        i modulo their number.
+        """
+
+    def __init__(
+        self,
+        *,
+        states: _abc.Iterable[_builtins.bytes] | None = ...,
+        same_deals: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["same_deals", b"same_deals", "states", b"states"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SavedStart: _TypeAlias = SavedStart  # noqa: Y015
+
+@_typing.final
 class VectorSetup(_message.Message):
     """How the games of a stream are played."""
 
@@ -219,6 +267,7 @@ class VectorSetup(_message.Message):
     GAME_SEEDS_FIELD_NUMBER: _builtins.int
     SCRIPTED_FIELD_NUMBER: _builtins.int
     BRANCH_FIELD_NUMBER: _builtins.int
+    SAVED_FIELD_NUMBER: _builtins.int
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
     games: _builtins.int
@@ -286,6 +335,10 @@ class VectorSetup(_message.Message):
     def branch(self) -> _room_pb2.BranchPoint:
         """From a point of a recorded game."""
 
+    @_builtins.property
+    def saved(self) -> Global___SavedStart:
+        """From saved games."""
+
     def __init__(
         self,
         *,
@@ -305,16 +358,17 @@ class VectorSetup(_message.Message):
         game_seeds: Global___GameSeeds | None = ...,
         scripted: _rules_pb2.ScriptedShift | None = ...,
         branch: _room_pb2.BranchPoint | None = ...,
+        saved: Global___SavedStart | None = ...,
         shift_statistics: _builtins.bool = ...,
         records: _builtins.bool = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "rules", b"rules", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "invalid_actions", b"invalid_actions", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "invalid_actions", b"invalid_actions", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
-    _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch"]  # noqa: Y015
+    _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch", "saved"]  # noqa: Y015
     _WhichOneofArgType_start: _TypeAlias = _typing.Literal["start", b"start"]  # noqa: Y015
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType_seeds) -> _WhichOneofReturnType_seeds | None: ...
@@ -391,6 +445,89 @@ class VectorReset(_message.Message):
 Global___VectorReset: _TypeAlias = VectorReset  # noqa: Y015
 
 @_typing.final
+class VectorSave(_message.Message):
+    """Asks for the complete states of games."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAMES_FIELD_NUMBER: _builtins.int
+    games: _builtins.bytes
+    """u32: the games, in any order."""
+    def __init__(
+        self,
+        *,
+        games: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["games", b"games"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___VectorSave: _TypeAlias = VectorSave  # noqa: Y015
+
+@_typing.final
+class VectorRestore(_message.Message):
+    """Replaces games by saved ones. Each continues exactly as the saved game would, with its index and
+    its seed. The next batch has every game that waits for the client; the other games are unchanged.
+    A restored game is not among the beginnings.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAMES_FIELD_NUMBER: _builtins.int
+    STATES_FIELD_NUMBER: _builtins.int
+    games: _builtins.bytes
+    """u32: the games to replace, ascending."""
+    @_builtins.property
+    def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
+        """The state of each, in the same order, from a stream whose setup differs at most in the number
+        of games, seeds, starts, episodes and skip_forced.
+        """
+
+    def __init__(
+        self,
+        *,
+        games: _builtins.bytes = ...,
+        states: _abc.Iterable[_builtins.bytes] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["games", b"games", "states", b"states"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___VectorRestore: _TypeAlias = VectorRestore  # noqa: Y015
+
+@_typing.final
+class VectorStates(_message.Message):
+    """States of games: everything that determines how a game continues, the cards of all seats
+    included. They are for the client that owns the games; keep them from those who play in them. A
+    state is opaque, versioned and the same on all platforms, and has less than 2 KB, plus at least 7
+    bytes for each decision kept for a record.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STATES_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
+        """The states, in the order of the request. Together at most max_vector_batch_bytes."""
+
+    def __init__(
+        self,
+        *,
+        states: _abc.Iterable[_builtins.bytes] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["states", b"states"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___VectorStates: _TypeAlias = VectorStates  # noqa: Y015
+
+@_typing.final
 class RunResponse(_message.Message):
     """A response of the server."""
 
@@ -399,6 +536,7 @@ class RunResponse(_message.Message):
     STARTED_FIELD_NUMBER: _builtins.int
     BATCH_FIELD_NUMBER: _builtins.int
     RECORD_FIELD_NUMBER: _builtins.int
+    STATES_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def started(self) -> Global___VectorStarted:
         """The first message."""
@@ -413,18 +551,23 @@ class RunResponse(_message.Message):
         Requires no reply.
         """
 
+    @_builtins.property
+    def states(self) -> Global___VectorStates:
+        """The states that were asked for."""
+
     def __init__(
         self,
         *,
         started: Global___VectorStarted | None = ...,
         batch: Global___VectorBatch | None = ...,
         record: Global___VectorRecord | None = ...,
+        states: Global___VectorStates | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["batch", b"batch", "record", b"record", "response", b"response", "started", b"started"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["batch", b"batch", "record", b"record", "response", b"response", "started", b"started", "states", b"states"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["batch", b"batch", "record", b"record", "response", b"response", "started", b"started"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["batch", b"batch", "record", b"record", "response", b"response", "started", b"started", "states", b"states"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_response: _TypeAlias = _typing.Literal["started", "batch", "record"]  # noqa: Y015
+    _WhichOneofReturnType_response: _TypeAlias = _typing.Literal["started", "batch", "record", "states"]  # noqa: Y015
     _WhichOneofArgType_response: _TypeAlias = _typing.Literal["response", b"response"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_response) -> _WhichOneofReturnType_response | None: ...
 

@@ -1,0 +1,63 @@
+"""A policy with its observation function plays live as on a vector environment."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import chefshat
+from chefshat import Client, Decision, VectorEnv, pb
+from chefshat.columns import Situations
+from chefshat.learn.features import classic_of, table_of
+
+SEED = bytes(range(32))
+
+
+def policy(situations: Situations) -> NDArray[np.intp]:
+    """Chooses the legal action with the highest of fixed scores of everything that a seat may know."""
+    inputs = table_of(situations)
+    weights = np.random.default_rng(3).standard_normal((inputs.shape[1], situations.sizes.num_actions), np.float32)
+    return np.where(situations.masks, inputs @ weights, -np.inf).argmax(axis=1)
+
+
+class Live(chefshat.Agent):
+    """Plays by the policy, and keeps what it saw and did."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[bytes, bytes, int]] = []
+
+    def decide(self, decision: Decision) -> int:
+        """Decides by the one row of the decision."""
+        situations = decision.situations()
+        assert (classic_of(situations)[0] == decision.classic_vector()).all()
+        action = int(policy(situations)[0])
+        self.seen.append((table_of(situations).tobytes(), columns(situations, 0), action))
+        return action
+
+
+def columns(situations: Situations, row: int) -> bytes:
+    """Returns a row of all columns."""
+    tables = [*((name, array) for name, array in situations.observations.as_dict().items())]
+    tables += [(name, getattr(situations, name)) for name in Situations.columns()]
+    return b"".join(name.encode() + array[row].tobytes() for name, array in tables)
+
+
+def test_the_same_function_plays_live_and_on_a_vector_environment(real_address: str) -> None:
+    live = Live()
+    with Client(real_address) as client:
+        seats = [None, "greedy", "greedy", "greedy"]
+        room = client.create_room("live", seats=seats, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
+        client.play(live, client.join_room(room.join_code, "live").ticket)
+    seen = []
+    with VectorEnv(real_address, client_seats=[0], opponents="greedy", seed=[SEED], total_games=1) as env:
+        while not env.batch.done:
+            action = int(policy(env.batch)[0])
+            seen.append((table_of(env.batch).tobytes(), columns(env.batch, 0), action))
+            env.step([action])
+    assert len(seen) > 20
+    assert live.seen == seen
+
+
+def test_a_decision_before_the_start_of_its_game_has_no_table() -> None:
+    decision = Decision(pb.DecisionRequest(), chefshat.SeatInfo("room", "game", 0))
+    with pytest.raises(ValueError, match="the start of the game has not arrived"):
+        decision.situations()
