@@ -184,6 +184,8 @@ def evaluate(agent: Agent, options: Options) -> list[int]:
 def train(options: Options) -> Iterator[dict[str, Any]]:
     """Trains an agent and evaluates it. Yields what is worth knowing after each update, and at the end."""
     torch.manual_seed(options.seed)
+    # Such small networks are slower with more.
+    torch.set_num_threads(1)
     games = Games(options, seed=options.seed)
     agent = Agent(games.seen.shape[1], games.masks.shape[1], options.width)
     optimizer = torch.optim.Adam(agent.parameters(), lr=options.learning_rate, eps=1e-5)
