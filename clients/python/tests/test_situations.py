@@ -16,7 +16,8 @@ def policy(situations: Situations) -> NDArray[np.intp]:
     """Chooses the legal action with the highest of fixed scores of everything that a seat may know."""
     inputs = table_of(situations)
     weights = np.random.default_rng(3).standard_normal((inputs.shape[1], situations.sizes.num_actions), np.float32)
-    return np.where(situations.masks, inputs @ weights, -np.inf).argmax(axis=1)
+    best: NDArray[np.intp] = np.where(situations.masks, inputs @ weights, -np.inf).argmax(axis=1)
+    return best
 
 
 class Live(chefshat.Agent):

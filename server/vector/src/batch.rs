@@ -84,6 +84,8 @@ fn observations(columns: ObservationColumns) -> v1::ObservationColumns {
         played: columns.played.into(),
         gave: columns.gave.into(),
         received: columns.received.into(),
+        history: columns.history.into(),
+        history_counts: columns.history_counts.into(),
     }
 }
 
@@ -92,7 +94,9 @@ mod tests {
     use chefshat_agents::{AgentKind, game_seed};
     use chefshat_engine::{ActionId, DecisionKind, Role, RuleSetSpec, Stop};
     use chefshat_record::convert::decision_kind;
-    use chefshat_simulation::vector::{MAX_SEATS_PLAYED, Seeds, VectorGames, VectorSetup};
+    use chefshat_simulation::vector::{
+        MAX_HISTORY_ENTRIES, MAX_SEATS_PLAYED, Seeds, VectorGames, VectorSetup,
+    };
     use prost::Message as _;
 
     use crate::batch::*;
@@ -189,7 +193,9 @@ mod tests {
             Seeds::List(vec![game_seed(1, 1)].into()),
         )
         .unwrap()
-        .with_statistics(true);
+        .with_statistics(true)
+        .with_history((MAX_HISTORY_ENTRIES / MAX_SEATS_PLAYED) as u16)
+        .unwrap();
         let (mut games, mut batch) = VectorGames::new(setup);
         let mut most = 0;
         for _ in 0..3 {

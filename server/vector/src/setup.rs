@@ -121,6 +121,8 @@ fn read(
         .map_err(problem)?
         .with_statistics(message.shift_statistics)
         .with_records(message.records)
+        .with_history(u16::try_from(message.history).unwrap_or(u16::MAX))
+        .map_err(problem)?
         .with_start(start)
         .map_err(problem)?;
     if message.records {
@@ -144,6 +146,7 @@ pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
             Seeds::Base(base) => Some(*base),
             Seeds::List(_) => None,
         },
+        history: setup.history().into(),
     }
 }
 
@@ -264,6 +267,7 @@ fn problem(error: SetupError) -> FieldProblem {
         SetupError::Total { .. } => "total_games",
         SetupError::NoSeeds => "game_seeds",
         SetupError::Script(_) => "scripted",
+        SetupError::History(_) => "history",
         SetupError::NoSaved | SetupError::Saved { .. } => "saved",
     };
     FieldProblem::new(field, error.to_string())

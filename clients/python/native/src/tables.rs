@@ -170,6 +170,8 @@ fn observed(
         ("shifts", seen.shifts),
         ("pizzas", seen.pizzas),
         ("points", seen.points),
+        ("history_counts", seen.history_counts),
+        ("history", seen.history),
     ]);
     columns.extend(small);
     columns.extend([

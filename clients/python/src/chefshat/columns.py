@@ -34,6 +34,7 @@ class Sizes:
         hand_size: H, the cards dealt to a hand.
         num_actions: A, the number of actions of any kind.
         turn_actions: T, the number of actions of a turn; they come first, and the last of them is passing.
+        history: the width of the column `history`; 0: there is none.
     """
 
     players: int
@@ -42,6 +43,7 @@ class Sizes:
     hand_size: int
     num_actions: int
     turn_actions: int
+    history: int = 0
 
     @classmethod
     def of(cls, started: pb.VectorStarted | pb.GameStarted) -> Self:
@@ -53,7 +55,14 @@ class Sizes:
             hand_size=started.hand_size,
             num_actions=started.action_space.size,
             turn_actions=started.action_space.turn_actions,
+            # A live game has no such column.
+            history=started.history if isinstance(started, pb.VectorStarted) else 0,
         )
+
+    @property
+    def has_history(self) -> int:
+        """1 if there is a history, else 0."""
+        return min(self.history, 1)
 
     @property
     def card_kinds(self) -> int:
@@ -91,7 +100,7 @@ class Column(Generic[Scalar]):
         width = self._width
         if isinstance(width, str):
             width = int(getattr(sizes, width))
-        return (rows,) if width == 1 else (rows, width)
+        return (rows,) if width == 1 and self._width != "history" else (rows, width)
 
     @overload
     def __get__(self, table: None, owner: type) -> Self: ...
@@ -171,9 +180,14 @@ class Table:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self._rows} rows)"
 
+    @classmethod
+    def columns_of(cls, sizes: Sizes) -> dict[str, Column[Any]]:
+        """Returns the columns that tables of these sizes have, by name: without a history also without its columns."""
+        return {name: column for name, column in cls.columns().items() if 0 not in column.shape(1, sizes)}
+
     def as_dict(self) -> dict[str, NDArray[Any]]:
         """Returns the columns as arrays, by name."""
-        return {name: getattr(self, name) for name in self.columns()}
+        return {name: getattr(self, name) for name in self.columns_of(self.sizes)}
 
     def take(self, rows: NDArray[Any]) -> Self:
         """Returns a table of the rows with these indices (or where this mask is true)."""
@@ -211,6 +225,10 @@ class Observations(Table):
     """(R, F+1): cards this seat gave in the Shift's exchange."""
     received = Column[np.uint8]("u1", "card_kinds")
     """(R, F+1): cards this seat received in the Shift's exchange."""
+    history = Column[np.uint16]("<u2", "history")
+    """(R, K): the latest actions of the Shift that the seat may know, the most recent last, after zeros. See `chefshat.history`."""
+    history_counts = Column[np.uint32]("<u4", "has_history")
+    """(R,): number of these actions since the Shift began, more than K if the column lacks some; (R, 0) without history."""
 
 
 class Situations(Table):

@@ -49,6 +49,7 @@ class VectorOptions(TypedDict, total=False):
         branch: the point of a recorded game that each game continues from.
         shift_statistics: whether batches have `shifts`.
         records: whether batches have the `records` of games that have ended.
+        history: K, the width of the column `observations.history`: the latest actions of the Shift; 0 (default): there is none.
     """
 
     client_seats: Sequence[int] | None
@@ -67,6 +68,7 @@ class VectorOptions(TypedDict, total=False):
     branch: pb.BranchPoint | None
     shift_statistics: bool
     records: bool
+    history: int
 
 
 def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
@@ -98,6 +100,7 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
         branch=branch,
         shift_statistics=options.get("shift_statistics", False),
         records=options.get("records", False),
+        history=options.get("history", 0),
         # A branch has the record's rules.
         rules=None if branch is not None else rule_set(rules),
     )

@@ -3,10 +3,11 @@
 //! is.
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Mask, Observation, PlayedDecision, Seat, SeatOrder, Seed,
-    ShiftMetrics, SpecialAction, Standings,
+    ActionSpace, BySeat, Cards, DecisionKind, Mask, Observation, PlayedDecision, Seat, SeatOrder,
+    Seed, ShiftMetrics, SpecialAction, Standings,
 };
 
+use super::history::History;
 use super::{Episode, VectorSetup};
 
 /// The end of an episode with a place for every seat.
@@ -80,6 +81,14 @@ pub struct ObservationColumns {
     pub gave: Vec<u8>,
     /// u8 by card.
     pub received: Vec<u8>,
+    /// u16, as wide as the setup's history: the latest actions of the Shift that the seat may know,
+    /// the most recent last, after zeros. With A actions, 1 + seat * (A+1) + action; action A is a
+    /// gift of an unknown card.
+    pub history: Vec<u8>,
+    /// u32: number of the actions of the Shift that the seat may know; empty without history.
+    pub history_counts: Vec<u8>,
+    /// Width of `history`.
+    width: u16,
 }
 
 /// Episodes of the client's seats that ended.
@@ -195,6 +204,7 @@ pub(super) struct Row<'a> {
     pub(super) attempts: u32,
     pub(super) reward: f32,
     pub(super) observation: &'a Observation,
+    pub(super) history: Option<&'a History>,
     pub(super) legal: &'a Mask,
 }
 
@@ -207,6 +217,7 @@ pub(super) struct Ending<'a> {
     pub(super) game_over: bool,
     pub(super) place: u8,
     pub(super) observation: &'a Observation,
+    pub(super) history: Option<&'a History>,
 }
 
 impl Batch {
@@ -226,7 +237,15 @@ impl Batch {
                 games,
                 usize::from(rules.faces()) + 1,
                 rules.players(),
+                setup.history(),
             ),
+            endings: Endings {
+                observations: ObservationColumns {
+                    width: setup.history(),
+                    ..ObservationColumns::default()
+                },
+                ..Endings::default()
+            },
             masks: of(mask_bytes),
             mask_bytes,
             ..Batch::default()
@@ -240,7 +259,8 @@ impl Batch {
         self.kinds.push(row.observation.kind.map_or(0, kind_number));
         put_u32(&mut self.attempts, row.attempts);
         put_f32(&mut self.rewards, row.reward);
-        self.observations.push(row.observation);
+        self.observations
+            .push(row.observation, row.seat, row.history);
         let mut words = row.legal.words().iter();
         for word in words.by_ref().take(self.mask_bytes / 8) {
             self.masks.extend_from_slice(&word.to_le_bytes());
@@ -252,7 +272,7 @@ impl Batch {
 }
 
 impl ObservationColumns {
-    fn with_room(rows: usize, cards: usize, seats: usize) -> ObservationColumns {
+    fn with_room(rows: usize, cards: usize, seats: usize, history: u16) -> ObservationColumns {
         let of = |width: usize| Vec::with_capacity(rows * width);
         ObservationColumns {
             shifts: of(4),
@@ -268,10 +288,13 @@ impl ObservationColumns {
             played: of(cards),
             gave: of(cards),
             received: of(cards),
+            history: of(2 * usize::from(history)),
+            history_counts: of(4 * usize::from(history.min(1))),
+            width: history,
         }
     }
 
-    fn push(&mut self, seen: &Observation) {
+    fn push(&mut self, seen: &Observation, seat: Seat, history: Option<&History>) {
         let put_cards =
             |column: &mut Vec<u8>, cards: Cards| column.extend(cards.counts(seen.faces));
         put_u32(&mut self.shifts, seen.shift);
@@ -295,6 +318,11 @@ impl ObservationColumns {
         put_cards(&mut self.played, seen.played);
         put_cards(&mut self.gave, seen.gave);
         put_cards(&mut self.received, seen.received);
+        if let Some(history) = history {
+            let space = ActionSpace::new(seen.faces).expect("an observation has 4 to 15 faces");
+            let count = history.write(self.width, seat, space, &mut self.history);
+            put_u32(&mut self.history_counts, count);
+        }
     }
 }
 
@@ -308,7 +336,8 @@ impl Endings {
         self.ends.push(FINISHED);
         self.game_over.push(row.game_over.into());
         self.places_taken.push(row.place);
-        self.observations.push(row.observation);
+        self.observations
+            .push(row.observation, row.seat, row.history);
     }
 }
 

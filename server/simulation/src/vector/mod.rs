@@ -3,9 +3,28 @@
 //! open decisions as columns. `setup` has the options, `slot` advances one game, `columns` is the
 //! output, `saved` has complete states of games. There are no threads here; several environments
 //! can be stepped in parallel.
+//!
+//! A state is everything that determines how a game continues. It can be kept as a value or as
+//! bytes, restored here or elsewhere, and forked:
+//!
+//! ```
+//! use chefshat_engine::RuleSetSpec;
+//! use chefshat_simulation::vector::{SavedGame, Seeds, VectorGames, VectorSetup};
+//!
+//! let rules = RuleSetSpec::default().validate()?;
+//! let setup = VectorSetup::new(rules, 2, &[None; 4], Seeds::Base(7))?.with_history(64)?;
+//! let (mut games, batch) = VectorGames::new(setup);
+//! let bytes = games.save(&[1])?[0].to_bytes();
+//! let (copies, first) = games.fork(&[1], 100, None)?;
+//! assert_eq!((copies.setup().games(), first.rows), (100, 100));
+//! let again = games.restore(&[1], vec![SavedGame::from_bytes(&bytes)?])?;
+//! assert_eq!(again.masks, batch.masks);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod columns;
 mod error;
+mod history;
 mod running;
 mod sampling;
 mod saved;
@@ -17,6 +36,7 @@ use chefshat_engine::ActionId;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
+pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 pub use saved::SavedGame;
 pub use setup::{Episode, MAX_SEATS_PLAYED, Seeds, SetupError, Start, VectorSetup};
 use slot::Slot;

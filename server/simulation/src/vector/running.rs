@@ -7,6 +7,7 @@ use chefshat_engine::{
 };
 
 use super::error::StateError;
+use super::history::History;
 use super::terms::{Decisions, InvalidActions, Terms};
 use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed, is_wrong_action};
 
@@ -30,6 +31,8 @@ pub(super) struct RunningGame {
     pub(super) decisions: Vec<PlayedDecision>,
     /// Number of decisions and attempts in `decisions`.
     pub(super) kept: u64,
+    /// The actions of the Shift, if the setup asks for them.
+    pub(super) history: Option<History>,
 }
 
 #[derive(Clone, Debug)]

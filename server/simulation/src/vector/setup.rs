@@ -9,6 +9,7 @@ use thiserror::Error;
 use chefshat_agents::{AgentKind, game_seed};
 
 use super::error::StateError;
+use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 use super::saved::SavedGame;
 use super::terms::{Decisions, InvalidActions, Terms};
 
@@ -86,6 +87,7 @@ pub struct VectorSetup {
     start: Start,
     statistics: bool,
     records: bool,
+    history: u16,
 }
 
 /// Why options are invalid.
@@ -126,6 +128,11 @@ pub enum SetupError {
     /// The script is invalid.
     #[error("{0}")]
     Script(#[from] ScriptError),
+    /// The history column is too wide.
+    #[error(
+        "a history of {0} actions: choose at most {MAX_HISTORY}, and at most {MAX_HISTORY_ENTRIES} actions over the client's seats of all games"
+    )]
+    History(u16),
     /// The list of saved games is empty.
     #[error("the list of saved games is empty: give at least one")]
     NoSaved,
@@ -184,6 +191,7 @@ impl VectorSetup {
             start: Start::Deal,
             statistics: false,
             records: false,
+            history: 0,
         })
     }
 
@@ -288,6 +296,7 @@ impl VectorSetup {
             start: Start::Deal,
             ..self.clone()
         }
+        .with_history(self.history)?
         .with_start(Start::Saved {
             games: games.into(),
             same_deals,
@@ -297,6 +306,20 @@ impl VectorSetup {
     /// Sets whether batches contain the Shifts that ended.
     pub fn with_statistics(self, statistics: bool) -> VectorSetup {
         VectorSetup { statistics, ..self }
+    }
+
+    /// Sets the width of the history column: the latest actions of the Shift, as each seat may know
+    /// them; 0 for none.
+    ///
+    /// # Errors
+    /// If it is above [`MAX_HISTORY`], or the columns of all seats are too large.
+    pub fn with_history(self, history: u16) -> Result<VectorSetup, SetupError> {
+        let seats = self.client_seats().count() as u64;
+        let entries = u64::from(self.games) * seats * u64::from(history);
+        if history > MAX_HISTORY || entries > u64::from(MAX_HISTORY_ENTRIES) {
+            return Err(SetupError::History(history));
+        }
+        Ok(VectorSetup { history, ..self })
     }
 
     /// Sets whether decisions are kept for records.
@@ -371,6 +394,11 @@ impl VectorSetup {
         self.records
     }
 
+    /// Width of the history column.
+    pub fn history(&self) -> u16 {
+        self.history
+    }
+
     /// The seeds of the games.
     pub fn seeds(&self) -> &Seeds {
         &self.seeds
@@ -396,6 +424,7 @@ impl VectorSetup {
             invalid: self.invalid,
             statistics: self.statistics,
             records: self.records,
+            history: self.history,
         }
     }
 

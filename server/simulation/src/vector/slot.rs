@@ -6,6 +6,7 @@ use chefshat_engine::{
 };
 
 use super::columns::{Batch, Ending, PlayedGame, Row, Totals, places_taken};
+use super::history::History;
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
 use super::setup::{Episode, Start, VectorSetup};
@@ -169,6 +170,7 @@ impl Slot {
             attempts: open.attempts,
             reward: open.reward,
             observation: &running.game.observe(Viewer::Seat(seat)),
+            history: running.history.as_ref(),
             legal: &open.legal,
         });
         true
@@ -199,6 +201,11 @@ impl Slot {
             .may_end_shift(action)
             .then(|| running.game.closing_copy());
         running.events.clear();
+        let required = match &running.history {
+            Some(_) => running.game.requirement(),
+            None => None,
+        };
+        let actor = running.game.decision().map(|decision| decision.seat);
         running
             .game
             .apply(action, |event| running.events.push(event))
@@ -207,6 +214,11 @@ impl Slot {
             scheme.of_events(setup.rules(), &running.events, |seat, reward, _| {
                 running.rewards[seat] += reward;
             });
+        }
+        if let (Some(history), Some(seat)) = (&mut running.history, actor) {
+            let space = setup.rules().actions();
+            let events = &running.events;
+            history.add(setup.history(), seat, required, action, events, space);
         }
         let standings = running.game.standings();
         if let Some(recorder) = &mut running.recorder {
@@ -244,8 +256,12 @@ impl Slot {
                     game_over: standings.is_some(),
                     place: places[seat],
                     observation: &closing.observe(Viewer::Seat(seat)),
+                    history: running.history.as_ref(),
                 });
             }
+        }
+        if let Some(history) = &mut running.history {
+            *history = History::new();
         }
     }
 
@@ -287,6 +303,7 @@ impl RunningGame {
             attempts: Vec::new(),
             decisions: Vec::new(),
             kept: 0,
+            history: (setup.history() > 0).then(History::new),
         }
     }
 

@@ -56,6 +56,8 @@ pub(super) struct Terms {
     pub(super) invalid: InvalidActions,
     pub(super) statistics: bool,
     pub(super) records: bool,
+    /// Width of the history column.
+    pub(super) history: u16,
 }
 
 impl Terms {
@@ -99,6 +101,7 @@ impl Terms {
         differs!("rule for invalid actions", self.invalid, here.invalid);
         differs!("shift_statistics", self.statistics, here.statistics);
         differs!("records", self.records, here.records);
+        differs!("history", self.history, here.history);
         None
     }
 }

@@ -62,7 +62,7 @@ class Form:
             # A play of all F cards of face F with both jokers exceeds 1.
             self.space = spaces.Box(0.0, 2.0, (features.table_width(sizes.players, sizes.faces),), np.float32)
         elif observation == "columns":
-            self.space = spaces.Dict({name: _column_space(column, sizes) for name, column in _columns().items()})
+            self.space = spaces.Dict({name: _column_space(column, sizes) for name, column in _columns(sizes).items()})
         else:
             known = ", ".join(map(repr, FORMS))
             raise ValueError(f"observation={observation!r}: choose one of {known}, or give a function")
@@ -75,7 +75,7 @@ class Form:
         if self._function is not None:
             return np.asarray(self._function(situations))
         seen = situations.observations
-        found = {name: getattr(situations if name in _DECISION else seen, name) for name in _columns()}
+        found = {name: getattr(situations if name in _DECISION else seen, name) for name in _columns(situations.sizes)}
         return {name: array.reshape(len(situations), -1) for name, array in found.items()}
 
     def row(self, observed: Observed, row: int) -> Any:  # noqa: ANN401 - An array or a dictionary of them.
@@ -90,9 +90,9 @@ def mask_space(sizes: Sizes) -> spaces.Box:
     return spaces.Box(0, 1, (sizes.num_actions,), np.int8)
 
 
-def _columns() -> dict[str, Column[Any]]:
+def _columns(sizes: Sizes) -> dict[str, Column[Any]]:
     mine = Situations.columns()
-    return {**{name: mine[name] for name in _DECISION}, **Observations.columns()}
+    return {**{name: mine[name] for name in _DECISION}, **Observations.columns_of(sizes)}
 
 
 def _column_space(column: Column[Any], sizes: Sizes) -> spaces.Box:

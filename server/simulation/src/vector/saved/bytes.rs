@@ -21,8 +21,10 @@ use chefshat_engine::{
 
 use super::SavedGame;
 use super::game::{game, put_game};
+use super::history::{history, put_history};
 use super::reader::Reader;
 use crate::vector::error::{STATE_VERSION, StateError};
+use crate::vector::history::MAX_HISTORY;
 use crate::vector::running::{Open, RunningGame};
 use crate::vector::terms::{Decisions, InvalidActions, Terms};
 
@@ -135,6 +137,7 @@ fn put_terms(out: &mut Vec<u8>, terms: &Terms) {
     out.push(asks.into());
     out.extend(limit.map_or(0, NonZeroU32::get).to_le_bytes());
     out.extend([terms.statistics, terms.records].map(u8::from));
+    out.extend(terms.history.to_le_bytes());
 }
 
 fn terms(reader: &mut Reader<'_>) -> Result<Terms, StateError> {
@@ -165,7 +168,16 @@ fn terms(reader: &mut Reader<'_>) -> Result<Terms, StateError> {
         },
         statistics: reader.flag()?,
         records: reader.flag()?,
+        history: history_width(reader)?,
     })
+}
+
+fn history_width(reader: &mut Reader<'_>) -> Result<u16, StateError> {
+    let width = reader.u16()?;
+    if width > MAX_HISTORY {
+        return Err(StateError::Malformed("its history is too wide"));
+    }
+    Ok(width)
 }
 
 fn rules(reader: &mut Reader<'_>) -> Result<RuleSet, StateError> {
@@ -234,6 +246,9 @@ fn put_running(out: &mut Vec<u8>, running: &RunningGame) {
         out.push(taken.by_default.into());
         put_actions(out, &taken.attempts);
     }
+    if let Some(history) = &running.history {
+        put_history(out, history);
+    }
 }
 
 fn put_actions(out: &mut Vec<u8>, actions: &[ActionId]) {
@@ -301,6 +316,10 @@ fn running(reader: &mut Reader<'_>, terms: &Terms) -> Result<RunningGame, StateE
     if attempts.len() != listed || (!terms.records && !decisions.is_empty()) {
         return Err(StateError::Malformed("kept decisions do not fit"));
     }
+    let history = match terms.history {
+        0 => None,
+        _ => Some(history(reader, terms)?),
+    };
     let kept = decisions
         .iter()
         .map(|taken| 1 + taken.attempts.len() as u64);
@@ -315,5 +334,6 @@ fn running(reader: &mut Reader<'_>, terms: &Terms) -> Result<RunningGame, StateE
         attempts,
         kept: kept.sum(),
         decisions,
+        history,
     })
 }

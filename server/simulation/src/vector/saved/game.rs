@@ -79,7 +79,7 @@ pub(super) fn game(reader: &mut Reader<'_>, rules: RuleSet) -> Result<GameState,
         idle: reader.u32()?,
         starter: reader.seat(players)?,
         leader: reader.seat(players)?,
-        last_to_play: seat_or_none(reader, players)?,
+        last_to_play: reader.seat_or_none(players)?,
         passed: reader.by_seat(players, Reader::flag)?,
         places: reader.by_seat(players, Reader::u8)?,
         played: cards(reader)?,
@@ -93,7 +93,7 @@ pub(super) fn game(reader: &mut Reader<'_>, rules: RuleSet) -> Result<GameState,
             2 => Some(SpecialAction::DinnerIsServed),
             _ => return Err(StateError::Malformed("there is no such special action")),
         },
-        drawn: seat_or_none(reader, players)?,
+        drawn: reader.seat_or_none(players)?,
         ranking: reader.optional(|reader| order(reader, players))?,
         last_order: reader.optional(|reader| order(reader, players))?,
     })
@@ -102,7 +102,7 @@ pub(super) fn game(reader: &mut Reader<'_>, rules: RuleSet) -> Result<GameState,
 fn stage(reader: &mut Reader<'_>, players: usize) -> Result<Stage, StateError> {
     let unknown = StateError::Malformed("no game stands like this");
     let kind = reader.u8()?;
-    let seat = seat_or_none(reader, players)?;
+    let seat = reader.seat_or_none(players)?;
     let [chef_left, sous_chef_left] = reader.array()?;
     match (kind, seat, chef_left, sous_chef_left) {
         (0, None, 0, 0) => Ok(Stage::Over),
@@ -115,14 +115,6 @@ fn stage(reader: &mut Reader<'_>, players: usize) -> Result<Stage, StateError> {
         (3, Some(seat), 0, 0) => Ok(Stage::Special(seat)),
         _ => Err(unknown),
     }
-}
-
-fn seat_or_none(reader: &mut Reader<'_>, players: usize) -> Result<Option<Seat>, StateError> {
-    if reader.0.first() == Some(&NO_SEAT) {
-        reader.u8()?;
-        return Ok(None);
-    }
-    reader.seat(players).map(Some)
 }
 
 fn order(reader: &mut Reader<'_>, players: usize) -> Result<SeatOrder, StateError> {

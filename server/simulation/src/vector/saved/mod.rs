@@ -6,6 +6,7 @@
 
 mod bytes;
 mod game;
+mod history;
 mod reader;
 
 use chefshat_engine::{Game, Seed};

@@ -95,6 +95,15 @@ impl<'a> Reader<'a> {
         Ok(Seat::new(index))
     }
 
+    /// A seat, or 255 for none.
+    pub(super) fn seat_or_none(&mut self, players: usize) -> Result<Option<Seat>, StateError> {
+        if self.0.first() == Some(&u8::MAX) {
+            self.u8()?;
+            return Ok(None);
+        }
+        self.seat(players).map(Some)
+    }
+
     pub(super) fn by_seat<T: Copy + Default>(
         &mut self,
         players: usize,

@@ -1,6 +1,7 @@
 //! Vector environments. Shared here: setups, a policy, and reading columns.
 
 mod episodes;
+mod histories;
 mod limits;
 mod play;
 mod states;

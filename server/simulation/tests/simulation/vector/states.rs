@@ -84,6 +84,8 @@ fn any_setup() -> impl Strategy<Value = VectorSetup> {
                 })
                 .with_statistics(statistics)
                 .with_records(records)
+                .with_history([0, 5, 40][(seed % 3) as usize])
+                .unwrap()
         },
     )
 }

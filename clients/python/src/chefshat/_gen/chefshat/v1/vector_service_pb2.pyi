@@ -227,8 +227,8 @@ class SavedStart(_message.Message):
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
         """States, as in VectorStates, of running games with the same rules, seats, rewards, decisions,
-        rule for invalid actions and shift_statistics. The game with index i is a copy of the state at
-        i modulo their number.
+        rule for invalid actions, shift_statistics and history. The game with index i is a copy of the
+        state at i modulo their number.
         """
 
     def __init__(
@@ -270,6 +270,7 @@ class VectorSetup(_message.Message):
     SAVED_FIELD_NUMBER: _builtins.int
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
+    HISTORY_FIELD_NUMBER: _builtins.int
     games: _builtins.int
     """Number of parallel games n, at least 1. Games times client seats is at most max_vector_seats;
     all streams of a server together have at most max_vector_seats_in_all.
@@ -308,6 +309,10 @@ class VectorSetup(_message.Message):
     max_vector_recorded_games in parallel, a target of at most max_shifts points or Shifts,
     max_turns of at most 10000, and with ASK_AGAIN a limit of 1..=1000 attempts. The size of
     records in progress is bounded as well (RECORDS_TOO_LONG).
+    """
+    history: _builtins.int
+    """Width of the column `history`, at most 1024; 0: there is none. Games times client seats times
+    history is at most 524288.
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -361,10 +366,11 @@ class VectorSetup(_message.Message):
         saved: Global___SavedStart | None = ...,
         shift_statistics: _builtins.bool = ...,
         records: _builtins.bool = ...,
+        history: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "invalid_actions", b"invalid_actions", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
@@ -585,10 +591,13 @@ class VectorStarted(_message.Message):
     CLIENT_SEATS_FIELD_NUMBER: _builtins.int
     BUILT_IN_AGENTS_FIELD_NUMBER: _builtins.int
     BASE_SEED_FIELD_NUMBER: _builtins.int
+    HISTORY_FIELD_NUMBER: _builtins.int
     hand_size: _builtins.int
     """Cards dealt to a hand, H."""
     base_seed: _builtins.int
     """The base seed; unset if `game_seeds` was set."""
+    history: _builtins.int
+    """Width of the column `history`."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -614,10 +623,11 @@ class VectorStarted(_message.Message):
         client_seats: _abc.Iterable[_builtins.int] | None = ...,
         built_in_agents: _abc.Iterable[_builtins.str] | None = ...,
         base_seed: _builtins.int | None = ...,
+        history: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "base_seed", b"base_seed", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "base_seed", b"base_seed", "built_in_agents", b"built_in_agents", "client_seats", b"client_seats", "hand_size", b"hand_size", "rules", b"rules"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "base_seed", b"base_seed", "built_in_agents", b"built_in_agents", "client_seats", b"client_seats", "hand_size", b"hand_size", "history", b"history", "rules", b"rules"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__base_seed: _TypeAlias = _typing.Literal["base_seed"]  # noqa: Y015
     _WhichOneofArgType__base_seed: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed"]  # noqa: Y015
@@ -735,6 +745,8 @@ class ObservationColumns(_message.Message):
     PLAYED_FIELD_NUMBER: _builtins.int
     GAVE_FIELD_NUMBER: _builtins.int
     RECEIVED_FIELD_NUMBER: _builtins.int
+    HISTORY_FIELD_NUMBER: _builtins.int
+    HISTORY_COUNTS_FIELD_NUMBER: _builtins.int
     shifts: _builtins.bytes
     """u32: number of the Shift."""
     pizzas: _builtins.bytes
@@ -763,6 +775,18 @@ class ObservationColumns(_message.Message):
     """u8, F+1 wide: cards this seat gave in this Shift's exchange."""
     received: _builtins.bytes
     """u8, F+1 wide: cards this seat received in this Shift's exchange."""
+    history: _builtins.bytes
+    """u16, as wide as the setup's `history`: the latest actions since the Shift began, as far as the
+    seat may know them, the most recent last, after zeros. An entry is 1 + s * (A+1) + a for action a
+    of seat s. Turns and declared special actions are public. A gift is action A, a card unknown to
+    the seat, except for its giver and, when the exchange is complete, its receiver. Gifts without a
+    choice come when the exchange is complete. A declined special action is an entry for the seat
+    that declined alone. If a game begins within a Shift, its history begins there.
+    """
+    history_counts: _builtins.bytes
+    """u32: number of these actions since the Shift began, also those beyond the width; empty if there
+    is no history.
+    """
     def __init__(
         self,
         *,
@@ -779,10 +803,12 @@ class ObservationColumns(_message.Message):
         played: _builtins.bytes = ...,
         gave: _builtins.bytes = ...,
         received: _builtins.bytes = ...,
+        history: _builtins.bytes = ...,
+        history_counts: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["boards", b"boards", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hands", b"hands", "passed", b"passed", "pizzas", b"pizzas", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shifts", b"shifts"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["boards", b"boards", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hands", b"hands", "history", b"history", "history_counts", b"history_counts", "passed", b"passed", "pizzas", b"pizzas", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shifts", b"shifts"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
