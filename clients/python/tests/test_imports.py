@@ -58,6 +58,34 @@ def test_what_needs_no_server_needs_no_grpc() -> None:
     assert run(f"{imports}{LOADED}", "grpc", "numpy") == "numpy"
 
 
+def test_environments_in_this_process_need_no_grpc() -> None:
+    pytest.importorskip("chefshat_native")
+    pytest.importorskip("pettingzoo")
+    program = """
+import chefshat
+from chefshat.envs import chefshat_v1
+with chefshat.VectorEnv(games=2, transitions=True, seed=1) as env:
+    batch = env.step(env.batch.masks.argmax(axis=1))
+    print(len(batch))
+env = chefshat.make(opponents="greedy", render_mode="ansi")
+_, info = env.reset(seed=1)
+env.step(int(info["action_mask"].argmax()))
+assert "hand" in env.render()
+many = chefshat.make("gymnasium_vector", num_envs=2)
+many.step(many.reset(seed=1)[1]["action_mask"].argmax(axis=1))
+everyone = chefshat_v1.env()
+everyone.reset(seed=1)
+everyone.step(int(everyone.last()[0]["action_mask"].argmax()))
+try:
+    chefshat.VectorEnv("127.0.0.1:1")
+except ImportError as error:
+    print(error)
+"""
+    stepped, refused = run(WITHOUT_GRPC + program).splitlines()
+    assert stepped == "2"
+    assert "pip install grpcio" in refused
+
+
 def test_what_needs_a_server_says_what_to_install() -> None:
     program = "import chefshat\ntry:\n    chefshat.Client\nexcept ImportError as error:\n    print(error)"
     assert "pip install grpcio" in run(WITHOUT_GRPC + program)
