@@ -43,7 +43,8 @@ enum Task {
         /// Run only the tests of one part.
         #[arg(long, value_enum)]
         only: Option<Part>,
-        /// Also run the tests that take many minutes: the images built from source, idle streams.
+        /// Also run the tests that take many minutes: the wheels and the images
+        /// built from source, idle streams.
         #[arg(long)]
         slow: bool,
     },

@@ -12,6 +12,7 @@ use crate::places::{DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKA
 use crate::setup;
 use crate::steps::Steps;
 use crate::web;
+use crate::wheels;
 
 /// The tests of a language, or of docker/, which can be run separately.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -29,8 +30,8 @@ pub(crate) enum Part {
     Deployment,
 }
 
-/// Sets up and runs the tests of one part, or of all; if `slow`, also those of docker/ that take
-/// long.
+/// Sets up and runs the tests of one part, or of all; if `slow`, also those that take long: of the
+/// wheels and of docker/.
 pub(crate) fn run(
     places: &Places,
     steps: &mut Steps,
@@ -102,6 +103,9 @@ pub(crate) fn run(
             }
             steps.programs(tests)?;
             lint::python(places, steps)?;
+            if slow {
+                wheels::run(places, steps, "release", true)?;
+            }
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
         }
