@@ -44,6 +44,16 @@ pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
 /// How long a client may take to receive one message.
 pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
+/// Most analyses at a time, those waiting for a thread included.
+pub const MAX_ANALYSES: usize = 64;
+/// Most rollouts of an analysis.
+pub const MAX_ANALYSIS_ROLLOUTS: u64 = 1_000_000;
+/// Most steps of counting the deals of an analysis; a step takes 8 bytes at most.
+pub const MAX_ANALYSIS_STEPS: u64 = 500_000;
+/// Time of an analysis that names none.
+pub const ANALYSIS_TIME: Duration = Duration::from_secs(1);
+/// Longest time of an analysis.
+pub const MAX_ANALYSIS_TIME: Duration = Duration::from_secs(10);
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.

@@ -300,6 +300,7 @@ fn routes(
     use crate::wire::service::play_service_server::PlayServiceServer;
     use crate::wire::service::spectator_service_server::SpectatorServiceServer;
     use v1::admin_service_server::AdminServiceServer;
+    use v1::analysis_service_server::AnalysisServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
@@ -316,6 +317,7 @@ fn routes(
         retention,
     );
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
+    let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let routes = Routes::new(
         PlayServiceServer::new(grpc::Play::new(
             Arc::clone(rooms),
@@ -360,6 +362,7 @@ fn routes(
     .add_service(
         VectorServiceServer::new(vectors).max_decoding_message_size(MAX_VECTOR_MESSAGE_BYTES),
     )
+    .add_service(AnalysisServiceServer::new(analyses).max_decoding_message_size(MAX_MESSAGE_BYTES))
     .add_service(AdminServiceServer::new(admin).max_decoding_message_size(MAX_MESSAGE_BYTES))
     .add_service(
         ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), calls, config))

@@ -38,6 +38,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
   ],
   "only programs make these calls: Play, vectors, imports, operating": [
     "ACTIONS_REFUSED",
+    "ANALYSIS_REFUSED",
     "CALLS_NOT_TAKEN",
     "CLIENT_IDLE",
     "CLIENT_TOO_SLOW",
@@ -58,6 +59,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SETUP_TOO_LATE",
     "STATES_TOO_LARGE",
     "STREAM_SILENT",
+    "TOO_MANY_ANALYSES",
     "TOO_MANY_COMMANDS",
     "TOO_MANY_SEATS",
     "TOO_MANY_VECTOR_GAMES",

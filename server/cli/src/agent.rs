@@ -6,9 +6,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::kind::KindArg;
-use chefshat_agents::{AgentKind, BuiltInAgent, RecordedPlayer};
+use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
+use chefshat_engine::RuleSet;
 use chefshat_record::jsonl;
+use chefshat_search::MonteCarlo;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
@@ -27,8 +29,8 @@ use chefshat_server::convert::recorded_player;
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// The agent: random, random_unmasked, greedy, trained, or replay (imitates the player of a
-    /// record).
+    /// The agent: random, random_unmasked, greedy, trained, monte_carlo (searches on all cores; with
+    /// a budget: monte_carlo:50ms), or replay (imitates the player of a record).
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]
@@ -74,6 +76,7 @@ pub(super) struct AgentCommand {
 enum AgentArg {
     Kind(AgentKind),
     Replay,
+    MonteCarlo(MonteCarlo),
 }
 
 impl AgentArg {
@@ -81,6 +84,7 @@ impl AgentArg {
         match self {
             Self::Kind(kind) => kind.name(),
             Self::Replay => BuiltInAgent::REPLAY,
+            Self::MonteCarlo(_) => MonteCarlo::NAME,
         }
     }
 }
@@ -90,9 +94,8 @@ impl AgentCommand {
         if self.games > 1 && !self.join_args.has_code_file() {
             return Err("a code or ticket is valid for one game; to play more --games, give a --code-file that gets new codes".into());
         }
-        let agent = self.built_in_agent()?;
+        let mut agent = self.remote_agent()?;
         let client = self.server.connect_patiently().await?;
-        let mut agent = RemoteAgent::new(agent, Duration::from_millis(self.pace_ms));
         let mut last_code = None;
         let mut all_finished = true;
         for _ in 0..self.games {
@@ -112,15 +115,29 @@ impl AgentCommand {
         })
     }
 
-    fn built_in_agent(&self) -> Result<BuiltInAgent, CommandError> {
+    fn remote_agent(&self) -> Result<RemoteAgent, CommandError> {
+        let (seed, pace) = (
+            seed_for("chefshat agent", self.seed),
+            Duration::from_millis(self.pace_ms),
+        );
         match (self.agent, &self.record, self.seat) {
-            (AgentArg::Kind(kind), None, None) => Ok(BuiltInAgent::new(
-                kind,
-                seed_for("chefshat agent", self.seed),
-            )),
-            (AgentArg::Kind(_), ..) => Err("--record and --seat are for the agent replay".into()),
+            (AgentArg::Kind(kind), None, None) => {
+                Ok(RemoteAgent::new(BuiltInAgent::new(kind, seed), pace))
+            }
+            (AgentArg::MonteCarlo(plays), None, None) => {
+                let pool = rayon::ThreadPoolBuilder::new().build()?;
+                let maker = OnAllCores {
+                    plays,
+                    pool: Arc::new(pool),
+                };
+                Ok(RemoteAgent::made_by(Arc::new(maker), seed, pace))
+            }
+            (AgentArg::Kind(_) | AgentArg::MonteCarlo(_), ..) => {
+                Err("--record and --seat are for the agent replay".into())
+            }
             (AgentArg::Replay, Some(record), Some(seat)) => {
-                Ok(BuiltInAgent::replay(player_of(record, seat)?))
+                let agent = BuiltInAgent::replay(player_of(record, seat)?);
+                Ok(RemoteAgent::new(agent, pace))
             }
             (AgentArg::Replay, ..) => Err("replay needs --record and --seat".into()),
         }
@@ -165,8 +182,26 @@ fn agent_arg(name: &str) -> Result<AgentArg, String> {
     if name == BuiltInAgent::REPLAY {
         return Ok(AgentArg::Replay);
     }
-    let kind = agent_kind(name).map_err(|known| format!("{known}, {}", BuiltInAgent::REPLAY))?;
+    if name.split(':').next() == Some(MonteCarlo::NAME) {
+        let plays = name.parse::<MonteCarlo>();
+        return (plays.map(AgentArg::MonteCarlo)).map_err(|error| error.to_string());
+    }
+    let others = [MonteCarlo::NAME, BuiltInAgent::REPLAY].join(", ");
+    let kind = agent_kind(name).map_err(|known| format!("{known}, {others}"))?;
     Ok(AgentArg::Kind(kind))
+}
+
+/// Makes agents that search on the threads of a pool.
+#[derive(Debug)]
+struct OnAllCores {
+    plays: MonteCarlo,
+    pool: Arc<rayon::ThreadPool>,
+}
+
+impl AgentMaker for OnAllCores {
+    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
+        (self.plays).agent_on(rules, seed, Some(Arc::clone(&self.pool)))
+    }
 }
 
 /// Loads the player of a seat of a record.

@@ -48,7 +48,7 @@ The same seed gives the same output, on any number of threads, unless monte_carl
 )]
 pub(super) struct Compare {
     /// A built-in agent or a network file. monte_carlo takes a budget for each decision and the
-    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:2000:trained (rollouts).
+    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:400:greedy (rollouts).
     a: String,
     /// The agent to compare it with.
     b: String,

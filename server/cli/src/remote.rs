@@ -1,12 +1,13 @@
 //! A built-in agent as a remote client: converts a decision request to the engine's observation, so
 //! that the agent decides as it would inside the server.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent};
 use chefshat_client::{ActionId, Agent, nth_legal, v1};
-use chefshat_engine::{Mask, RuleSet, Seat};
-use chefshat_record::convert::rules_from_proto;
+use chefshat_engine::{Mask, RuleSet};
+use chefshat_record::convert::{event_from_proto, rules_from_proto, seat_from_number};
 use sha2::{Digest as _, Sha256};
 use tracing::warn;
 
@@ -20,6 +21,8 @@ pub(super) const MAX_PACE_MS: u64 = 5_000;
 #[derive(Debug)]
 pub(super) struct RemoteAgent {
     agent: BuiltInAgent,
+    /// Creates the agent of each game, with this seed, when the rules are known.
+    maker: Option<(Arc<dyn AgentMaker>, [u8; 32])>,
     pace: Duration,
     seat: Option<u32>,
     rules: Option<RuleSet>,
@@ -30,6 +33,19 @@ impl RemoteAgent {
     pub(super) fn new(agent: BuiltInAgent, pace: Duration) -> Self {
         Self {
             agent,
+            maker: None,
+            pace,
+            seat: None,
+            rules: None,
+        }
+    }
+
+    /// Plays each game as an agent of this maker.
+    pub(super) fn made_by(maker: Arc<dyn AgentMaker>, seed: [u8; 32], pace: Duration) -> Self {
+        Self {
+            // Replaced before the first decision.
+            agent: BuiltInAgent::new(AgentKind::default(), seed),
+            maker: Some((maker, seed)),
             pace,
             seat: None,
             rules: None,
@@ -41,18 +57,39 @@ impl RemoteAgent {
         let (Some(rules), Some(seat)) = (self.rules, self.seat) else {
             return Err("the server sent a decision before the rules".into());
         };
-        let seat = usize::try_from(seat)
-            .ok()
-            .filter(|seat| *seat < rules.players())
-            .map(Seat::new)
+        let seat = seat_from_number(seat, rules.players())
             .ok_or("the server assigned a seat that the game does not have")?;
         let observation = observation_from_proto(request, seat, &rules)
             .map_err(|problem| format!("invalid observation: {problem}"))?;
         let legal = Mask::from_bytes(&request.action_mask)
             .filter(|mask| !mask.is_empty())
             .ok_or("invalid mask of legal actions")?;
-        let action = self.agent.decide(&observation, &legal);
+        let action = if self.agent.follows_events() {
+            // It takes its time.
+            tokio::task::block_in_place(|| self.agent.decide(&observation, &legal))
+        } else {
+            self.agent.decide(&observation, &legal)
+        };
         Ok(ActionId(action.index().into()))
+    }
+}
+
+impl RemoteAgent {
+    /// Shows an event of a Shift to an agent that follows them.
+    fn follow(&mut self, event: &v1::GameEvent) {
+        let (Some(kind), Some(rules), Some(seat)) = (&event.kind, &self.rules, self.seat) else {
+            return;
+        };
+        let Some(seat) = seat_from_number(seat, rules.players()) else {
+            return;
+        };
+        if self.agent.follows_events() {
+            match event_from_proto(kind, rules) {
+                Ok(Some(event)) => self.agent.on_event(seat, &event),
+                Ok(None) => {}
+                Err(problem) => warn!(%problem, "an event of the game cannot be read"),
+            }
+        }
     }
 }
 
@@ -73,7 +110,7 @@ impl Agent for RemoteAgent {
 
     fn on_event(&mut self, event: &v1::GameEvent) {
         let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind else {
-            return;
+            return self.follow(event);
         };
         self.rules = match start.rules.as_ref().map(rules_from_proto) {
             Some(Ok(rules)) => Some(rules),
@@ -83,6 +120,9 @@ impl Agent for RemoteAgent {
             }
             None => None,
         };
+        if let (Some((maker, seed)), Some(rules)) = (&self.maker, &self.rules) {
+            self.agent = maker.agent(rules, *seed);
+        }
     }
 }
 
@@ -109,12 +149,11 @@ pub(super) fn agent_kind(name: &str) -> Result<AgentKind, String> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use chefshat_agents::RecordedPlayer;
     use chefshat_engine::RecordedDecision;
-    use chefshat_engine::{DecisionKind, Game, RuleSetSpec, Seed, Viewer};
-    use chefshat_record::convert::rules_to_proto;
+    use chefshat_engine::{DecisionKind, Game, RuleSetSpec, Seat, Seed, Stop, Viewer};
+    use chefshat_record::convert::{By, event_kind, rules_to_proto};
+    use chefshat_search::MonteCarlo;
 
     use crate::remote::*;
     use chefshat_record::convert::observation_to_proto;
@@ -179,6 +218,55 @@ mod tests {
             }
             assert!(turns > 20, "{kind:?} played {turns} turns only");
         }
+    }
+
+    /// What it sees of others reaches it as events, in this form as in the engine's.
+    #[test]
+    fn an_agent_that_searches_follows_the_events() {
+        let plays: MonteCarlo = "monte_carlo:40:random".parse().expect("a valid agent");
+        let rules = RuleSetSpec {
+            stop: Stop::Shifts(2),
+            ..RuleSetSpec::default()
+        };
+        let rules = rules.validate().expect("a rule set");
+        let seat = Seat::new(1);
+        let mut inside = plays.agent(&rules, [3; 32]);
+        let mut remote = RemoteAgent::made_by(Arc::new(plays), [3; 32], Duration::ZERO);
+        remote.on_attached(&v1::Attached {
+            seat: 1,
+            ..v1::Attached::default()
+        });
+        let mut events = Vec::new();
+        let mut game = Game::new(rules, Seed([6; 32]), |event| events.push(event));
+        remote.on_event(&started(&game));
+        let mut others = BuiltInAgent::new(AgentKind::Random, [4; 32]);
+        let by = By {
+            source: v1::DecisionSource::Agent,
+            decision_time_us: 0,
+        };
+        let mut asked = 0;
+        while let Some(decision) = game.decision() {
+            for event in events.drain(..) {
+                inside.on_event(seat, &event);
+                let seen = event.seen_by(Viewer::Seat(seat));
+                remote.on_event(&v1::GameEvent {
+                    kind: event_kind(&seen, rules.actions(), by),
+                    ..v1::GameEvent::default()
+                });
+            }
+            let observation = game.observe(Viewer::Seat(decision.seat));
+            let legal = game.legal_actions();
+            let mut action = others.decide(&observation, &legal);
+            if decision.seat == seat {
+                action = inside.decide(&observation, &legal);
+                let answer = remote.decide(&request(&game)).0;
+                assert_eq!(answer, u32::from(action.index()));
+                asked += 1;
+            }
+            game.apply(action, |event| events.push(event))
+                .expect("the action is legal");
+        }
+        assert!(asked > 10, "{asked}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use chefshat_engine::{ActionId, Game, RuleSet, Script, Seed, TakenOver};
+use chefshat_engine::{ActionId, Event, Game, RuleSet, Script, Seed, TakenOver};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::convert::{
@@ -66,15 +66,20 @@ impl Branch {
     /// The game at the branch point, with this seed for later Shifts. `None` if a decision is
     /// illegal, which never happens for a result of [`branch_of`].
     pub fn played(&self, later: Seed) -> Option<Game> {
+        self.replayed(later, |_| {})
+    }
+
+    /// Like [`Branch::played`], reporting every event, private fields included.
+    pub fn replayed(&self, later: Seed, mut on_event: impl FnMut(Event)) -> Option<Game> {
         let first = self.taken_over.first().map_or(later, |part| part.seed);
         let mut game = match &self.script {
-            None => Game::new(self.rules, first, |_| {}),
-            Some(script) => Game::scripted(self.rules, first, script, |_| {}).ok()?,
+            None => Game::new(self.rules, first, &mut on_event),
+            Some(script) => Game::scripted(self.rules, first, script, &mut on_event).ok()?,
         };
         for part in &self.taken_over {
             game.reseed(part.seed);
             for action in &part.actions {
-                game.apply(*action, |_| {}).ok()?;
+                game.apply(*action, &mut on_event).ok()?;
             }
         }
         game.reseed(later);

@@ -52,9 +52,9 @@ impl Default for MonteCarlo {
     fn default() -> MonteCarlo {
         MonteCarlo {
             budget: Budget::Time(Duration::from_millis(50)),
-            rollouts: AgentKind::Greedy,
+            rollouts: AgentKind::Trained,
             prior: AgentKind::Trained,
-            margin: 1.0,
+            margin: 3.0,
         }
     }
 }
@@ -62,7 +62,7 @@ impl Default for MonteCarlo {
 /// Why a text names no agent that searches.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 #[error(
-    "{0}: write monte_carlo, monte_carlo:50ms, monte_carlo:2000 (rollouts) or monte_carlo:50ms:trained (the agent of the rollouts: random, greedy or trained)"
+    "{0}: write monte_carlo, monte_carlo:50ms, monte_carlo:64 (rollouts) or monte_carlo:50ms:greedy (the agent of the rollouts: random, greedy or trained)"
 )]
 pub struct MonteCarloError(String);
 

@@ -144,6 +144,12 @@ pub const CALLS: &[Call] = &[
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
     call("/chefshat.v1.RecordService/ImportRecord", Host, Refused).streaming(),
     call("/chefshat.v1.VectorService/Run", Player, Refused).streaming(),
+    call("/chefshat.v1.AnalysisService/Evaluate", Player, Compared).streaming(),
+    call(
+        "/chefshat.v1.AnalysisService/LegalActions",
+        Player,
+        Compared,
+    ),
     call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
     call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
     call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused),

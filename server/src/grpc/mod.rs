@@ -3,6 +3,7 @@
 
 mod access;
 mod admin;
+mod analysis;
 mod follow;
 mod info;
 mod limits;
@@ -22,6 +23,7 @@ mod vector;
 
 pub use access::AccessLayer;
 pub use admin::AdminCalls;
+pub use analysis::Analyses;
 pub use info::Info;
 pub use limits::LimitsLayer;
 pub use play::Play;

@@ -1,6 +1,7 @@
 //! System tests over real sockets, from the view of participants, spectators and strangers.
 
 mod access;
+mod analysis;
 mod answers;
 mod attendant;
 mod beginnings;

@@ -40,6 +40,26 @@ fn the_table_is_readable_and_the_same_for_the_same_seed() {
 }
 
 #[test]
+fn a_number_of_rollouts_makes_games_repeatable() {
+    let flags = "--deals 2 --shifts 2 --seats one --faces 5";
+    let once = json("monte_carlo:20:random", "random", flags);
+    assert_eq!(
+        once,
+        json(
+            "monte_carlo:20:random",
+            "random",
+            &format!("{flags} --threads 1")
+        )
+    );
+    assert_eq!(once["a"]["agent"], "monte_carlo:20:random");
+    assert_eq!(once["shifts"], 16);
+    assert_ne!(
+        once["points_per_shift"],
+        json("random", "random", flags)["points_per_shift"]
+    );
+}
+
+#[test]
 fn lines_keep_within_100_columns() {
     for (a, b, flags) in [
         (TABLE, TABLE, "--deals 2 --shifts 1000 --seats one"),
@@ -105,6 +125,7 @@ fn mistakes_are_explained() {
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
     for (a, b, flags, expected) in [
         ("clever", "greedy", "", "neither a built-in agent (random, "),
+        ("monte_carlo:0", "greedy", "", "write monte_carlo, "),
         ("greedy", manifest, "", "Cargo.toml: not a safetensors file"),
         (
             "greedy",

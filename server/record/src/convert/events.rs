@@ -1,8 +1,13 @@
-//! Converts events of the engine to the protocol. Redaction comes before, in `Event::seen_by`:
+//! Converts events of the engine to the protocol, and those of a Shift back. Redaction comes before, in `Event::seen_by`:
 //! everything present is written.
 
-use chefshat_engine::{ActionSpace, BySeat, Cards, Event, Role, Seat, SpecialAction, Standings};
+use chefshat_engine::{
+    ActionSpace, BySeat, Cards, Event, Role, RuleSet, Seat, SpecialAction, Standings,
+};
 use chefshat_proto::v1::{self, game_event::Kind};
+
+use super::rules::{FieldProblem, role_from_number};
+use super::start::{action_id, cards_from_numbers, seat_from_number};
 
 /// The cause of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,6 +102,78 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
         })),
         Event::GameEnded { .. } => return None,
     })
+}
+
+/// Reads an event of a Shift that is not over, as a seat saw it. `None` for events that say nothing
+/// about the cards.
+///
+/// # Errors
+/// The first field that does not match the rules.
+pub fn event_from_proto(kind: &Kind, rules: &RuleSet) -> Result<Option<Event>, FieldProblem> {
+    let players = rules.players();
+    let problem = |words: &str| FieldProblem::new("events", words);
+    let seat_of = |number| {
+        seat_from_number(number, players).ok_or_else(|| problem("the game has no such seat"))
+    };
+    let cards_of = |numbers: &[u32], golden| {
+        cards_from_numbers(numbers, golden, rules.faces())
+            .ok_or_else(|| problem("no deck of these rules has these cards"))
+    };
+    Ok(Some(match kind {
+        Kind::ShiftStarted(started) => {
+            let mut hands = BySeat::filled(players, None);
+            for hand in &started.hands {
+                hands[seat_of(hand.seat)?] = Some(cards_of(&hand.cards, hand.golden)?);
+            }
+            Event::ShiftStarted {
+                shift: started.shift,
+                hands: Box::new(hands),
+            }
+        }
+        Kind::RolesAssigned(assigned) => {
+            let roles: Vec<Option<Role>> = (assigned.roles.iter())
+                .map(|&role| u8::try_from(role).ok().and_then(role_from_number))
+                .collect();
+            let roles = BySeat::from_slice(&roles).filter(|roles| roles.len() == players);
+            Event::RolesAssigned {
+                roles: roles.ok_or_else(|| problem("roles must have one entry per seat"))?,
+            }
+        }
+        Kind::SpecialActionDeclared(declared) => Event::SpecialActionDeclared {
+            seat: seat_of(declared.seat)?,
+            special: match declared.action() {
+                v1::SpecialAction::FoodFight => SpecialAction::FoodFight,
+                v1::SpecialAction::DinnerIsServed => SpecialAction::DinnerIsServed,
+                v1::SpecialAction::Unspecified => return Err(problem("unknown special action")),
+            },
+        },
+        Kind::CardsExchanged(gift) => Event::CardsExchanged {
+            giver: seat_of(gift.giver)?,
+            receiver: seat_of(gift.receiver)?,
+            count: u8::try_from(gift.count).map_err(|_| problem("too many cards exchanged"))?,
+            cards: match gift.cards.as_slice() {
+                [] => None,
+                cards => Some(cards_of(cards, gift.golden)?),
+            },
+        },
+        Kind::Play(play) => {
+            let small = |number: u32| u8::try_from(number).unwrap_or(u8::MAX);
+            Event::Played {
+                seat: seat_of(play.seat)?,
+                action: action_id(play.action),
+                face: small(play.face),
+                quantity: small(play.quantity),
+                jokers: small(play.jokers),
+                cards_left: small(play.cards_left),
+            }
+        }
+        // The number of cards left is not sent.
+        Kind::Pass(pass) => Event::Passed {
+            seat: seat_of(pass.seat)?,
+            cards_left: 0,
+        },
+        _ => return Ok(None),
+    }))
 }
 
 /// Converts the cards of a seat.

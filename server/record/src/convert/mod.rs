@@ -9,7 +9,9 @@ mod rewards;
 mod rules;
 mod start;
 
-pub use events::{By, event_kind, final_table, seat_cards, seat_number, special_to_proto};
+pub use events::{
+    By, event_from_proto, event_kind, final_table, seat_cards, seat_number, special_to_proto,
+};
 pub(crate) use expression::LAST_MS;
 pub use expression::check_expression;
 pub use kind::{has_real_cards, kind_from_name, kind_name};

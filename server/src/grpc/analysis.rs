@@ -1,0 +1,311 @@
+//! `AnalysisService`: estimates of the actions of a decision, on threads of its own so that rooms
+//! stay responsive. `chefshat_search` estimates; this file reads positions and writes the answers.
+//! Only what the seat knows goes into a position, and games that are running have none.
+
+use std::panic::AssertUnwindSafe;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{ActionId, Mask, RuleSet, Seed, Viewer};
+use chefshat_proto::v1::{
+    self, analysis_service_server::AnalysisService, evaluate_request::Position,
+};
+use chefshat_record::branch::{BranchError, branch_of};
+use chefshat_record::convert::{
+    FieldProblem, decision_kind, event_from_proto, observation_from_proto, rules_from_proto,
+    seat_from_number, seat_number,
+};
+use chefshat_search::{
+    Allocation, Estimate, Knowledge, KnowledgeError, Method, Sampler, ShiftHistory, evaluate,
+    likely_hands,
+};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::{mpsc, oneshot};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::{Request, Response, Status};
+
+use super::limits::charged;
+use super::recorded::Recorded;
+use super::status::{Refusal, field, internal, shutting_down};
+use crate::access::Caller;
+use crate::config::{
+    ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS, MAX_ANALYSIS_TIME,
+};
+use crate::limits::{Places, Refused};
+
+/// Deals from which the likely hands are averaged.
+const DEALS_FOR_HANDS: u64 = 500;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct Analyses {
+    recorded: Recorded,
+    /// Each analysis takes one thread.
+    pool: Arc<ThreadPool>,
+    places: Arc<Places>,
+    closing: CancellationToken,
+}
+
+/// How to evaluate a position.
+struct Plan {
+    method: Method,
+    rollouts: u64,
+    time: Duration,
+    seed: [u8; 32],
+}
+
+impl Analyses {
+    /// Creates the service with this number of threads (0: one for each core). `closing` ends its
+    /// work.
+    ///
+    /// # Errors
+    /// The operating system cannot start the threads.
+    pub fn new(
+        recorded: Recorded,
+        threads: usize,
+        closing: CancellationToken,
+    ) -> Result<Self, ThreadPoolBuildError> {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|index| format!("analysis-{index}"))
+            .build()?;
+        let places = Places::new(MAX_ANALYSES, recorded.rooms().shares());
+        Ok(Self {
+            recorded,
+            pool: Arc::new(pool),
+            places,
+            closing,
+        })
+    }
+
+    /// What the seat of a recorded decision knows there, and what is legal.
+    async fn moment(
+        &self,
+        caller: &Caller,
+        moment: v1::RecordedMoment,
+    ) -> Result<(Knowledge, Mask), Status> {
+        let decisions = moment.decisions;
+        self.recorded
+            .of_game(caller, &moment.game_id, move |lines, _| {
+                let branch = branch_of(&lines, decisions)?;
+                let mut histories: Vec<ShiftHistory> = (0..branch.rules.players())
+                    .map(|seat| ShiftHistory::new(chefshat_engine::Seat::new(seat)))
+                    .collect();
+                let game = branch.replayed(Seed([0; 32]), |event| {
+                    histories
+                        .iter_mut()
+                        .for_each(|history| history.on_event(&event));
+                });
+                let position = game.and_then(|game| {
+                    let seat = game.decision()?.seat;
+                    let seen = game.observe(Viewer::Seat(seat));
+                    let history = &histories[seat.index()];
+                    let knowledge = Knowledge::new(branch.rules, &seen, history).ok()?;
+                    Some((knowledge, game.legal_actions()))
+                });
+                Ok(position)
+            })
+            .await?
+            .map_err(|error: BranchError| refused("moment", error.to_string()))?
+            .ok_or_else(internal)
+    }
+
+    /// Works on a thread of the pool. `stopped` says whether the client has gone or the server stops.
+    async fn on_pool<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        let gone = CancellationToken::new();
+        let guard = gone.clone().drop_guard();
+        let closing = self.closing.clone();
+        let (done, result) = oneshot::channel();
+        self.pool.spawn(move || {
+            let stopped = || gone.is_cancelled() || closing.is_cancelled();
+            // Rooms share the process, so a panic ends only this work.
+            let worked = std::panic::catch_unwind(AssertUnwindSafe(|| work(&stopped)));
+            if let Ok(value) = worked {
+                // It fails only if the client has gone.
+                let _ = done.send(value);
+            }
+        });
+        let value = result.await.map_err(|_| internal());
+        drop(guard);
+        match self.closing.is_cancelled() {
+            true => Err(shutting_down()),
+            false => value,
+        }
+    }
+}
+
+#[tonic::async_trait]
+impl AnalysisService for Analyses {
+    type EvaluateStream = ReceiverStream<Result<v1::EvaluateResponse, Status>>;
+
+    async fn evaluate(
+        &self,
+        request: Request<v1::EvaluateRequest>,
+    ) -> Result<Response<Self::EvaluateStream>, Status> {
+        let key = charged(request.extensions());
+        let place = (self.places.try_take(key))
+            .ok_or_else(|| Refusal::from(too_many(self.places.share_of(key))))?;
+        let caller = Caller::of(request.extensions());
+        let message = request.into_inner();
+        let plan = plan(&message)?;
+        let knowledge = match message.position {
+            None => return Err(refused("position", "set moment or situation")),
+            Some(Position::Situation(situation)) => situation_knowledge(&situation)?,
+            Some(Position::Moment(moment)) => self.moment(&caller, moment).await?.0,
+        };
+        let (responses, stream) = mpsc::channel(1);
+        let service = self.clone();
+        tokio::spawn(async move {
+            let work = service.on_pool(move |stopped| {
+                // Work that was given up keeps its place until it ends.
+                let _place = place;
+                evaluated(knowledge, &plan, stopped)
+            });
+            let answer = tokio::select! {
+                answer = work => answer,
+                () = responses.closed() => return,
+            };
+            let answer = answer
+                .and_then(|found| found.map_err(|error| refused("position", error.to_string())));
+            // It fails only if the client has gone.
+            let _ = responses.send(answer).await;
+        });
+        Ok(Response::new(ReceiverStream::new(stream)))
+    }
+
+    async fn legal_actions(
+        &self,
+        request: Request<v1::LegalActionsRequest>,
+    ) -> Result<Response<v1::LegalActionsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let moment = request.into_inner().moment;
+        let moment = moment.ok_or_else(|| refused("moment", "not set"))?;
+        let (knowledge, legal) = self.moment(&caller, moment).await?;
+        let kind = knowledge.observation().kind;
+        let size = knowledge.rules().actions().size();
+        Ok(Response::new(v1::LegalActionsResponse {
+            seat: seat_number(knowledge.seat()),
+            kind: kind
+                .map_or(v1::DecisionKind::Unspecified, decision_kind)
+                .into(),
+            action_mask: legal.to_bytes(size),
+        }))
+    }
+}
+
+/// Evaluates a position.
+fn evaluated(
+    knowledge: Knowledge,
+    plan: &Plan,
+    stopped: &dyn Fn() -> bool,
+) -> Result<v1::EvaluateResponse, KnowledgeError> {
+    let start = Instant::now();
+    let seat = knowledge.seat();
+    let sampler = Sampler::new(knowledge, MAX_ANALYSIS_STEPS)?;
+    let actions: Vec<ActionId> = sampler.legal_actions().iter().collect();
+    let progress = |rollouts: u64| {
+        let spent = rollouts as f64 / plan.rollouts as f64;
+        let elapsed = start.elapsed().as_secs_f64() / plan.time.as_secs_f64();
+        if stopped() { 1.0 } else { spent.max(elapsed) }
+    };
+    let found = evaluate(&sampler, &actions, plan.method, plan.seed, None, progress);
+    let deals = if stopped() { 0 } else { DEALS_FOR_HANDS };
+    let hands = likely_hands(&sampler, plan.seed, deals);
+    Ok(v1::EvaluateResponse {
+        seat: seat_number(seat),
+        rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
+        actions: found.iter().map(estimate_to_proto).collect(),
+        hands: (hands.into_iter())
+            .map(|cards| v1::ExpectedHand { cards })
+            .collect(),
+    })
+}
+
+fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
+    let error = estimate.standard_error();
+    v1::ActionEstimate {
+        action: estimate.action.index().into(),
+        points: estimate.points(),
+        standard_error: if error.is_finite() { error } else { 0.0 },
+        place: estimate.place(),
+        rollouts: estimate.rollouts,
+    }
+}
+
+/// The plan of a request.
+fn plan(message: &v1::EvaluateRequest) -> Result<Plan, Status> {
+    let policy = match message.agent.as_str() {
+        "" => Some(AgentKind::Greedy),
+        name => AgentKind::from_name(name).filter(|kind| *kind != AgentKind::RandomUnmasked),
+    };
+    let policy = policy.ok_or_else(|| refused("agent", "choose random, greedy or trained"))?;
+    if message.rollouts > MAX_ANALYSIS_ROLLOUTS {
+        let words = format!("choose at most {MAX_ANALYSIS_ROLLOUTS}");
+        return Err(refused("rollouts", words));
+    }
+    let time = match message.time_ms {
+        0 => ANALYSIS_TIME,
+        ms => Duration::from_millis(ms.into()),
+    };
+    if time > MAX_ANALYSIS_TIME {
+        let words = format!("choose at most {}", MAX_ANALYSIS_TIME.as_millis());
+        return Err(refused("time_ms", words));
+    }
+    let mut seed = [0; 32];
+    seed[..8].copy_from_slice(&message.seed.to_le_bytes());
+    Ok(Plan {
+        method: Method {
+            policy,
+            allocation: Allocation::Uniform,
+        },
+        rollouts: match message.rollouts {
+            0 => MAX_ANALYSIS_ROLLOUTS,
+            rollouts => rollouts,
+        },
+        time,
+        seed,
+    })
+}
+
+/// What the seat of a situation knows.
+fn situation_knowledge(situation: &v1::Situation) -> Result<Knowledge, Status> {
+    let rules: RuleSet =
+        rules_from_proto(situation.rules.as_ref().unwrap_or(&v1::RuleSet::default()))
+            .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
+    let problem = |problem: FieldProblem| field("ANALYSIS_REFUSED", &problem);
+    let seat = seat_from_number(situation.seat, rules.players())
+        .ok_or_else(|| refused("seat", "the game has no such seat"))?;
+    let decision = situation.decision.as_ref();
+    let decision = decision.ok_or_else(|| refused("decision", "not set"))?;
+    let observation = observation_from_proto(decision, seat, &rules).map_err(problem)?;
+    let mut history = ShiftHistory::new(seat);
+    for event in situation
+        .events
+        .iter()
+        .filter_map(|event| event.kind.as_ref())
+    {
+        if let Some(event) = event_from_proto(event, &rules).map_err(problem)? {
+            history.on_event(&event);
+        }
+    }
+    Knowledge::new(rules, &observation, &history)
+        .map_err(|error| refused("situation", error.to_string()))
+}
+
+fn refused(name: &'static str, words: impl Into<String>) -> Status {
+    field("ANALYSIS_REFUSED", &FieldProblem::new(name, words))
+}
+
+fn too_many(limit: usize) -> Refused {
+    Refused {
+        reason: "TOO_MANY_ANALYSES",
+        what: "too many analyses at a time; wait until one ends",
+        limit: limit as u64,
+        retry_after: MAX_ANALYSIS_TIME,
+    }
+}

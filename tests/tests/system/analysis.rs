@@ -1,0 +1,216 @@
+//! Estimates of recorded decisions and of situations that a client describes.
+
+use chefshat_client::Client;
+use chefshat_engine::{Seed, Viewer};
+use chefshat_proto::v1::{
+    self, analysis_service_client::AnalysisServiceClient, evaluate_request::Position,
+    game_event::Kind,
+};
+use chefshat_record::branch::branch_of;
+use chefshat_record::convert::{
+    By, decision_kind, event_kind, observation_to_proto, rules_to_proto, seat_number,
+};
+use chefshat_tests::{TestServer, one_shift, room_of_four};
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+use crate::played::{EndedGame, original, points};
+
+/// Few enough that the time is never reached.
+const ROLLOUTS: u64 = 60;
+
+fn request(position: Position) -> v1::EvaluateRequest {
+    v1::EvaluateRequest {
+        position: Some(position),
+        rollouts: ROLLOUTS,
+        time_ms: 10_000,
+        agent: "random".into(),
+        seed: 5,
+    }
+}
+
+fn moment(game_id: &str, decisions: usize) -> v1::RecordedMoment {
+    v1::RecordedMoment {
+        game_id: game_id.into(),
+        decisions: decisions as u64,
+    }
+}
+
+async fn evaluated(
+    client: &Client,
+    request: v1::EvaluateRequest,
+) -> Result<v1::EvaluateResponse, Status> {
+    let mut service = AnalysisServiceClient::new(client.channel());
+    let mut answers = service.evaluate(request).await?.into_inner();
+    let answer = answers.message().await?.expect("an answer");
+    assert_eq!(answers.message().await?, None);
+    Ok(answer)
+}
+
+/// A recorded decision as its seat saw it.
+fn situation(game: &EndedGame, decisions: usize) -> v1::Situation {
+    let branch = branch_of(&game.lines, decisions as u64).expect("a point of the game");
+    let mut events = Vec::new();
+    let at = branch
+        .replayed(Seed([0; 32]), |event| events.push(event))
+        .expect("a valid record");
+    let seat = at.decision().expect("a decision is open").seat;
+    let viewer = Viewer::Seat(seat);
+    let by = By {
+        source: v1::DecisionSource::Unspecified,
+        decision_time_us: 0,
+    };
+    let seen = |event: &chefshat_engine::Event| {
+        event_kind(&event.seen_by(viewer), branch.rules.actions(), by)
+    };
+    let kinds: Vec<Kind> = events.iter().filter_map(seen).collect();
+    let from = kinds
+        .iter()
+        .rposition(|kind| matches!(kind, Kind::ShiftStarted(_)))
+        .expect("the Shift started");
+    let observation = at.observe(viewer);
+    v1::Situation {
+        rules: Some(rules_to_proto(&branch.rules)),
+        seat: seat_number(seat),
+        decision: Some(v1::DecisionRequest {
+            kind: observation
+                .kind
+                .map_or(v1::DecisionKind::Unspecified, decision_kind)
+                .into(),
+            observation: Some(observation_to_proto(&observation)),
+            ..v1::DecisionRequest::default()
+        }),
+        events: kinds[from..]
+            .iter()
+            .map(|kind| v1::GameEvent {
+                kind: Some(kind.clone()),
+                ..v1::GameEvent::default()
+            })
+            .collect(),
+    }
+}
+
+#[tokio::test]
+async fn a_recorded_decision_is_evaluated_by_what_its_seat_knew() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let game = original(&client).await;
+    let positions = game.positions();
+    let mut service = AnalysisServiceClient::new(client.channel());
+    for decisions in points(&game) {
+        let at = &positions[decisions];
+        let seat = at.decision().expect("a decision is open").seat;
+        let legal = at.legal_actions();
+
+        let request_legal = v1::LegalActionsRequest {
+            moment: Some(moment(game.game_id(), decisions)),
+        };
+        let answer = service.legal_actions(request_legal).await;
+        let answer = answer.expect("legal actions").into_inner();
+        assert_eq!(
+            answer.action_mask,
+            legal.to_bytes(at.rules().actions().size())
+        );
+        assert_eq!(answer.seat, seat_number(seat));
+
+        let recorded = request(Position::Moment(moment(game.game_id(), decisions)));
+        let found = evaluated(&client, recorded.clone())
+            .await
+            .expect("estimates");
+        let actions: Vec<u32> = legal.iter().map(|action| action.index().into()).collect();
+        let estimated: Vec<u32> = found.actions.iter().map(|found| found.action).collect();
+        assert_eq!(estimated, actions);
+        assert!(found.rollouts >= ROLLOUTS);
+        for action in &found.actions {
+            assert!((0.0..=5.0).contains(&action.points), "{action:?}");
+            assert!((1.0..=4.0).contains(&action.place), "{action:?}");
+        }
+        for (hand, left) in found
+            .hands
+            .iter()
+            .zip(at.observe(Viewer::Spectator).cards_left.values())
+        {
+            let cards: f64 = hand.cards.iter().sum();
+            assert!((cards - f64::from(*left)).abs() < 1e-9);
+        }
+        // The same again, and from the seat's own view, which has no hidden card.
+        assert_eq!(
+            evaluated(&client, recorded).await.expect("estimates"),
+            found
+        );
+        let described = request(Position::Situation(situation(&game, decisions)));
+        assert_eq!(
+            evaluated(&client, described).await.expect("estimates"),
+            found
+        );
+    }
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn what_cannot_be_evaluated_is_refused() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let game = original(&client).await;
+    let policy = v1::RoomPolicy::default();
+    let (running, _tickets) = room_of_four(&client, one_shift(), policy).await;
+    let running = running.room.expect("a room");
+    let at = points(&game)[0];
+    let check = async |request: v1::EvaluateRequest, code: Code, reason: &str| {
+        let status = evaluated(&client, request).await.expect_err(reason);
+        let details = status.get_details_error_info();
+        let found = details.map_or_else(String::new, |details| details.reason);
+        assert_eq!(
+            (status.code(), found.as_str()),
+            (code, reason),
+            "{status:?}"
+        );
+    };
+    let named = |game_id: &str, decisions| request(Position::Moment(moment(game_id, decisions)));
+    let described = |change: fn(&mut v1::Situation)| {
+        let mut situation = situation(&game, at);
+        change(&mut situation);
+        request(Position::Situation(situation))
+    };
+    let invalid = Code::InvalidArgument;
+    let refused = "ANALYSIS_REFUSED";
+    check(
+        named(&running.game_id, 0),
+        Code::FailedPrecondition,
+        "GAME_RUNNING",
+    )
+    .await;
+    check(named(&"0".repeat(32), 0), Code::NotFound, "GAME_UNKNOWN").await;
+    check(named(game.game_id(), 1_000_000), invalid, refused).await;
+    check(v1::EvaluateRequest::default(), invalid, refused).await;
+    let valid = named(game.game_id(), at);
+    for wrong in [
+        v1::EvaluateRequest {
+            time_ms: 10_001,
+            ..valid.clone()
+        },
+        v1::EvaluateRequest {
+            rollouts: 1_000_001,
+            ..valid.clone()
+        },
+        v1::EvaluateRequest {
+            agent: "clever".into(),
+            ..valid
+        },
+        described(|situation| situation.seat = 4),
+        described(|situation| situation.decision = None),
+        described(|situation| situation.events.clear()),
+        // Another seat's hand.
+        described(|situation| situation.seat = (situation.seat + 1) % 4),
+    ] {
+        check(wrong, invalid, refused).await;
+    }
+    let rules = described(|situation| {
+        situation.rules = Some(v1::RuleSet {
+            faces: Some(3),
+            ..v1::RuleSet::default()
+        })
+    });
+    check(rules, invalid, "RULE_SET_REFUSED").await;
+    server.stop().await;
+}
