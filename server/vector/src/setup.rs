@@ -3,14 +3,14 @@
 use std::num::{NonZeroU32, NonZeroU64};
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{RuleSet, RuleSetSpec, Seed, Stop};
+use chefshat_engine::{ActionId, RuleSet, RuleSetSpec, Seed, Stop};
 use chefshat_proto::v1::{self, vector_setup};
 use chefshat_record::convert::{
     FieldProblem, MAX_RECORDED_ATTEMPTS, action_space, reward_scheme_from_proto, rules_from_proto,
     rules_to_proto, script_from_proto, seat_from_number, seat_number,
 };
 use chefshat_simulation::vector::{
-    Decisions, Episode, InvalidActions, Seeds, SetupError, Start, VectorSetup,
+    Decisions, Episode, InvalidActions, Seeds, SetupError, Start, StartPoint, VectorSetup,
 };
 
 use crate::error::RequestError;
@@ -64,6 +64,17 @@ pub fn start_from_proto(
                 .map_err(|problem| RequestError::field("SCRIPT_REFUSED", &problem))?;
             Ok(Some((rules, Start::Script(Box::new(script)))))
         }
+        Some(vector_setup::Start::Listed(listed)) => {
+            let rules = rules()?;
+            let points = listed.starts.iter().enumerate().map(|(entry, start)| {
+                point_from_proto(start, &rules).map_err(|problem| {
+                    let words = format!("start {entry}: {problem}");
+                    RequestError::field("SCRIPT_REFUSED", &FieldProblem::new("listed", words))
+                })
+            });
+            let points = points.collect::<Result<Vec<_>, _>>()?;
+            Ok(Some((rules, Start::Listed(points.into()))))
+        }
         Some(vector_setup::Start::Saved(saved)) => {
             let states = states_from_proto(&saved.states)
                 .map_err(|problem| RequestError::field("STATES_REFUSED", &problem))?;
@@ -75,6 +86,25 @@ pub fn start_from_proto(
         }
         Some(vector_setup::Start::Branch(_)) => Ok(None),
     }
+}
+
+fn point_from_proto(
+    message: &v1::ListedStart,
+    rules: &RuleSet,
+) -> Result<StartPoint, FieldProblem> {
+    let script = message.hands.clone().unwrap_or_default();
+    let (actions, rest) = message.actions.as_chunks::<2>();
+    if !rest.is_empty() {
+        let words = "the column is incomplete: 2 bytes for each action";
+        return Err(FieldProblem::new("actions", words));
+    }
+    let actions = actions.iter();
+    Ok(StartPoint {
+        script: script_from_proto(&script, rules)?,
+        actions: actions
+            .map(|bytes| ActionId::new(u16::from_le_bytes(*bytes)))
+            .collect(),
+    })
 }
 
 /// The games of a setup message, whose rules, start and seeds are already checked.
@@ -268,6 +298,10 @@ fn problem(error: SetupError) -> FieldProblem {
         SetupError::NoSeeds => "game_seeds",
         SetupError::Script(_) => "scripted",
         SetupError::History(_) => "history",
+        SetupError::NoStarts
+        | SetupError::ListedScript { .. }
+        | SetupError::ListedAction { .. }
+        | SetupError::ListedEnd { .. } => "listed",
         SetupError::NoSaved | SetupError::Saved { .. } => "saved",
     };
     FieldProblem::new(field, error.to_string())

@@ -46,6 +46,8 @@ class VectorOptions(TypedDict, total=False):
         seed: a base seed, the games' seeds, or None (default) for random ones. See `Seed`.
         rules: the rule set; see `Rules`.
         hands: the hands each game begins with, instead of a deal.
+        starts: the start of each game, used in turn like seeds: pairs of hands and the actions of all seats that were taken from
+            there, for instance `[(hands, [17, 199]), (hands, [])]`. The actions do not end the Shift.
         branch: the point of a recorded game that each game continues from.
         shift_statistics: whether batches have `shifts`.
         records: whether batches have the `records` of games that have ended.
@@ -65,6 +67,7 @@ class VectorOptions(TypedDict, total=False):
     seed: Seed
     rules: Rules
     hands: pb.ScriptedShift | None
+    starts: Sequence[tuple[pb.ScriptedShift, Sequence[int]]] | None
     branch: pb.BranchPoint | None
     shift_statistics: bool
     records: bool
@@ -81,6 +84,9 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     decisions, rewards = options.get("decisions", "all"), options.get("rewards")
     if branch is not None and hands is not None:
         raise ValueError("a game begins from a record (branch) or with given hands (hands), not both")
+    starts = options.get("starts")
+    if starts is not None and (branch is not None or hands is not None):
+        raise ValueError("starts excludes branch and hands: each of them says how games begin")
     if branch is not None and rules is not None:
         raise ValueError("a game that continues a record (branch) has the record's rules: leave rules out")
     if options.get("other_decisions") is not None and decisions != "turns":
@@ -106,6 +112,10 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     )
     if client_seats is not None and len(client_seats) == 0:
         raise ValueError("client_seats is empty: name at least one seat, or leave it out to play all")
+    if starts is not None:
+        setup.listed.SetInParent()
+        for given, actions in starts:
+            setup.listed.starts.add(hands=given, actions=np.asarray(actions, "<u2").tobytes())
     if rewards is not None:
         setup.reward_scheme = choice("rewards", rewards, pb.RewardScheme, "REWARD_SCHEME_")
     put_seed(setup, options.get("seed"))

@@ -30,6 +30,7 @@ mod sampling;
 mod saved;
 mod setup;
 mod slot;
+mod start;
 mod terms;
 
 use chefshat_engine::ActionId;
@@ -38,8 +39,9 @@ pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Sh
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
 pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 pub use saved::SavedGame;
-pub use setup::{Episode, MAX_SEATS_PLAYED, Seeds, SetupError, Start, VectorSetup};
+pub use setup::{Episode, VectorSetup};
 use slot::Slot;
+pub use start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};
 
 /// Maximum number of decisions and invalid attempts of built-in agents within one step, over all

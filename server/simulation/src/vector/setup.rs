@@ -1,20 +1,16 @@
 //! Validated options of a vector environment.
 
 use std::num::{NonZeroU32, NonZeroU64};
-use std::sync::Arc;
 
-use chefshat_engine::{BySeat, Game, RewardScheme, RuleSet, Script, ScriptError, Seat, Seed};
-use thiserror::Error;
+use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Seed};
 
-use chefshat_agents::{AgentKind, game_seed};
+use chefshat_agents::AgentKind;
 
 use super::error::StateError;
 use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 use super::saved::SavedGame;
+use super::start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
 use super::terms::{Decisions, InvalidActions, Terms};
-
-/// Maximum number of seats of one client: games times its seats in each.
-pub const MAX_SEATS_PLAYED: u32 = 16_384;
 
 /// The scope of an episode.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -24,51 +20,6 @@ pub enum Episode {
     Shift,
     /// A game.
     Game,
-}
-
-/// The seeds of the games.
-#[derive(Clone, Eq, PartialEq, Debug)]
-pub enum Seeds {
-    /// Game i has seed i of this base seed ([`game_seed`]).
-    Base(u64),
-    /// Game i has seed i modulo the length of the list, which is not empty.
-    List(Arc<[Seed]>),
-}
-
-impl Seeds {
-    fn of(&self, index: u64) -> Seed {
-        match self {
-            Seeds::Base(base) => game_seed(*base, index),
-            Seeds::List(seeds) => seeds[(index % seeds.len() as u64) as usize],
-        }
-    }
-}
-
-/// The start of each game.
-#[derive(Clone, Debug, Default)]
-pub enum Start {
-    /// A deal from the seed.
-    #[default]
-    Deal,
-    /// A scripted Shift.
-    Script(Box<Script>),
-    /// A copy of a running game.
-    Point {
-        /// The game.
-        game: Box<Game>,
-        /// Whether later Shifts are dealt from this game's seed instead of each game's own.
-        same_deals: bool,
-    },
-    /// Copies of saved games: the game with index i is a copy of the saved game at i modulo their
-    /// number.
-    Saved {
-        /// The games.
-        games: Arc<[SavedGame]>,
-        /// Whether a copy continues as the saved game would: with its seed, and its agents'
-        /// generators where they were. Otherwise later Shifts are dealt and agents choose by each
-        /// game's own seed.
-        same_deals: bool,
-    },
 }
 
 /// Options of a vector environment, created by [`VectorSetup::new`].
@@ -88,62 +39,6 @@ pub struct VectorSetup {
     statistics: bool,
     records: bool,
     history: u16,
-}
-
-/// Why options are invalid.
-#[derive(Clone, Eq, PartialEq, Debug, Error)]
-pub enum SetupError {
-    /// The number of entries is not the number of seats.
-    #[error("{given} seats are filled, but the game has {players}")]
-    Seats {
-        /// Entries given.
-        given: usize,
-        /// Seats of the rule set.
-        players: usize,
-    },
-    /// The client has no seat.
-    #[error("the client plays no seat: give it at least one")]
-    NoClient,
-    /// The number of games is 0 or too large.
-    #[error(
-        "{games} games with {seats} of the client's seats: play at least 1 game, and at most {MAX_SEATS_PLAYED} games times seats"
-    )]
-    Games {
-        /// Games asked for.
-        games: u32,
-        /// Seats of the client in each.
-        seats: usize,
-    },
-    /// The total number of games is below the number of parallel games.
-    #[error("{total} games in total are fewer than the {games} parallel games")]
-    Total {
-        /// Total number of games.
-        total: u64,
-        /// Parallel games.
-        games: u32,
-    },
-    /// The list of seeds is empty.
-    #[error("the list of seeds is empty: give at least one")]
-    NoSeeds,
-    /// The script is invalid.
-    #[error("{0}")]
-    Script(#[from] ScriptError),
-    /// The history column is too wide.
-    #[error(
-        "a history of {0} actions: choose at most {MAX_HISTORY}, and at most {MAX_HISTORY_ENTRIES} actions over the client's seats of all games"
-    )]
-    History(u16),
-    /// The list of saved games is empty.
-    #[error("the list of saved games is empty: give at least one")]
-    NoSaved,
-    /// A saved game cannot be continued with these options.
-    #[error("saved game {entry}: {error}")]
-    Saved {
-        /// The game at fault, from 0.
-        entry: usize,
-        /// Why.
-        error: StateError,
-    },
 }
 
 impl VectorSetup {
@@ -265,9 +160,36 @@ impl VectorSetup {
                 });
                 *games = checked.collect::<Result<_, _>>()?;
             }
+            Start::Listed(points) => {
+                if points.is_empty() {
+                    return Err(SetupError::NoStarts);
+                }
+                let mut points = points.iter().enumerate();
+                points.try_for_each(|(entry, point)| self.check_point(entry, point))?;
+            }
             Start::Deal | Start::Point { .. } => {}
         }
         Ok(VectorSetup { start, ..self })
+    }
+
+    fn check_point(&self, entry: usize, point: &StartPoint) -> Result<(), SetupError> {
+        let game = Game::scripted(self.rules, Seed([0; 32]), &point.script, |_| {});
+        let mut game = game.map_err(|error| SetupError::ListedScript { entry, error })?;
+        for (place, &action) in point.actions.iter().enumerate() {
+            let mut ended = false;
+            game.apply(action, |event| {
+                ended |= matches!(event, Event::ShiftEnded(_))
+            })
+            .map_err(|error| SetupError::ListedAction {
+                entry,
+                place,
+                error,
+            })?;
+            if ended {
+                return Err(SetupError::ListedEnd { entry, place });
+            }
+        }
+        Ok(())
     }
 
     /// Options for `times` copies of each of these games, otherwise the same. With seeds, copies
@@ -432,7 +354,8 @@ impl VectorSetup {
     pub(super) fn check(&self, saved: &SavedGame) -> Result<(), StateError> {
         saved.check(&self.terms())?;
         let copies = matches!(self.start, Start::Saved { .. });
-        if self.records && !copies && !saved.is_played_from(|seed| self.begin(seed)) {
+        let start = |seed| self.begin(saved.index(), seed, |_, _, _| {});
+        if self.records && !copies && !saved.is_played_from(start) {
             return Err(StateError::Record);
         }
         Ok(())
@@ -443,12 +366,34 @@ impl VectorSetup {
         &self.start
     }
 
-    /// A game with this seed at its start, which is not a saved one.
-    pub(super) fn begin(&self, seed: Seed) -> Game {
+    /// The game with this index and seed at its start, which is not a saved one. Calls back with
+    /// each action taken before, the game before it, and its events.
+    pub(super) fn begin(
+        &self,
+        index: u64,
+        seed: Seed,
+        mut on_action: impl FnMut(&Game, ActionId, &[Event]),
+    ) -> Game {
+        let scripted = |script| {
+            Game::scripted(self.rules, seed, script, |_| {})
+                .expect("the script has been checked with these rules")
+        };
         match &self.start {
             Start::Deal => Game::new(self.rules, seed, |_| {}),
-            Start::Script(script) => Game::scripted(self.rules, seed, script, |_| {})
-                .expect("the script has been checked with these rules"),
+            Start::Script(script) => scripted(script),
+            Start::Listed(points) => {
+                let point = &points[(index % points.len() as u64) as usize];
+                let mut game = scripted(&point.script);
+                let mut events = Vec::new();
+                for &action in &point.actions {
+                    let before = game.clone();
+                    events.clear();
+                    game.apply(action, |event| events.push(event))
+                        .expect("the actions have been checked with these rules");
+                    on_action(&before, action, &events);
+                }
+                game
+            }
             Start::Point { game, same_deals } => {
                 let mut game = Game::clone(game);
                 if !same_deals {

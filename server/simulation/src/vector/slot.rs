@@ -9,7 +9,8 @@ use super::columns::{Batch, Ending, PlayedGame, Row, Totals, places_taken};
 use super::history::History;
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
-use super::setup::{Episode, Start, VectorSetup};
+use super::setup::{Episode, VectorSetup};
+use super::start::Start;
 use super::terms::Decisions;
 use chefshat_agents::{ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;
@@ -289,7 +290,14 @@ impl RunningGame {
             let saved = &games[(index % games.len() as u64) as usize];
             return saved.begin((!same_deals).then_some(seed));
         }
-        let game = setup.begin(seed);
+        let mut history = (setup.history() > 0).then(History::new);
+        let game = setup.begin(index, seed, |before, action, events| {
+            if let (Some(history), Some(open)) = (&mut history, before.decision()) {
+                let required = before.requirement();
+                let space = setup.rules().actions();
+                history.add(setup.history(), open.seat, required, action, events, space);
+            }
+        });
         RunningGame {
             seed,
             recorder: setup
@@ -303,7 +311,7 @@ impl RunningGame {
             attempts: Vec::new(),
             decisions: Vec::new(),
             kept: 0,
-            history: (setup.history() > 0).then(History::new),
+            history,
         }
     }
 

@@ -4,6 +4,7 @@ mod episodes;
 mod histories;
 mod limits;
 mod play;
+mod starts;
 mod states;
 
 use chefshat_agents::AgentKind;

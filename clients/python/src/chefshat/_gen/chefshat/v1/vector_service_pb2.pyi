@@ -212,6 +212,60 @@ class GameSeeds(_message.Message):
 Global___GameSeeds: _TypeAlias = GameSeeds  # noqa: Y015
 
 @_typing.final
+class ListedStart(_message.Message):
+    """A scripted Shift, and actions that were taken in it."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    HANDS_FIELD_NUMBER: _builtins.int
+    ACTIONS_FIELD_NUMBER: _builtins.int
+    actions: _builtins.bytes
+    """u16: the actions of all seats from there, in order. They do not end the Shift."""
+    @_builtins.property
+    def hands(self) -> _rules_pb2.ScriptedShift:
+        """The start of the Shift."""
+
+    def __init__(
+        self,
+        *,
+        hands: _rules_pb2.ScriptedShift | None = ...,
+        actions: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["hands", b"hands"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["actions", b"actions", "hands", b"hands"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ListedStart: _TypeAlias = ListedStart  # noqa: Y015
+
+@_typing.final
+class ListedStarts(_message.Message):
+    """Starts of games."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STARTS_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def starts(self) -> _containers.RepeatedCompositeFieldContainer[Global___ListedStart]:
+        """At least one. The game with index i begins with the start at i modulo their number; its seed
+        deals later Shifts.
+        """
+
+    def __init__(
+        self,
+        *,
+        starts: _abc.Iterable[Global___ListedStart] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["starts", b"starts"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ListedStarts: _TypeAlias = ListedStarts  # noqa: Y015
+
+@_typing.final
 class SavedStart(_message.Message):
     """Saved games as the start of games. In copies decisions are not kept for records."""
 
@@ -268,6 +322,7 @@ class VectorSetup(_message.Message):
     SCRIPTED_FIELD_NUMBER: _builtins.int
     BRANCH_FIELD_NUMBER: _builtins.int
     SAVED_FIELD_NUMBER: _builtins.int
+    LISTED_FIELD_NUMBER: _builtins.int
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
     HISTORY_FIELD_NUMBER: _builtins.int
@@ -344,6 +399,10 @@ class VectorSetup(_message.Message):
     def saved(self) -> Global___SavedStart:
         """From saved games."""
 
+    @_builtins.property
+    def listed(self) -> Global___ListedStarts:
+        """With hands and actions of its own."""
+
     def __init__(
         self,
         *,
@@ -364,17 +423,18 @@ class VectorSetup(_message.Message):
         scripted: _rules_pb2.ScriptedShift | None = ...,
         branch: _room_pb2.BranchPoint | None = ...,
         saved: Global___SavedStart | None = ...,
+        listed: Global___ListedStarts | None = ...,
         shift_statistics: _builtins.bool = ...,
         records: _builtins.bool = ...,
         history: _builtins.int = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "listed", b"listed", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "listed", b"listed", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
-    _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch", "saved"]  # noqa: Y015
+    _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch", "saved", "listed"]  # noqa: Y015
     _WhichOneofArgType_start: _TypeAlias = _typing.Literal["start", b"start"]  # noqa: Y015
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType_seeds) -> _WhichOneofReturnType_seeds | None: ...
