@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 /// Play tournaments of known skills and count how often the order of neighbours is called certain.
 ///
-/// Games have four players and give 5, 3, 1, 0 by place. Places follow random performances around
+/// Games have four players and give 5, 3, 1, 0 by place, or two players and 1, 0. Places follow random performances around
 /// the skills; a lead of 5.9 wins 73 % of two-player games. Of neighbours of equal skill at most
 /// one pair in twenty should reach 95 %. The same seed gives the same output.
 #[derive(Debug, Parser)]
@@ -47,7 +47,8 @@ struct Kind {
     groups: usize,
 }
 
-const KINDS: [Kind; 5] = [
+const KINDS: [Kind; 6] = [
+    kind("2 equal, games of two", Format::RoundRobin, 2, 1),
     kind("4 equal, one table", Format::RoundRobin, 4, 1),
     kind("8 equal, Swiss", Format::Swiss, 8, 1),
     kind("24 equal, Swiss", Format::Swiss, 24, 1),
@@ -121,6 +122,10 @@ fn play(kind: Kind, chance: &mut ChaCha8Rng, found: &mut [Found; ROUNDS.len()]) 
     let skill = |who: usize| (who / kind.size) as f64 * LEAD;
     let mut settings = settings(kind.format);
     settings.rounds = ROUNDS.last().copied();
+    if kind.size * kind.groups < settings.players {
+        settings.players = 2;
+        settings.points = vec![1, 0];
+    }
     chance.fill_bytes(&mut settings.draw_seed);
     let mut tournament = begun(settings, repeat_n(None, kind.size * kind.groups));
     for round in 1..=ROUNDS[ROUNDS.len() - 1] {
@@ -251,9 +256,9 @@ mod tests {
 
     #[test]
     fn equals_are_called_certain_no_more_often_than_stated() {
-        // One table and a small Swiss tournament of equals, and one table of different participants.
+        // Two, one table and a small Swiss tournament of equals, and one table of different ones.
         let tournaments = 200;
-        let rows = rows(&[KINDS[0], KINDS[1], KINDS[3]], tournaments, 3);
+        let rows = rows(&[KINDS[1], KINDS[0], KINDS[2], KINDS[4]], tournaments, 3);
         for row in rows.iter().filter(|row| row.kind.groups == 1) {
             for (reached, level) in row.found.equal.iter().zip(LEVELS) {
                 // The pairs of a tournament are not independent: counts tournaments.

@@ -12,8 +12,10 @@
 //! The standings themselves decide who is the upper participant, so a test of "the upper one is
 //! better" that ignores this finds twice as many differences between equals as it admits. The
 //! confidence is therefore two-sided: of equal participants, at most one pair in twenty reaches
-//! 95 %. Nor is it ever higher than a few occasions allow: n tosses of a coin all show the same
-//! side with probability 2^(1 - n), so four occasions give at most 87.5 %.
+//! 95 %. If both played equally often on every occasion, it comes from exchanging their scores,
+//! which is exact, else from Student's distribution. It is never higher than a few occasions allow:
+//! n tosses of a coin all show the same side with probability 2^(1 - n), so four occasions give at
+//! most 87.5 %.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,6 +67,9 @@ pub const SURE: f64 = 0.95;
 /// 95 % of a normal distribution lie within this many deviations of the mean.
 const Z_SURE: f64 = 1.959_963_984_540_054;
 
+/// Sum of the absolute differences up to which [`by_exchange`] computes: some hundred occasions.
+const MOST_EXACT: i64 = 1000;
+
 /// Scores are whole numbers, so a smaller standard error is a rounding error.
 const ROUNDING: f64 = 1e-9;
 
@@ -86,12 +91,12 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
         };
     }
     let standard_error = standard_error(upper, lower, means);
-    // Without a standard error all occasions agree.
-    let as_different = match standard_error > 0.0 {
+    let by_chance = by_exchange(upper, lower).unwrap_or_else(|| match standard_error > 0.0 {
         true => 2.0 * below(-difference.abs() / standard_error, few - 1),
+        // All occasions agree.
         false => 0.0,
-    };
-    let by_chance = as_different.max(all_the_same(few));
+    });
+    let by_chance = by_chance.max(all_the_same(few));
     let confidence = match difference.total_cmp(&0.0) {
         std::cmp::Ordering::Greater => (1.0 - by_chance).max(0.5),
         std::cmp::Ordering::Less => by_chance.min(0.5),
@@ -110,6 +115,40 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
             by_error.max(by_occasions).ceil().max(1.0) as u64
         }),
     }
+}
+
+/// The probability of at least this difference, in either direction, if the two exchanged their
+/// scores on each occasion with a toss of a coin: exact for equal participants (Fisher's
+/// randomisation test). `None` unless both played equally often on every occasion for whole
+/// numbers, and not for so many that computing it is long; then Student's distribution will do.
+fn by_exchange(upper: &[Scored], lower: &[Scored]) -> Option<f64> {
+    let mut by_occasion: BTreeMap<u64, (i64, i64)> = BTreeMap::new();
+    for (scores, sign) in [(upper, 1), (lower, -1)] {
+        for scored in scores {
+            let (games, difference) = by_occasion.entry(scored.occasion).or_default();
+            let whole = (scored.score.fract() == 0.0).then_some(scored.score as i64)?;
+            (*games, *difference) = (*games + sign, *difference + sign * whole);
+        }
+    }
+    let differences: Vec<i64> = (by_occasion.values())
+        .map(|&(games, difference)| (games == 0).then_some(difference))
+        .collect::<Option<_>>()?;
+    let most: i64 = differences.iter().map(|difference| difference.abs()).sum();
+    if most > MOST_EXACT {
+        return None;
+    }
+    let mut sums = BTreeMap::from([(0, 1.0)]);
+    for difference in &differences {
+        let mut next: BTreeMap<i64, f64> = BTreeMap::new();
+        for (sum, probability) in sums {
+            *next.entry(sum + difference).or_default() += 0.5 * probability;
+            *next.entry(sum - difference).or_default() += 0.5 * probability;
+        }
+        sums = next;
+    }
+    let found = differences.iter().sum::<i64>().abs();
+    let as_large = sums.iter().filter(|(sum, _)| sum.abs() >= found);
+    Some(as_large.map(|(_, probability)| probability).sum())
 }
 
 /// The probability that this many tosses of a coin all show the same side: no difference found on
@@ -240,14 +279,26 @@ mod tests {
         // The differences are 2, 2, 2, 1, 0: mean 1.4, variance 0.8.
         close(sure.difference, 1.4);
         close(sure.standard_error, (0.8f64 / 5.0).sqrt());
-        // 3.5 standard errors, 4 degrees of freedom: 97.5 %, but these are only five occasions.
-        assert_eq!((sure.confidence, sure.more_games), (0.9375, Some(1)));
-        let longer = |values: &[f64]| scores(0, &[values, &[3.0, 3.0]].concat());
-        let sure = order_confidence(&longer(&UPPER), &longer(&LOWER));
-        // The differences have the mean 1 and the variance 1: 2.65 standard errors, 6 degrees.
-        close(sure.difference, 1.0);
-        assert!((sure.confidence - 0.961_756).abs() < 1e-5, "{sure:?}");
-        assert_eq!(sure.more_games, None);
+        // Of the 16 ways to exchange four of them, two are as extreme.
+        assert_eq!((sure.confidence, sure.more_games), (0.875, Some(1)));
+        let longer = |score: f64| [UPPER.map(|_| 3.0), UPPER.map(|_| score)].concat();
+        let with =
+            |score: f64| order_confidence(&scores(0, &longer(score)), &scores(0, &[1.0; 10]));
+        assert_eq!(
+            (with(3.0).confidence, with(3.0).more_games),
+            (1.0 - 1.0 / 512.0, None)
+        );
+        assert_eq!(with(1.0).confidence, 0.9375);
+        assert_eq!((with(-1.0).difference, with(-1.0).confidence), (0.0, 0.5));
+    }
+
+    #[test]
+    fn many_common_occasions_are_paired_by_their_error() {
+        let many = |values: &[f64]| scores(0, &values.repeat(400));
+        let sure = order_confidence(&many(&[3.0, 1.0]), &many(&[1.0, 2.9]));
+        // Differences of 2 and -1.9: mean 0.05, variance 3.80; 800 occasions.
+        close(sure.difference, 0.05);
+        assert!((sure.confidence - 0.532).abs() < 1e-3, "{sure:?}");
     }
 
     #[test]
