@@ -238,7 +238,8 @@ class VectorEnv:
         """Returns the complete states of games: everything that determines how they continue.
 
         A state has the cards of all seats: keep it from the agents that play. It is opaque, and the same on all platforms and on
-        both ways to the games. It has less than 2 KB, and with `records=True` also the decisions so far.
+        both ways to the games. It has less than 2 KB (by default some 420 bytes), and 5 bytes for each action of a history; with
+        `records=True` also the decisions so far.
 
         Args:
             games: the games, 0..n-1, in any order, for instance `batch.games[rows]`; None: all.

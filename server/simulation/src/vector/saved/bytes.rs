@@ -4,12 +4,12 @@
 //! - the terms: rule set, agents, reward scheme, decisions, invalid actions, what is kept;
 //! - u64 index, and whether a game is running; if so:
 //! - the game: its seed, the engine's state, positions of generators, statistics, pending rewards,
-//!   the open decision, kept decisions;
+//!   the open decision, kept decisions, the history;
 //! - u32 CRC-32 of all bytes before, which finds damage.
 //!
 //! Bytes are not trusted, with a right checksum or without: reading checks every value, and the
-//! engine refuses states that no game can have. A state without kept decisions has less than
-//! 2 KB; kept decisions take at least 7 bytes each.
+//! engine refuses states that no game can have. A state has less than 2 KB, plus 5 bytes for each
+//! entry of a history and at least 7 for each kept decision.
 
 use std::num::NonZeroU32;
 

@@ -569,8 +569,8 @@ Global___VectorRestore: _TypeAlias = VectorRestore  # noqa: Y015
 class VectorStates(_message.Message):
     """States of games: everything that determines how a game continues, the cards of all seats
     included. They are for the client that owns the games; keep them from those who play in them. A
-    state is opaque, versioned and the same on all platforms, and has less than 2 KB, plus at least 7
-    bytes for each decision kept for a record.
+    state is opaque, versioned and the same on all platforms, and has less than 2 KB, plus 5 bytes
+    for each action of a history and at least 7 for each decision kept for a record.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
