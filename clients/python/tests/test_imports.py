@@ -100,4 +100,6 @@ def test_gymnasium_finds_the_environments_by_name() -> None:
     assert run(f"{start}{start}import gymnasium\n{specs}") == expected
     assert run(f"import gymnasium\n{start}{specs}") == expected
     assert run(f"{start}import chefshat.envs, gymnasium\n{specs}") == expected
+    look = "import importlib.util; importlib.util.find_spec('gymnasium.envs.registration')\n"
+    assert run(f"{start}{look}import gymnasium\n{specs}") == expected
     assert run(f"{start}{LOADED}", "gymnasium", "numpy", "importlib.machinery") in ("", "importlib.machinery")

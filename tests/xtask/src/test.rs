@@ -43,7 +43,8 @@ pub(crate) fn run(
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
 
     let deployment = wants(Part::Deployment);
-    if has_python && (wants(Part::Rust) || wants(Part::Python) || deployment) {
+    let needs_python = has_python && (wants(Part::Rust) || wants(Part::Python) || deployment);
+    if needs_python {
         steps.run("set up Python", || setup::python_packages(places))?;
     }
     if has_node && (wants(Part::Rust) || wants(Part::Node) || deployment) {
@@ -66,7 +67,7 @@ pub(crate) fn run(
     ];
     steps.program("build", cargo_command(places).args(build))?;
 
-    if has_python {
+    if needs_python {
         steps.run("install the native module", || setup::native_module(places))?;
     }
 

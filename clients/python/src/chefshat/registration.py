@@ -31,19 +31,26 @@ def register(registry: "ModuleType") -> None:
 class _Finder:
     """A finder of modules that registers the environments after Gymnasium's registry has been imported."""
 
-    def find_spec(self, name: str, path: "Sequence[str] | None" = None, target: "ModuleType | None" = None) -> "ModuleSpec | None":
-        if name != _REGISTRY:
-            return None
-        from importlib.machinery import PathFinder
+    _searching = False
 
-        sys.meta_path.remove(self)
-        spec = PathFinder.find_spec(name, path, target)
+    def find_spec(self, name: str, path: "Sequence[str] | None" = None, target: "ModuleType | None" = None) -> "ModuleSpec | None":
+        if name != _REGISTRY or self._searching:
+            return None
+        from importlib.util import find_spec
+
+        self._searching = True
+        try:
+            spec = find_spec(name)
+        finally:
+            self._searching = False
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
             def execute_and_register(module: "ModuleType") -> None:
                 execute(module)
                 register(module)
+                if self in sys.meta_path:
+                    sys.meta_path.remove(self)
 
             spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
         return spec
