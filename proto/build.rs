@@ -16,7 +16,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let encoded = descriptors.encode_to_vec();
     write(&out.join("descriptors.bin"), &encoded)?;
+    let services = std::env::var_os("CARGO_FEATURE_SERVICES").is_some();
     tonic_prost_build::configure()
+        .build_client(services)
+        .build_server(services)
         .compile_well_known_types(true)
         .extern_path(".google.protobuf", "::pbjson_types")
         // Rare and large: boxed, so that the frequent variants beside them stay small.

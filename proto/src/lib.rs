@@ -1,6 +1,6 @@
-//! The `chefshat.v1` protocol: messages, service traits and clients, generated from the `.proto`
-//! files beside this crate, with the canonical JSON form of every message (serde). The
-//! documentation of each item is the comment in its `.proto` file.
+//! The `chefshat.v1` protocol: messages, with the canonical JSON form of every message (serde), and
+//! with the feature `services` the service traits and clients, generated from the `.proto` files
+//! beside this crate. The documentation of each item is the comment in its `.proto` file.
 
 /// Everything of package `chefshat.v1`.
 #[allow(
@@ -11,7 +11,7 @@
     reason = "generated code"
 )]
 pub mod v1 {
-    tonic::include_proto!("chefshat.v1");
+    include!(concat!(env!("OUT_DIR"), "/chefshat.v1.rs"));
     include!(concat!(env!("OUT_DIR"), "/chefshat.v1.serde.rs"));
 }
 

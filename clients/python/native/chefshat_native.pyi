@@ -6,7 +6,7 @@
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
@@ -19,15 +19,26 @@ class Games:
     """Many games of one client, stepped together."""
 
     @staticmethod
-    def begin(setup: bytes) -> tuple[Games, Batch]:
-        """Begins the games of a serialized `VectorSetup`; returns them with their first batch."""
+    def begin(setup: bytes, threads: int = 0) -> tuple[Games, Batch]:
+        """Begins the games of a serialized `VectorSetup`; returns them with their first batch.
+
+        `threads`: 0 for as many as there are cores. The games are the same with any number of them.
+        """
 
     @property
     def started(self) -> bytes:
         """The serialized `VectorStarted`."""
 
-    def step(self, actions: NDArray[np.uint16]) -> Batch:
-        """Takes one action for each row of the latest batch and returns the next batch."""
+    @property
+    def layouts(self) -> dict[str, dict[str, int]]:
+        """For each table the bytes of a row before each column."""
+
+    def step(self, actions: ArrayLike) -> Batch:
+        """Takes one action for each row of the latest batch and returns the next batch.
+
+        Raises TypeError for anything but an array of uint16 or int64, and ValueError if there is not one action for each row, or a
+        number that is no action. Then the games are unchanged.
+        """
 
     def reset(self, reset: bytes) -> Batch:
         """Executes a serialized `VectorReset` and returns the next batch."""
@@ -46,7 +57,7 @@ class Games:
 class Batch:
     """The open decisions, and what happened since the previous batch.
 
-    A table is the number of its rows, its columns one after the other, and where each begins. Every table is handed over once.
+    A table is the number of its rows, and its columns one after the other. Every table is handed over once.
     """
 
     @property
@@ -61,16 +72,16 @@ class Batch:
     def done(self) -> bool:
         """Whether all games are over and none follows."""
 
-    def decisions(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+    def decisions(self) -> tuple[int, NDArray[np.uint8]]:
         """Hands over the open decisions."""
 
-    def endings(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+    def endings(self) -> tuple[int, NDArray[np.uint8]]:
         """Hands over the episodes that have ended."""
 
-    def beginnings(self) -> tuple[int, NDArray[np.uint8], dict[str, int]]:
+    def beginnings(self) -> tuple[int, NDArray[np.uint8]]:
         """Hands over the games that have begun."""
 
-    def shifts(self) -> tuple[int, NDArray[np.uint8], dict[str, int]] | None:
+    def shifts(self) -> tuple[int, NDArray[np.uint8]] | None:
         """Hands over the Shifts that have ended, if statistics are enabled."""
 
     def totals(self) -> tuple[int, int, int, int, int]:

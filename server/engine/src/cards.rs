@@ -108,15 +108,27 @@ impl Cards {
         (faces != 0).then(|| Face::of(((63 - faces.leading_zeros()) / BITS) as u8 + 1))
     }
 
+    /// [`Cards::counts`] as an array, with zeros after the F+1 numbers.
+    #[inline]
+    pub fn count_array(self, faces: u8) -> [u8; MAX_FACES as usize + 1] {
+        let cards = self.0 & FACE_BITS;
+        let odd = (cards & LOW_NIBBLES).to_le_bytes();
+        let even = ((cards >> BITS) & LOW_NIBBLES).to_le_bytes();
+        let mut counts = [0; MAX_FACES as usize + 1];
+        for pair in 0..8 {
+            counts[2 * pair] = odd[pair];
+            counts[2 * pair + 1] = even[pair];
+        }
+        counts[usize::from(faces)] = self.jokers();
+        counts
+    }
+
     /// The counts of a deck with this many faces: faces 1..=F ascending, then jokers, F+1 numbers.
+    #[inline]
     pub fn counts(self, faces: u8) -> impl ExactSizeIterator<Item = u8> {
-        (0..faces + 1).map(move |index| {
-            if index == faces {
-                self.jokers()
-            } else {
-                self.count_of(index + 1)
-            }
-        })
+        self.count_array(faces)
+            .into_iter()
+            .take(usize::from(faces) + 1)
     }
 
     /// The cards ascending: faces by their number, then F+1 for each joker.

@@ -3,15 +3,16 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
+use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, ActionSpace};
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Batch as Columns, VectorGames};
+use chefshat_simulation::vector::{Batch as Columns, Decisions, VectorGames, VectorSetup};
 use chefshat_vector::{
     Limits, Request, RequestError, record_lines, saved_to_proto, seeds_from_setup,
     setup_from_proto, start_from_proto, started_to_proto,
 };
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods as _};
 use prost::Message;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
@@ -19,7 +20,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use rand::TryRng as _;
 
-use crate::tables::{Batch, Record};
+use crate::tables::{Batch, Record, layouts};
+use crate::threads::pool;
 
 /// As a server's, so that a setup that is accepted here is accepted there.
 const LIMITS: Limits = Limits {
@@ -27,6 +29,9 @@ const LIMITS: Limits = Limits {
     recorded_games: 256,
     recorded_shifts: 1_000,
 };
+
+/// Most games whose step is fast.
+const MAX_FAST_GAMES: u32 = 8;
 
 create_exception!(
     chefshat_native,
@@ -42,29 +47,40 @@ pub(crate) struct Games {
     /// `None` once a step has failed for good.
     state: Mutex<Option<VectorGames>>,
     started: Vec<u8>,
+    /// Whether a step takes less time than others would wait for the interpreter.
+    is_fast: bool,
+    threads: usize,
 }
 
 #[pymethods]
 impl Games {
     /// Begins the games of a serialized `VectorSetup`; returns them with their first batch.
+    /// `threads`: 0 for as many as there are cores.
     #[staticmethod]
-    fn begin(py: Python<'_>, setup: &[u8]) -> PyResult<(Self, Batch)> {
+    #[pyo3(signature = (setup, threads = 0))]
+    fn begin(py: Python<'_>, setup: &[u8], threads: usize) -> PyResult<(Self, Batch)> {
         let message = decode::<v1::VectorSetup>("setup", setup)?;
+        let pool = pool(threads);
         let begun = py.detach(|| {
             caught(|| {
                 let seeds = seeds_from_setup(&message, &LIMITS, random_seed)?;
                 let (rules, start) = start_from_proto(&message)?.ok_or_else(no_records_here)?;
                 let setup = setup_from_proto(&message, rules, start, seeds, &LIMITS)?;
                 let started = started_to_proto(&setup).encode_to_vec();
-                let (games, mut columns) = VectorGames::new(setup);
+                let (games, mut columns) = VectorGames::on(setup, pool);
                 let records = records(&games, &mut columns);
                 Ok((games, started, columns, records))
             })
         });
         let (games, started, columns, records) = begun?.map_err(|error| refused(py, error))?;
         let batch = Batch::new(columns, records, games.setup());
-        let state = Mutex::new(Some(games));
-        Ok((Self { state, started }, batch))
+        let handle = Self {
+            is_fast: games.setup().games() <= MAX_FAST_GAMES && only_fast_agents(games.setup()),
+            state: Mutex::new(Some(games)),
+            started,
+            threads,
+        };
+        Ok((handle, batch))
     }
 
     /// The serialized `VectorStarted`.
@@ -73,11 +89,36 @@ impl Games {
         PyBytes::new(py, &self.started)
     }
 
-    /// Takes one action for each row of the latest batch and returns the next batch.
-    fn step(&self, py: Python<'_>, actions: PyReadonlyArray1<'_, u16>) -> PyResult<Batch> {
-        let actions = actions.as_array().into_iter().copied();
-        let request = Request::Actions(actions.map(ActionId::new).collect());
-        self.execute(py, request)
+    /// For each table the bytes of a row before each column.
+    #[getter]
+    fn layouts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let state = self.lock()?;
+        layouts(py, state.as_ref().ok_or_else(|| ended(py))?.setup())
+    }
+
+    /// Takes one action for each row of the latest batch and returns the next batch. Raises
+    /// `TypeError` for anything but an array of uint16 or int64, and `ValueError` if there is not
+    /// one action for each row, or a number that is no action; then the games are unchanged.
+    fn step(&self, py: Python<'_>, actions: &Bound<'_, PyAny>) -> PyResult<Batch> {
+        let actions = if let Ok(actions) = actions.cast::<PyArray1<u16>>() {
+            let actions = actions.try_readonly()?;
+            actions
+                .as_array()
+                .iter()
+                .copied()
+                .map(ActionId::new)
+                .collect()
+        } else if let Ok(actions) = actions.cast::<PyArray1<i64>>() {
+            let actions = actions.try_readonly()?;
+            let actions = actions.as_array();
+            let action = |number: &i64| u16::try_from(*number).map(ActionId::new);
+            actions.iter().map(action).collect::<Result<_, _>>()?
+        } else {
+            return Err(PyTypeError::new_err(
+                "actions are an array of uint16 or int64",
+            ));
+        };
+        self.execute(py, Request::Actions(actions))
     }
 
     /// Executes a serialized `VectorReset` and returns the next batch.
@@ -126,29 +167,43 @@ impl Games {
 }
 
 impl Games {
-    /// Executes a request without holding the interpreter.
+    /// Executes a request. Long ones do not hold the interpreter.
     fn execute(&self, py: Python<'_>, request: Request) -> PyResult<Batch> {
         let mut state = self.lock()?;
-        // Taken out: it does not return if the step fails for good.
-        let mut games = state.take().ok_or_else(|| ended(py))?;
-        let done = py.detach(|| {
-            caught(move || {
-                let stepped = request.execute(&mut games).map(|mut columns| {
-                    let records = records(&games, &mut columns);
-                    (columns, records)
-                });
-                (games, stepped)
-            })
-        });
-        let (games, stepped) = done?;
-        match stepped {
-            Ok((columns, records)) => {
-                let batch = Batch::new(columns, records, games.setup());
-                *state = Some(games);
-                Ok(batch)
+        let games = state.as_mut().ok_or_else(|| ended(py))?;
+        if let Request::Actions(actions) = &request {
+            let size = games.setup().rules().actions().size();
+            let known = actions.iter().all(|action| action.index() < size);
+            if actions.len() != games.rows() || !known {
+                return Err(PyValueError::new_err("give one action for each row"));
             }
-            // As over the network, a refused request ends the games.
-            Err(error) => Err(refused(py, error)),
+        }
+        if !self.is_fast {
+            // That of this process, which may have been forked.
+            games.set_pool(pool(self.threads));
+        }
+        let work = || {
+            caught(|| {
+                let mut columns = request.execute(games)?;
+                let records = records(games, &mut columns);
+                Ok(Batch::new(columns, records, games.setup()))
+            })
+        };
+        let done = match self.is_fast {
+            true => work(),
+            false => py.detach(work),
+        };
+        match done {
+            Ok(Ok(batch)) => Ok(batch),
+            // As over the network, a refused request ends the games; so does a panic.
+            Ok(Err(error)) => {
+                *state = None;
+                Err(refused(py, error))
+            }
+            Err(panic) => {
+                *state = None;
+                Err(panic)
+            }
         }
     }
 
@@ -171,6 +226,17 @@ pub(crate) fn action_texts(faces: u8) -> PyResult<Vec<String>> {
         .ok_or_else(|| PyValueError::new_err(format!("{faces} is not in 4..=15")))?;
     let texts = (0..space.size()).filter_map(|index| space.text(ActionId::new(index)));
     Ok(texts.collect())
+}
+
+/// Whether all built-in agents decide in less than a microsecond.
+fn only_fast_agents(setup: &VectorSetup) -> bool {
+    let others = match setup.decisions() {
+        Decisions::Turns { others } => others,
+        Decisions::All => None,
+    };
+    let agents = setup.agents().values().copied().chain([others]);
+    let fast = [AgentKind::Random, AgentKind::Greedy];
+    agents.flatten().all(|agent| fast.contains(&agent))
 }
 
 /// The records of games that ended, taken from their columns.

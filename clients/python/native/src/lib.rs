@@ -2,10 +2,12 @@
 //! same columns as `VectorService`. Setups, resets and records are the protocol's messages, so that
 //! there is one contract for every way to the games.
 //!
-//! `games` has the class that steps games, `tables` their batches as numpy arrays.
+//! `games` has the class that steps games, `tables` their batches as numpy arrays, `threads` the
+//! pools of threads.
 
 mod games;
 mod tables;
+mod threads;
 
 use pyo3::prelude::*;
 

@@ -2,13 +2,18 @@
 //! numbers of eight and four bytes first so that all are aligned. Python creates a column as a view
 //! of it when it is first used.
 
-use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use chefshat_simulation::vector::{Batch as Columns, ObservationColumns, VectorSetup};
 use numpy::{PyArray1, PyArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
+
+/// Columns by name, in the order in which they are packed.
+type Named<T> = Vec<(&'static str, T)>;
+
+/// The number of a table's rows, and its columns one after the other.
+type Table<'py> = (u32, Bound<'py, PyArray1<u8>>);
 
 /// The record of a game that ended.
 #[derive(Debug)]
@@ -17,6 +22,44 @@ pub(crate) struct Record {
     pub(crate) index: u64,
     /// Serialized `RecordLine`s.
     pub(crate) lines: Vec<Vec<u8>>,
+}
+
+/// For each table the bytes of a row before each column: a column begins at as many for each row.
+pub(crate) fn layouts<'py>(py: Python<'py>, setup: &VectorSetup) -> PyResult<Bound<'py, PyDict>> {
+    let rules = setup.rules();
+    let (cards, seats) = (usize::from(rules.faces()) + 1, rules.players());
+    let mask = usize::from(rules.actions().size()).div_ceil(8);
+    let widths = |name| match name {
+        "indices" => 8,
+        "games" | "attempts" | "rewards" | "shifts" | "pizzas" | "laps" | "turns" => 4,
+        "points" | "valid" | "wrong" | "passes" | "reward_sums" | "performance" => 4 * seats,
+        "cards_left" | "passed" | "places" | "roles" => seats,
+        "hands" | "played" | "gave" | "received" => cards,
+        "mask_bits" => mask,
+        "boards" => 3,
+        "history" => 2 * usize::from(setup.history()),
+        "history_counts" => 4 * usize::from(setup.history().min(1)),
+        "seeds" => 32,
+        _ => 1,
+    };
+    let mut empty = Columns::default();
+    let tables = [
+        ("decisions", decisions(&mut empty)),
+        ("endings", endings(&mut empty)),
+        ("beginnings", beginnings(&mut empty)),
+        ("shifts", shifts(&mut empty)),
+    ];
+    let layouts = PyDict::new(py);
+    for (table, columns) in tables {
+        let layout = PyDict::new(py);
+        let mut before = 0;
+        for (name, _) in columns {
+            layout.set_item(name, before)?;
+            before += widths(name);
+        }
+        layouts.set_item(table, layout)?;
+    }
+    Ok(layouts)
 }
 
 /// The open decisions, and what happened since the previous batch.
@@ -37,84 +80,30 @@ pub(crate) struct Batch {
     records: Vec<Record>,
 }
 
-/// A table: the number of its rows, its columns one after the other, and where each begins.
-type Table<'py> = (u32, Bound<'py, PyArray1<u8>>, BTreeMap<&'static str, usize>);
-
 #[pymethods]
 impl Batch {
     /// Hands over the open decisions. Every table is handed over once.
     fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
-        let mut all = self.columns();
-        let seen = std::mem::take(&mut all.observations);
-        let mut columns = vec![
-            ("games", std::mem::take(&mut all.games)),
-            ("attempts", std::mem::take(&mut all.attempts)),
-            ("rewards", std::mem::take(&mut all.rewards)),
-        ];
-        let small = vec![
-            ("seats", std::mem::take(&mut all.seats)),
-            ("kinds", std::mem::take(&mut all.kinds)),
-            ("mask_bits", std::mem::take(&mut all.masks)),
-        ];
-        observed(&mut columns, small, seen);
-        table(py, all.rows, columns)
+        packed(py, self.rows, decisions(&mut self.columns()))
     }
 
     /// Hands over the episodes that have ended.
     fn endings<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
-        let ended = std::mem::take(&mut self.columns().endings);
-        let mut columns = vec![
-            ("indices", ended.indices),
-            ("games", ended.games),
-            ("rewards", ended.rewards),
-        ];
-        let small = vec![
-            ("seats", ended.seats),
-            ("ends", ended.ends),
-            ("game_over", ended.game_over),
-            ("places_taken", ended.places_taken),
-        ];
-        observed(&mut columns, small, ended.observations);
-        table(py, ended.rows, columns)
+        let mut columns = self.columns();
+        packed(py, columns.endings.rows, endings(&mut columns))
     }
 
     /// Hands over the games that have begun.
     fn beginnings<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
-        let begun = std::mem::take(&mut self.columns().beginnings);
-        let columns = vec![
-            ("indices", begun.indices),
-            ("games", begun.games),
-            ("seeds", begun.seeds),
-        ];
-        table(py, begun.rows, columns)
+        let mut columns = self.columns();
+        packed(py, columns.beginnings.rows, beginnings(&mut columns))
     }
 
     /// Hands over the Shifts that have ended, if statistics are enabled.
     fn shifts<'py>(&self, py: Python<'py>) -> PyResult<Option<Table<'py>>> {
-        if !self.statistics {
-            return Ok(None);
-        }
-        let shifts = std::mem::take(&mut self.columns().shifts);
-        let columns = vec![
-            ("indices", shifts.indices),
-            ("games", shifts.games),
-            ("shifts", shifts.shifts),
-            ("pizzas", shifts.pizzas),
-            ("laps", shifts.laps),
-            ("turns", shifts.turns),
-            ("points", shifts.points),
-            ("valid", shifts.valid),
-            ("wrong", shifts.wrong),
-            ("passes", shifts.passes),
-            ("reward_sums", shifts.reward_sums),
-            ("performance", shifts.performance),
-            ("starters", shifts.starters),
-            ("special_actions", shifts.special_actions),
-            ("adjudicated", shifts.adjudicated),
-            ("game_winners", shifts.game_winners),
-            ("places", shifts.places),
-        ];
-        table(py, shifts.rows, columns).map(Some)
+        let mut columns = self.columns();
+        let table = |columns: &mut Columns| packed(py, columns.shifts.rows, shifts(columns));
+        self.statistics.then(|| table(&mut columns)).transpose()
     }
 
     /// Decisions of the client and of all seats, invalid attempts of the client, Shifts and games,
@@ -160,21 +149,88 @@ impl Batch {
     }
 }
 
-/// Adds the columns of observations, and after them the caller's of one byte.
+/// Takes the open decisions.
+fn decisions(batch: &mut Columns) -> Named<Vec<u8>> {
+    let seen = std::mem::take(&mut batch.observations);
+    let wide = vec![
+        ("games", std::mem::take(&mut batch.games)),
+        ("attempts", std::mem::take(&mut batch.attempts)),
+        ("rewards", std::mem::take(&mut batch.rewards)),
+    ];
+    let narrow = vec![
+        ("seats", std::mem::take(&mut batch.seats)),
+        ("kinds", std::mem::take(&mut batch.kinds)),
+        ("mask_bits", std::mem::take(&mut batch.masks)),
+    ];
+    observed(wide, narrow, seen)
+}
+
+/// Takes the episodes that have ended.
+fn endings(batch: &mut Columns) -> Named<Vec<u8>> {
+    let ended = std::mem::take(&mut batch.endings);
+    let wide = vec![
+        ("indices", ended.indices),
+        ("games", ended.games),
+        ("rewards", ended.rewards),
+    ];
+    let narrow = vec![
+        ("seats", ended.seats),
+        ("ends", ended.ends),
+        ("game_over", ended.game_over),
+        ("places_taken", ended.places_taken),
+    ];
+    observed(wide, narrow, ended.observations)
+}
+
+/// Takes the games that have begun.
+fn beginnings(batch: &mut Columns) -> Named<Vec<u8>> {
+    let begun = std::mem::take(&mut batch.beginnings);
+    vec![
+        ("indices", begun.indices),
+        ("games", begun.games),
+        ("seeds", begun.seeds),
+    ]
+}
+
+/// Takes the Shifts that have ended.
+fn shifts(batch: &mut Columns) -> Named<Vec<u8>> {
+    let shifts = std::mem::take(&mut batch.shifts);
+    vec![
+        ("indices", shifts.indices),
+        ("games", shifts.games),
+        ("shifts", shifts.shifts),
+        ("pizzas", shifts.pizzas),
+        ("laps", shifts.laps),
+        ("turns", shifts.turns),
+        ("points", shifts.points),
+        ("valid", shifts.valid),
+        ("wrong", shifts.wrong),
+        ("passes", shifts.passes),
+        ("reward_sums", shifts.reward_sums),
+        ("performance", shifts.performance),
+        ("starters", shifts.starters),
+        ("special_actions", shifts.special_actions),
+        ("adjudicated", shifts.adjudicated),
+        ("game_winners", shifts.game_winners),
+        ("places", shifts.places),
+    ]
+}
+
+/// Columns of situations: of four and more bytes, and of one byte, among them those observed.
 fn observed(
-    columns: &mut Vec<(&'static str, Vec<u8>)>,
-    small: Vec<(&'static str, Vec<u8>)>,
+    mut wide: Named<Vec<u8>>,
+    narrow: Named<Vec<u8>>,
     seen: ObservationColumns,
-) {
-    columns.extend([
+) -> Named<Vec<u8>> {
+    wide.extend([
         ("shifts", seen.shifts),
         ("pizzas", seen.pizzas),
         ("points", seen.points),
         ("history_counts", seen.history_counts),
         ("history", seen.history),
     ]);
-    columns.extend(small);
-    columns.extend([
+    wide.extend(narrow);
+    wide.extend([
         ("hands", seen.hands),
         ("golden", seen.golden),
         ("boards", seen.boards),
@@ -186,22 +242,17 @@ fn observed(
         ("gave", seen.gave),
         ("received", seen.received),
     ]);
+    wide
 }
 
-fn table<'py>(
-    py: Python<'py>,
-    rows: u32,
-    columns: Vec<(&'static str, Vec<u8>)>,
-) -> PyResult<Table<'py>> {
+fn packed<'py>(py: Python<'py>, rows: u32, columns: Named<Vec<u8>>) -> PyResult<Table<'py>> {
     let size = columns.iter().map(|(_, column)| column.len()).sum();
     let mut bytes = Vec::with_capacity(size);
-    let mut offsets = BTreeMap::new();
-    for (name, column) in columns {
-        offsets.insert(name, bytes.len());
+    for (_, column) in columns {
         bytes.extend(column);
     }
     let bytes = PyArray1::from_vec(py, bytes);
     // Columns are views of it, and as read-only as those of a message.
     bytes.try_readwrite()?.make_nonwriteable();
-    Ok((rows, bytes, offsets))
+    Ok((rows, bytes))
 }

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chefshat import pb
 from chefshat.address import ServerAddress
@@ -25,8 +25,11 @@ class Games(Protocol):
     def first(self) -> Batch:
         """Returns the first batch. Call it once, before the other methods."""
 
-    def step(self, actions: NDArray[np.uint16]) -> Batch:
-        """Takes the action of each row of the latest batch and returns the next batch."""
+    def step(self, actions: ArrayLike, batch: Batch) -> Batch:
+        """Takes the action of each row of the latest batch and returns the next batch.
+
+        Raises TypeError or ValueError for actions that are not `checked`. Then the games are unchanged.
+        """
 
     def reset(self, request: pb.VectorReset) -> Batch:
         """Abandons games, starts new ones and returns the next batch."""
@@ -45,3 +48,18 @@ class Games(Protocol):
 
     def close(self) -> None:
         """Ends the games."""
+
+
+def checked(actions: ArrayLike, batch: Batch) -> NDArray[np.uint16]:
+    """Checks and encodes the actions for a batch."""
+    array, rows, size = np.asarray(actions), len(batch), batch.sizes.num_actions
+    if array.shape != (rows,) or (rows and array.dtype.kind not in "iu"):
+        given = f"{array.dtype} of the shape {array.shape}"
+        raise ValueError(f"give one action for each row of the batch: integers of the shape ({rows},), not {given}")
+    if rows:
+        wrong = int(array.argmax())
+        if array[wrong] < size:
+            wrong = int(array.argmin())
+        if not 0 <= array[wrong] < size:
+            raise ValueError(f"row {wrong} has the action {array[wrong]}; actions are 0..={size - 1}")
+    return array.astype("<u2", copy=False)

@@ -1,13 +1,15 @@
 """Games that this process plays for a `VectorEnv`, with the native engine (the package `chefshat-native`)."""
 
 from collections.abc import Mapping, Sequence
-from typing import NoReturn, TypeVar
+from functools import cached_property
+from typing import Any, NoReturn, TypeVar
 
 import chefshat_native
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chefshat import pb
+from chefshat._games import checked
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Packed, ShiftStatistics, Sizes, Table, Totals
@@ -16,30 +18,54 @@ from chefshat.errors import ChefsHatError
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
-class NativeContent:
-    """The content of a batch of the engine."""
+class NativeBatch(Batch):
+    """A batch of the engine. Its tables are created on first use."""
 
-    def __init__(self, batch: chefshat_native.Batch) -> None:
-        self._batch = batch
-        self.step = batch.step
-        self.done = batch.done
+    def __init__(self, native: chefshat_native.Batch, sizes: Sizes, layouts: Mapping[str, Mapping[str, int]]) -> None:
+        # Not the constructor of the class above: a step in this process takes about as long as one.
+        self.sizes = sizes
+        self.step = native.step
+        self.done = native.done
+        self._rows = native.rows
+        self._native = native
+        self._layouts = layouts
 
-    def endings(self, sizes: Sizes) -> Endings:
-        """Returns the episodes that have ended."""
-        return _table(Endings, sizes, *self._batch.endings())
+    @classmethod
+    def of(cls, rows: int, sizes: Sizes, columns: Mapping[str, Any]) -> Batch:  # type: ignore[override] # Arrays are not the engine's.
+        """Creates a batch from arrays."""
+        return Batch.of(rows, sizes, columns)
 
-    def beginnings(self, sizes: Sizes) -> Beginnings:
-        """Returns the games that have begun."""
-        return _table(Beginnings, sizes, *self._batch.beginnings())
+    @cached_property
+    def packed(self) -> Packed:  # type: ignore[override] # Only tables with few rows are packed before they are used.
+        """The columns of the open decisions."""
+        _, columns = self._native.decisions()
+        return Packed(columns, self._layouts["decisions"])
 
-    def shifts(self, sizes: Sizes) -> ShiftStatistics | None:
-        """Returns the Shifts that have ended; None without statistics."""
-        found = self._batch.shifts()
-        return None if found is None else _table(ShiftStatistics, sizes, *found)
+    @cached_property
+    def endings(self) -> Endings:
+        """The episodes of the client's seats that have ended."""
+        return self._table(Endings, "endings", *self._native.endings())
 
+    @cached_property
+    def beginnings(self) -> Beginnings:
+        """The games that have begun."""
+        return self._table(Beginnings, "beginnings", *self._native.beginnings())
+
+    @cached_property
+    def shifts(self) -> ShiftStatistics | None:
+        """The Shifts that have ended, with statistics."""
+        found = self._native.shifts()
+        return None if found is None else self._table(ShiftStatistics, "shifts", *found)
+
+    @cached_property
     def totals(self) -> Totals:
-        """Returns the counts."""
-        return Totals(*self._batch.totals())
+        """Counts since the games began."""
+        return Totals(*self._native.totals())
+
+    def _table(self, kind: type[AnyTable], name: str, rows: int, columns: NDArray[np.uint8]) -> AnyTable:
+        table = kind(rows, self.sizes)
+        table.packed = Packed(columns, self._layouts[name])
+        return table
 
 
 class NativeGames:
@@ -54,16 +80,20 @@ class NativeGames:
             _raise(error)
         self.started = pb.VectorStarted.FromString(self._games.started)
         self._sizes = Sizes.of(self.started)
+        self._layouts = self._games.layouts
         self._records = setup.records
 
     def first(self) -> Batch:
         """Returns the first batch."""
         return self._batch(self._first)
 
-    def step(self, actions: NDArray[np.uint16]) -> Batch:
+    def step(self, actions: ArrayLike, batch: Batch) -> Batch:
         """Takes the action of each row of the latest batch and returns the next batch."""
         try:
-            return self._batch(self._games.step(actions))
+            try:
+                return self._batch(self._games.step(actions))
+            except (TypeError, ValueError):
+                return self._batch(self._games.step(checked(actions, batch)))
         except chefshat_native.Refused as error:
             _raise(error)
 
@@ -104,21 +134,13 @@ class NativeGames:
         vars(self).pop("_games", None)
 
     def _batch(self, native: chefshat_native.Batch) -> Batch:
-        batch = Batch(native.rows, self._sizes, NativeContent(native))
-        _, columns, offsets = native.decisions()
-        batch.packed = Packed(columns, offsets)
+        batch = NativeBatch(native, self._sizes, self._layouts)
         if self._records:
             records = native.records()
             batch.records = tuple(
                 GameRecord(game, index, tuple(map(pb.RecordLine.FromString, lines))) for game, index, lines in records
             )
         return batch
-
-
-def _table(kind: type[AnyTable], sizes: Sizes, rows: int, columns: NDArray[np.uint8], offsets: Mapping[str, int]) -> AnyTable:
-    table = kind(rows, sizes)
-    table.packed = Packed(columns, offsets)
-    return table
 
 
 def _raise(error: chefshat_native.Refused) -> NoReturn:

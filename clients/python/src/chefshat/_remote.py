@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chefshat import channels, pb
+from chefshat._games import checked
 from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch, GameRecord
@@ -95,9 +96,10 @@ class RemoteGames:
         """Returns the first batch."""
         return self._receive_batch()
 
-    def step(self, actions: NDArray[np.uint16]) -> Batch:
+    def step(self, actions: ArrayLike, batch: Batch) -> Batch:
         """Takes the action of each row of the latest batch and returns the next batch."""
-        self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=actions.tobytes())))
+        column = checked(actions, batch).tobytes()
+        self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=column)))
         return self._receive_batch()
 
     def reset(self, request: pb.VectorReset) -> Batch:

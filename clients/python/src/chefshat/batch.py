@@ -101,6 +101,10 @@ class Batch(Situations):
     rewards = Column[np.float32]("<f4")
     """(R,): sum of the seat's rewards since it last decided and since its episode began."""
 
+    #: The records of the games that have ended, if the env was created with `records=True`.
+    records: tuple[GameRecord, ...] = ()
+    _transitions: Transitions | None = None
+
     def __init__(self, rows: int, sizes: Sizes, content: Content | None = None) -> None:
         super().__init__(rows, sizes)
         self._content = content = content or NoContent()
@@ -108,9 +112,6 @@ class Batch(Situations):
         self.step = content.step
         #: Whether all games are over and no other follows; only a reset with a seed starts new ones.
         self.done = content.done
-        #: The records of the games that have ended, if the env was created with `records=True`.
-        self.records: tuple[GameRecord, ...] = ()
-        self._transitions: Transitions | None = None
 
     @cached_property
     def endings(self) -> Endings:

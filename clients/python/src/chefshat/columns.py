@@ -113,7 +113,8 @@ class Column(Generic[Scalar]):
         if table.source is not None:
             array: NDArray[Scalar] = table.source(self._name)
         elif table.packed is not None:
-            array = np.ndarray(shape, self.dtype, table.packed.bytes, table.packed.offsets[self._name])
+            columns, before = table.packed
+            array = np.ndarray(shape, self.dtype, columns, before[self._name] * table._rows)
         elif table.message is None:
             array = np.zeros(shape, self.dtype)
             array.flags.writeable = False
@@ -133,12 +134,12 @@ class Packed(NamedTuple):
     """Columns one after the other.
 
     Attributes:
-        bytes: the columns.
-        offsets: where each column begins, by name.
+        columns: their bytes.
+        before: the bytes of a row before each column, by name: a column begins at as many for each row.
     """
 
-    bytes: NDArray[np.uint8]
-    offsets: Mapping[str, int]
+    columns: NDArray[np.uint8]
+    before: Mapping[str, int]
 
 
 class Table:
@@ -151,6 +152,7 @@ class Table:
         source: creates columns by name, if there is neither.
     """
 
+    message: Message | None = None
     packed: Packed | None = None
     source: Callable[[str], NDArray[Any]] | None = None
 

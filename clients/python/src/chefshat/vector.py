@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import local_server, pb
-from chefshat._games import Games
+from chefshat._games import Games, checked
 from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
@@ -161,19 +161,23 @@ class VectorEnv:
         Args:
             actions: (R,) integers, the action of each row of `batch`, in order. See `sample_legal`.
         """
-        self._check_open()
+        if self._ended is not None:
+            self._check_open()
         batch = self.batch
         if batch.done:
             raise ChefsHatError("GAMES_OVER", "all games are over; call reset(seed) to start new ones")
-        array = self._checked(actions, len(batch))
         if self._memory is not None:
-            self._memory.remember(batch.games, batch.attempts, batch, array)
-        self._fresh = False
+            actions = checked(actions, batch)
+            self._memory.remember(batch.games, batch.attempts, batch, actions)
         try:
-            batch = self._games.step(array)
+            batch = self._games.step(actions, batch)
+        except (TypeError, ValueError):
+            # Wrong arguments: nothing has changed.
+            raise
         except BaseException as error:
             self._fail(error)
             raise
+        self._fresh = False
         self.batch = batch if self._memory is None else self._completed(batch)
         return self.batch
 
@@ -328,20 +332,6 @@ class VectorEnv:
         if self.closed:
             raise self._ended
         raise ChefsHatError("ENV_ENDED", f"this VectorEnv has ended ({self._ended}); make a new one") from self._ended
-
-    def _checked(self, actions: ArrayLike, rows: int) -> NDArray[np.uint16]:
-        """Checks and encodes actions."""
-        array = np.asarray(actions)
-        if array.shape != (rows,) or (rows and array.dtype.kind not in "iu"):
-            given = f"{array.dtype} of the shape {array.shape}"
-            raise ValueError(f"give one action for each row of the batch: integers of the shape ({rows},), not {given}")
-        if rows:
-            wrong = int(array.argmax())
-            if array[wrong] < self.num_actions:
-                wrong = int(array.argmin())
-            if not 0 <= array[wrong] < self.num_actions:
-                raise ValueError(f"row {wrong} has the action {array[wrong]}; actions are 0..={self.num_actions - 1}")
-        return array.astype("<u2", copy=False)
 
     def _completed(self, batch: Batch) -> Batch:
         """Computes the transitions of a batch, if they are enabled."""

@@ -1,9 +1,14 @@
 //! Dense layers in 32-bit floats, laid out for inner loops over contiguous memory. Only sums,
 //! products and ReLU are used, which the compiler neither fuses nor reorders, so a file gives the
-//! same values on every machine. tanh does not; it is applied only where outputs are displayed.
+//! same values on every machine, whatever the width of its vector instructions (`Sums` is
+//! compiled for several). tanh does not; it is applied only where outputs are displayed.
+
+use pulp::{Arch, NullaryFnOnce};
 
 /// Independent partial sums of a dot product, to fill one or two vector registers.
 const LANES: usize = 8;
+/// Units of a hidden layer that are summed at a time, as many as vector registers hold.
+const TILE: usize = 64;
 
 /// A hidden layer with ReLU.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,16 +37,61 @@ impl Hidden {
         );
         out.clear();
         out.extend_from_slice(&self.bias);
-        for (&value, weights) in input.iter().zip(self.by_input.chunks_exact(out.len())) {
-            if value != 0.0 {
-                for (unit, weight) in out.iter_mut().zip(weights) {
-                    *unit += value * weight;
-                }
-            }
-        }
+        let used: Vec<(usize, f32)> = (input.iter().copied().enumerate())
+            .filter(|(_, value)| *value != 0.0)
+            .collect();
+        Arch::new().dispatch(Sums {
+            used: &used,
+            by_input: &self.by_input,
+            out,
+        });
         for unit in out {
             *unit = unit.max(0.0);
         }
+    }
+}
+
+/// The sums of a hidden layer. A value and not a closure, because only its inlined call is compiled
+/// for each width of vector instructions.
+struct Sums<'a> {
+    /// The inputs other than 0, with their numbers.
+    used: &'a [(usize, f32)],
+    by_input: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl NullaryFnOnce for Sums<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let units = self.out.len();
+        let (tiles, rest) = self.out.as_chunks_mut::<TILE>();
+        let after = units - rest.len();
+        for (tile, first) in tiles.iter_mut().zip((0..).step_by(TILE)) {
+            // A copy, to stay in registers.
+            let mut sums = *tile;
+            for &(index, value) in self.used {
+                add(
+                    &mut sums,
+                    value,
+                    &self.by_input[index * units + first..][..TILE],
+                );
+            }
+            *tile = sums;
+        }
+        for &(index, value) in self.used {
+            let weights = &self.by_input[index * units + after..];
+            add(rest, value, &weights[..units - after]);
+        }
+    }
+}
+
+/// Adds weights times a value to sums.
+#[inline(always)]
+fn add(sums: &mut [f32], value: f32, weights: &[f32]) {
+    for (sum, weight) in sums.iter_mut().zip(weights) {
+        *sum += value * weight;
     }
 }
 

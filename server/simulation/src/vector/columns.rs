@@ -3,8 +3,8 @@
 //! is.
 
 use chefshat_engine::{
-    ActionSpace, BySeat, Cards, DecisionKind, Mask, Observation, PlayedDecision, Seat, SeatOrder,
-    Seed, ShiftMetrics, SpecialAction, Standings,
+    ActionSpace, BySeat, Cards, DecisionKind, MAX_FACES, Mask, Observation, PlayedDecision, Seat,
+    SeatOrder, Seed, ShiftMetrics, SpecialAction, Standings,
 };
 
 use super::history::History;
@@ -221,12 +221,11 @@ pub(super) struct Ending<'a> {
 }
 
 impl Batch {
-    /// An empty batch with capacity for one row of every game.
-    pub(super) fn new(setup: &VectorSetup) -> Batch {
-        let games = setup.games() as usize;
+    /// An empty batch with capacity for this number of rows.
+    pub(super) fn new(setup: &VectorSetup, rows: usize) -> Batch {
         let rules = setup.rules();
         let mask_bytes = usize::from(rules.actions().size()).div_ceil(8);
-        let of = |width: usize| Vec::with_capacity(games * width);
+        let of = |width: usize| Vec::with_capacity(rows * width);
         Batch {
             games: of(4),
             seats: of(1),
@@ -234,7 +233,7 @@ impl Batch {
             attempts: of(4),
             rewards: of(4),
             observations: ObservationColumns::with_room(
-                games,
+                rows,
                 usize::from(rules.faces()) + 1,
                 rules.players(),
                 setup.history(),
@@ -250,6 +249,22 @@ impl Batch {
             mask_bytes,
             ..Batch::default()
         }
+    }
+
+    /// Adds the tables of the games that follow.
+    pub(super) fn append(&mut self, next: Batch) {
+        self.rows += next.rows;
+        self.observations.append(next.observations);
+        self.endings.append(next.endings);
+        self.beginnings.append(next.beginnings);
+        self.shifts.append(next.shifts);
+        self.played.extend(next.played);
+        self.games.extend(next.games);
+        self.seats.extend(next.seats);
+        self.kinds.extend(next.kinds);
+        self.attempts.extend(next.attempts);
+        self.rewards.extend(next.rewards);
+        self.masks.extend(next.masks);
     }
 
     pub(super) fn push(&mut self, row: &Row<'_>) {
@@ -271,13 +286,44 @@ impl Batch {
     }
 }
 
+impl Totals {
+    pub(super) fn add(&mut self, more: &Totals) {
+        self.client_decisions += more.client_decisions;
+        self.decisions += more.decisions;
+        self.invalid_attempts += more.invalid_attempts;
+        self.shifts += more.shifts;
+        self.games += more.games;
+    }
+}
+
 impl ObservationColumns {
+    /// Adds the rows of another table.
+    fn append(&mut self, next: ObservationColumns) {
+        self.shifts.extend(next.shifts);
+        self.pizzas.extend(next.pizzas);
+        self.hands.extend(next.hands);
+        self.golden.extend(next.golden);
+        self.boards.extend(next.boards);
+        self.cards_left.extend(next.cards_left);
+        self.passed.extend(next.passed);
+        self.places.extend(next.places);
+        self.roles.extend(next.roles);
+        self.points.extend(next.points);
+        self.played.extend(next.played);
+        self.gave.extend(next.gave);
+        self.received.extend(next.received);
+        self.history.extend(next.history);
+        self.history_counts.extend(next.history_counts);
+    }
+
     fn with_room(rows: usize, cards: usize, seats: usize, history: u16) -> ObservationColumns {
         let of = |width: usize| Vec::with_capacity(rows * width);
+        // With room for the fixed number of bytes that is copied for the last row.
+        let of_cards = || Vec::with_capacity(rows * cards + usize::from(MAX_FACES) + 1);
         ObservationColumns {
             shifts: of(4),
             pizzas: of(4),
-            hands: of(cards),
+            hands: of_cards(),
             golden: of(1),
             boards: of(3),
             cards_left: of(seats),
@@ -285,9 +331,9 @@ impl ObservationColumns {
             places: of(seats),
             roles: of(seats),
             points: of(4 * seats),
-            played: of(cards),
-            gave: of(cards),
-            received: of(cards),
+            played: of_cards(),
+            gave: of_cards(),
+            received: of_cards(),
             history: of(2 * usize::from(history)),
             history_counts: of(4 * usize::from(history.min(1))),
             width: history,
@@ -295,8 +341,13 @@ impl ObservationColumns {
     }
 
     fn push(&mut self, seen: &Observation, seat: Seat, history: Option<&History>) {
-        let put_cards =
-            |column: &mut Vec<u8>, cards: Cards| column.extend(cards.counts(seen.faces));
+        let kinds = usize::from(seen.faces) + 1;
+        let put_cards = |column: &mut Vec<u8>, cards: Cards| {
+            // A fixed number of bytes is copied faster.
+            let length = column.len() + kinds;
+            column.extend_from_slice(&cards.count_array(seen.faces));
+            column.truncate(length);
+        };
         put_u32(&mut self.shifts, seen.shift);
         put_u32(&mut self.pizzas, seen.pizza);
         put_cards(&mut self.hands, seen.hand);
@@ -327,6 +378,19 @@ impl ObservationColumns {
 }
 
 impl Endings {
+    /// Adds the rows of another table.
+    fn append(&mut self, next: Endings) {
+        self.rows += next.rows;
+        self.observations.append(next.observations);
+        self.games.extend(next.games);
+        self.indices.extend(next.indices);
+        self.seats.extend(next.seats);
+        self.rewards.extend(next.rewards);
+        self.ends.extend(next.ends);
+        self.game_over.extend(next.game_over);
+        self.places_taken.extend(next.places_taken);
+    }
+
     pub(super) fn push(&mut self, row: &Ending<'_>) {
         self.rows += 1;
         put_u32(&mut self.games, row.game);
@@ -342,6 +406,14 @@ impl Endings {
 }
 
 impl Beginnings {
+    /// Adds the rows of another table.
+    fn append(&mut self, next: Beginnings) {
+        self.rows += next.rows;
+        self.games.extend(next.games);
+        self.indices.extend(next.indices);
+        self.seeds.extend(next.seeds);
+    }
+
     pub(super) fn push(&mut self, game: u32, index: u64, seed: &[u8; 32]) {
         self.rows += 1;
         put_u32(&mut self.games, game);
@@ -351,6 +423,28 @@ impl Beginnings {
 }
 
 impl Shifts {
+    /// Adds the rows of another table.
+    fn append(&mut self, next: Shifts) {
+        self.rows += next.rows;
+        self.games.extend(next.games);
+        self.indices.extend(next.indices);
+        self.shifts.extend(next.shifts);
+        self.starters.extend(next.starters);
+        self.pizzas.extend(next.pizzas);
+        self.laps.extend(next.laps);
+        self.turns.extend(next.turns);
+        self.special_actions.extend(next.special_actions);
+        self.adjudicated.extend(next.adjudicated);
+        self.game_winners.extend(next.game_winners);
+        self.places.extend(next.places);
+        self.points.extend(next.points);
+        self.valid.extend(next.valid);
+        self.wrong.extend(next.wrong);
+        self.passes.extend(next.passes);
+        self.reward_sums.extend(next.reward_sums);
+        self.performance.extend(next.performance);
+    }
+
     pub(super) fn push(
         &mut self,
         game: u32,

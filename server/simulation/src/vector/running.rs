@@ -2,22 +2,21 @@
 //! continues. `slot` plays it.
 
 use chefshat_engine::{
-    ActionId, BySeat, Decision, Event, Game, MAX_SEATS, Mask, MetricsRecorder, PlayedDecision,
-    Seat, Seed,
+    ActionId, BySeat, Decision, Event, Game, Mask, MetricsRecorder, PlayedDecision, Seat, Seed,
 };
 
 use super::error::StateError;
 use super::history::History;
 use super::terms::{Decisions, InvalidActions, Terms};
-use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed, is_wrong_action};
+use chefshat_agents::{BuiltInAgent, agent_seed, is_wrong_action};
 
 /// A game being played.
 #[derive(Clone, Debug)]
 pub(super) struct RunningGame {
     pub(super) seed: Seed,
     pub(super) game: Game,
-    /// Agents by seat. On the client's seats they take the decisions that the client does not.
-    pub(super) agents: [Option<BuiltInAgent>; MAX_SEATS],
+    /// Agents by seat; empty if there are none. On the client's seats they take the decisions that the client does not.
+    pub(super) agents: Box<[Option<BuiltInAgent>]>,
     /// Collects statistics of Shifts, if enabled.
     pub(super) recorder: Option<MetricsRecorder>,
     /// Rewards since each seat last decided.
@@ -71,17 +70,19 @@ impl Open {
 
 impl RunningGame {
     /// The built-in agents of a game with this seed, at its start.
-    pub(super) fn agents(terms: &Terms, seed: Seed) -> [Option<BuiltInAgent>; MAX_SEATS] {
+    pub(super) fn agents(terms: &Terms, seed: Seed) -> Box<[Option<BuiltInAgent>]> {
         let others = match terms.decisions {
             Decisions::All | Decisions::Turns { others: None } => None,
             Decisions::Turns { others } => others,
         };
-        // An array, because agents with their generators are not `Copy`.
-        std::array::from_fn(|index| {
-            let seat = Seat::new(index);
-            let kind: Option<AgentKind> = terms.agents.get(seat).and_then(|agent| agent.or(others));
-            kind.map(|kind| BuiltInAgent::new(kind, agent_seed(seed, seat)))
-        })
+        let kind = |seat| terms.agents.get(seat).and_then(|agent| agent.or(others));
+        let kinds = (0..terms.agents.len()).map(|index| (Seat::new(index), kind(Seat::new(index))));
+        if kinds.clone().all(|(_, kind)| kind.is_none()) {
+            return Box::default();
+        }
+        kinds
+            .map(|(seat, kind)| kind.map(|kind| BuiltInAgent::new(kind, agent_seed(seed, seat))))
+            .collect()
     }
 
     /// Deals later Shifts from another seed, from which agents choose at random as well.

@@ -2,10 +2,11 @@
 //! agents to the client's next decision, and writes rewards, ended episodes and counts.
 
 use chefshat_engine::{
-    Action, ActionId, BySeat, Decision, Event, Mask, MetricsRecorder, Seat, Standings, Viewer,
+    Action, ActionId, BySeat, Decision, Event, MetricsRecorder, Standings, Viewer,
 };
 
-use super::columns::{Batch, Ending, PlayedGame, Row, Totals, places_taken};
+use super::blocks::{OpenRow, Part};
+use super::columns::{Ending, PlayedGame, Row, places_taken};
 use super::history::History;
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
@@ -29,30 +30,34 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// Begins the first game.
-    pub(super) fn new(number: u32, setup: &VectorSetup, batch: &mut Batch) -> Slot {
-        let mut slot = Slot {
+    /// A slot without a game.
+    pub(super) fn new(number: u32) -> Slot {
+        Slot {
             number,
             index: u64::from(number),
             running: None,
-        };
-        slot.begin(setup, batch);
-        slot
+        }
+    }
+
+    /// The number of its games.
+    pub(super) fn number(&self) -> u32 {
+        self.number
     }
 
     /// Ends or abandons the game and begins the one with the next index, if there is one.
-    pub(super) fn begin_next(&mut self, setup: &VectorSetup, batch: &mut Batch) {
+    pub(super) fn begin_next(&mut self, setup: &VectorSetup, part: &mut Part) {
         self.running = None;
         let next = self.index.saturating_add(setup.games().into());
         if setup.has_game(next) {
             self.index = next;
-            self.begin(setup, batch);
+            self.begin(setup, part);
         }
     }
 
-    fn begin(&mut self, setup: &VectorSetup, batch: &mut Batch) {
+    /// Begins the game with this index.
+    pub(super) fn begin(&mut self, setup: &VectorSetup, part: &mut Part) {
         let running = RunningGame::begin(setup, self.index);
-        batch
+        part.batch
             .beginnings
             .push(self.number, self.index, &running.seed.0);
         self.running = Some(running);
@@ -79,25 +84,8 @@ impl Slot {
         self.running.as_ref().map_or(0, |running| running.kept)
     }
 
-    /// The legal actions of the open decision.
-    pub(super) fn legal(&self) -> Option<&Mask> {
-        Some(&self.running.as_ref()?.open.as_ref()?.legal)
-    }
-
-    /// The seat of the open decision, if the action is illegal there.
-    pub(super) fn refuses(&self, action: ActionId) -> Option<Seat> {
-        let open = self.running.as_ref()?.open.as_ref()?;
-        (!open.legal.contains(action)).then_some(open.decision.seat)
-    }
-
     /// Applies the client's action to the open decision.
-    pub(super) fn answer(
-        &mut self,
-        action: ActionId,
-        setup: &VectorSetup,
-        batch: &mut Batch,
-        totals: &mut Totals,
-    ) {
+    pub(super) fn answer(&mut self, action: ActionId, setup: &VectorSetup, part: &mut Part) {
         let Some(running) = &mut self.running else {
             return;
         };
@@ -110,7 +98,7 @@ impl Slot {
             open.attempts = open.attempts.saturating_add(1);
             open.reward = 0.0;
             let attempts = open.attempts;
-            totals.invalid_attempts += 1;
+            part.totals.invalid_attempts += 1;
             running.refuse(setup, decision, action);
             let limit = setup.max_invalid_attempts();
             if limit.is_none_or(|limit| attempts < limit.get()) {
@@ -122,21 +110,15 @@ impl Slot {
                 .expect("an open decision has a default");
         }
         running.open = None;
-        totals.client_decisions += 1;
-        self.take(taken, taken != action, setup, batch, totals);
+        part.totals.client_decisions += 1;
+        self.take(taken, taken != action, setup, part);
     }
 
     /// Advances until the client has to decide, the last game is over, or the step's limit is
-    /// reached. Decisions and attempts of built-in agents count against `budget`.
-    pub(super) fn advance(
-        &mut self,
-        setup: &VectorSetup,
-        batch: &mut Batch,
-        totals: &mut Totals,
-        budget: &mut u64,
-    ) {
-        let shifts_before = totals.shifts;
-        while *budget > 0 && totals.shifts - shifts_before < MAX_SHIFTS_PER_STEP {
+    /// reached. Decisions and attempts of built-in agents count against the part's budget.
+    pub(super) fn advance(&mut self, setup: &VectorSetup, part: &mut Part) {
+        let shifts_before = part.totals.shifts;
+        while part.budget > 0 && part.totals.shifts - shifts_before < MAX_SHIFTS_PER_STEP {
             let Some(running) = &mut self.running else {
                 return;
             };
@@ -144,28 +126,29 @@ impl Slot {
                 return;
             }
             let Some(decision) = running.game.decision() else {
-                self.finish(setup, batch);
+                self.finish(setup, part);
                 continue;
             };
-            if let Some((action, by_default)) = running.built_in_action(setup, decision, budget) {
-                self.take(action, by_default, setup, batch, totals);
+            let taken = running.built_in_action(setup, decision, &mut part.budget);
+            if let Some((action, by_default)) = taken {
+                self.take(action, by_default, setup, part);
             } else {
                 return;
             }
         }
     }
 
-    /// Writes the row of the open decision. Returns whether there is one.
-    pub(super) fn write_row(&mut self, batch: &mut Batch) -> bool {
+    /// Writes the row of the open decision, if there is one.
+    pub(super) fn write_row(&mut self, part: &mut Part) {
         let Some(running) = &mut self.running else {
-            return false;
+            return;
         };
         let Some(open) = &mut running.open else {
-            return false;
+            return;
         };
         let seat = open.decision.seat;
         open.reward += std::mem::take(&mut running.rewards[seat]);
-        batch.push(&Row {
+        part.batch.push(&Row {
             game: self.number,
             seat,
             attempts: open.attempts,
@@ -174,18 +157,16 @@ impl Slot {
             history: running.history.as_ref(),
             legal: &open.legal,
         });
-        true
+        part.open.push(OpenRow {
+            game: self.number,
+            seat,
+            legal: open.legal,
+        });
     }
 
     /// Applies a legal action and records its effects.
-    fn take(
-        &mut self,
-        action: ActionId,
-        by_default: bool,
-        setup: &VectorSetup,
-        batch: &mut Batch,
-        totals: &mut Totals,
-    ) {
+    fn take(&mut self, action: ActionId, by_default: bool, setup: &VectorSetup, part: &mut Part) {
+        let Part { batch, totals, .. } = part;
         let running = self.running.as_mut().expect("a game is being played");
         totals.decisions += 1;
         if setup.keeps_records() {
@@ -267,18 +248,18 @@ impl Slot {
     }
 
     /// Ends a finished game and begins the next one, if there is one.
-    fn finish(&mut self, setup: &VectorSetup, batch: &mut Batch) {
+    fn finish(&mut self, setup: &VectorSetup, part: &mut Part) {
         if setup.keeps_records()
             && let Some(running) = &mut self.running
         {
-            batch.played.push(PlayedGame {
+            part.batch.played.push(PlayedGame {
                 game: self.number,
                 index: self.index,
                 seed: running.seed,
                 decisions: std::mem::take(&mut running.decisions),
             });
         }
-        self.begin_next(setup, batch);
+        self.begin_next(setup, part);
     }
 }
 
@@ -342,7 +323,8 @@ impl RunningGame {
                 return None;
             }
         }
-        let Some(agent) = &mut self.agents[seat.index()] else {
+        let agent = self.agents.get_mut(seat.index());
+        let Some(agent) = agent.and_then(Option::as_mut) else {
             return self.game.default_action().map(|action| (action, false));
         };
         let legal = self.game.legal_actions();

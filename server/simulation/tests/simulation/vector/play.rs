@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
+use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed};
 use chefshat_engine::{ActionId, Decision, DecisionKind, Game, Mask, Script, Seat, Viewer};
@@ -236,4 +237,38 @@ fn games_start_from_a_script_or_a_position() {
         let (one, two) = batch.observations.hands.split_at(12);
         assert_eq!(one != two, differ);
     }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let agents = [
+        AgentKind::RandomUnmasked,
+        AgentKind::Greedy,
+        AgentKind::Random,
+    ];
+    let setup = against(agents, 300).with_statistics(true);
+    let pools = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        Arc::new(pool.build().unwrap())
+    });
+    let (mut alone, mut expected) = VectorGames::new(setup.clone());
+    let mut others = pools.map(|pool| VectorGames::on(setup.clone(), Some(pool)));
+    for step in 0..120 {
+        for (_, batch) in &others {
+            assert_eq!(*batch, expected, "step {step}");
+        }
+        if step % 50 == 49 {
+            expected = alone.reset_some(&[0, 70, 299]).unwrap();
+            for (games, batch) in &mut others {
+                *batch = games.reset_some(&[0, 70, 299]).unwrap();
+            }
+            continue;
+        }
+        let actions = some_actions(&expected);
+        expected = alone.step(&actions).unwrap();
+        for (games, batch) in &mut others {
+            *batch = games.step(&actions).unwrap();
+        }
+    }
+    assert!(expected.totals.games > 0 || expected.totals.shifts > 300);
 }
