@@ -1,19 +1,20 @@
-"""Decisions per second of this package's `VectorEnv`, with a random masked policy on all four seats.
+"""Decisions per second of this package's `VectorEnv`, with a random masked policy: in this process, and over the network.
 
-One process, one stream. The server's counts confirm the number of decisions.
+One process, one environment at a time. By default the policy has all four seats; with --opponents it has one, and decisions of the
+others count as well. The counts of the games confirm the number of decisions.
 """
 
-import importlib.metadata
+import importlib.util
 import sys
+from importlib.metadata import version
 
 import measure
-import numpy as np
 
 import chefshat
 from chefshat.local_server import shared_address
-from chefshat.vector import VectorEnv, sample_legal
+from chefshat.vector import VectorEnv, VectorOptions
 
-DEFAULT_GAMES = [1, 64, 1024]
+DEFAULT_GAMES = [1, 16, 64, 1024]
 
 
 class Batches:
@@ -21,23 +22,26 @@ class Batches:
 
     def __init__(self, env: VectorEnv, seed: int) -> None:
         self._env = env
-        self._chance = np.random.default_rng(seed)
-        self._batch = env.reset()
-        self.decisions = 0
+        env.sample(seed)
+        self._before = env.batch.totals
+        self._sent = 0
 
     def step(self) -> int:
-        """Takes one decision in every game."""
-        actions = sample_legal(self._batch.mask_bits, self._chance)
-        self._batch = self._env.step(actions)
-        self.decisions += len(actions)
-        return len(actions)
+        """Takes one decision in every game. Returns the number of decisions of all seats."""
+        before = self._env.batch
+        actions = self._env.sample()
+        self._sent += len(actions)
+        if len(self._env.client_seats) == self._env.players:
+            self._env.step(actions)
+            return len(actions)
+        return self._env.step(actions).totals.decisions - before.totals.decisions
 
     def check(self) -> None:
-        """Checks that the server took all decisions sent, all of them by the client, none of them invalid."""
-        totals = self._batch.totals
-        counted = (totals.client_decisions, totals.decisions, totals.invalid_attempts)
-        if counted != (self.decisions, self.decisions, 0):
-            raise AssertionError(f"{self.decisions} decisions were sent, the server counted {counted}")
+        """Checks that the games took all decisions sent, none of them invalid."""
+        totals = self._env.batch.totals
+        counted = totals.client_decisions - self._before.client_decisions
+        if (counted, totals.invalid_attempts) != (self._sent, 0):
+            raise AssertionError(f"{self._sent} decisions were sent, the games counted {counted}")
 
 
 def main() -> int:
@@ -45,19 +49,26 @@ def main() -> int:
     parser = measure.parser(__doc__.split("\n\n")[0], "python benchmarks/vector.py --games 1 64 1024 --rounds 5 --json")
     parser.add_argument("--address", metavar="HOST:PORT", help="the server (default: a new one)")
     parser.add_argument(
-        "--games", type=int, nargs="+", default=DEFAULT_GAMES, metavar="N", help="parallel games (default: 1 64 1024)"
+        "--games", type=int, nargs="+", default=DEFAULT_GAMES, metavar="N", help="parallel games (default: 1 16 64 1024)"
     )
+    parser.add_argument("--opponents", metavar="AGENT", help="the policy has seat 0 against this agent, for example trained")
     options = parser.parse_args()
     measured = []
-    address = options.address or shared_address()
-    with chefshat.Client(address) as client:
+    ways: dict[str, str | None] = {"over the network": options.address or shared_address()}
+    if options.address is None and importlib.util.find_spec("chefshat_native") is not None:
+        ways = {"in process": None, **ways}
+    with chefshat.Client(ways["over the network"] or "") as client:
         server_version = client.server_info().server_version
-    for games in options.games:
-        with VectorEnv(address, games, seed=options.seed) as env:
-            batches = Batches(env, options.seed)
-            measured.append(measure.measure(f"n = {games:,}", batches.step, options))
-            batches.check()
-    measure.show(measured, options, chefshat=importlib.metadata.version("chefshat"), server=server_version)
+    for way, address in ways.items():
+        for games in options.games:
+            setup: VectorOptions = {"seed": options.seed}
+            if options.opponents is not None:
+                setup |= {"client_seats": [0], "opponents": options.opponents}
+            with VectorEnv(address, games, **setup) as env:
+                batches = Batches(env, options.seed)
+                measured.append(measure.measure(f"{way}, n = {games:,}", batches.step, options))
+                batches.check()
+    measure.show(measured, options, chefshat=version("chefshat"), server=server_version)
     return 0
 
 
