@@ -4,11 +4,10 @@
 use std::sync::Arc;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{Mask, Seat};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::columns::{Batch, Totals};
+use super::part::Part;
 use super::setup::VectorSetup;
 use super::slot::Slot;
 
@@ -19,45 +18,6 @@ const MANY: usize = 256;
 /// Maximum number of decisions and invalid attempts of built-in agents within one step, over all
 /// games: about a second. Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
-
-/// An open decision of the client.
-#[derive(Debug)]
-pub(super) struct OpenRow {
-    pub(super) game: u32,
-    pub(super) seat: Seat,
-    pub(super) legal: Mask,
-}
-
-/// What happened in some games within a step.
-#[derive(Debug)]
-pub(super) struct Part {
-    pub(super) batch: Batch,
-    /// Counts of this step.
-    pub(super) totals: Totals,
-    /// Decisions and attempts that built-in agents may still make.
-    pub(super) budget: u64,
-    /// The rows of the batch.
-    pub(super) open: Vec<OpenRow>,
-}
-
-impl Part {
-    fn new(setup: &VectorSetup, rows: usize, budget: u64) -> Part {
-        Part {
-            batch: Batch::new(setup, rows),
-            totals: Totals::default(),
-            budget,
-            open: Vec::with_capacity(rows),
-        }
-    }
-
-    /// Adds what happened in the games that follow.
-    fn append(mut self, next: Part) -> Part {
-        self.batch.append(next.batch);
-        self.totals.add(&next.totals);
-        self.open.extend(next.open);
-        self
-    }
-}
 
 /// Runs `work` for every game and writes the rows.
 pub(super) fn run(

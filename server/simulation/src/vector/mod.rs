@@ -25,6 +25,7 @@ mod blocks;
 mod columns;
 mod error;
 mod history;
+mod part;
 mod running;
 mod sampling;
 mod saved;
@@ -35,13 +36,13 @@ mod terms;
 
 use std::sync::Arc;
 
-use blocks::{OpenRow, Part};
 use chefshat_engine::ActionId;
 use rayon::ThreadPool;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
 pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+use part::{OpenRow, Part};
 pub use saved::SavedGame;
 pub use setup::{Episode, VectorSetup};
 use slot::Slot;

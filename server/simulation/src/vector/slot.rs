@@ -5,9 +5,9 @@ use chefshat_engine::{
     Action, ActionId, BySeat, Decision, Event, MetricsRecorder, Standings, Viewer,
 };
 
-use super::blocks::{OpenRow, Part};
 use super::columns::{Ending, PlayedGame, Row, places_taken};
 use super::history::History;
+use super::part::{OpenRow, Part};
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
 use super::setup::{Episode, VectorSetup};

@@ -1,0 +1,45 @@
+//! What happens in some of the games within a step. `slot` adds to it, `blocks` puts parts together.
+
+use chefshat_engine::{Mask, Seat};
+
+use super::columns::{Batch, Totals};
+use super::setup::VectorSetup;
+
+/// An open decision of the client.
+#[derive(Debug)]
+pub(super) struct OpenRow {
+    pub(super) game: u32,
+    pub(super) seat: Seat,
+    pub(super) legal: Mask,
+}
+
+/// What happened in some games within a step.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub(super) batch: Batch,
+    /// Counts of this step.
+    pub(super) totals: Totals,
+    /// Decisions and attempts that built-in agents may still make.
+    pub(super) budget: u64,
+    /// The rows of the batch.
+    pub(super) open: Vec<OpenRow>,
+}
+
+impl Part {
+    pub(super) fn new(setup: &VectorSetup, rows: usize, budget: u64) -> Part {
+        Part {
+            batch: Batch::new(setup, rows),
+            totals: Totals::default(),
+            budget,
+            open: Vec::with_capacity(rows),
+        }
+    }
+
+    /// Adds what happened in the games that follow.
+    pub(super) fn append(mut self, next: Part) -> Part {
+        self.batch.append(next.batch);
+        self.totals.add(&next.totals);
+        self.open.extend(next.open);
+        self
+    }
+}
