@@ -211,8 +211,8 @@ impl Game {
         ensure(below, "the Shift has reached its limit of turns")?;
         self.check_pizza()?;
         ensure(
-            state.holding & (state.holding - 1) != 0,
-            "one seat holds cards, so the Shift has ended",
+            state.holding.count_ones() >= 2,
+            "fewer than two seats hold cards, so the Shift has ended",
         )?;
         ensure(
             state.holding & !state.passed & bit(seat) != 0,
@@ -277,7 +277,7 @@ impl Game {
             self.last_order == state.order,
             "the last Shift has another order",
         )?;
-        let adjudicated = state.holding & state.holding.wrapping_sub(1) != 0;
+        let adjudicated = state.holding.count_ones() >= 2;
         ensure(state.holding != 0, "a seat keeps its cards")?;
         let in_time = state.turns <= self.rules.max_turns();
         let limit = in_time && (!adjudicated || state.turns == self.rules.max_turns());

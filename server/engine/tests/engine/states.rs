@@ -179,3 +179,69 @@ fn impossible_states_are_refused_with_a_reason() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+/// A state of the first Shift in which all seats have played their cards, which nobody can: the
+/// Shift ends with the last seat's cards in its hand.
+fn nobody_holds_cards() -> GameState {
+    let rules = RuleSetSpec::default().validate().unwrap();
+    let mut game = Game::new(rules, Seed([3; 32]), |_| {});
+    while game.shift_turns() == 0 {
+        game.apply(game.default_action().unwrap(), |_| {}).unwrap();
+    }
+    let mut state = game.state();
+    let dealt = state.hands.values().chain([&state.played]);
+    let counts = dealt.fold(vec![0; 12], |counts, cards| {
+        let more = cards.counts(11);
+        counts.iter().zip(more).map(|(a, b)| a + b).collect()
+    });
+    state.played = Cards::from_counts(11, &counts, false).unwrap();
+    state.hands = BySeat::filled(4, Cards::EMPTY);
+    state.passed = BySeat::filled(4, false);
+    state.places = BySeat::from_slice(&[1, 2, 3, 4]).unwrap();
+    state.board = chefshat_engine::Board::default();
+    state.last_to_play = None;
+    (state.turns, state.laps, state.pizza, state.idle) = (40, 1, 1, 0);
+    state
+}
+
+#[test]
+fn states_without_cards_in_any_hand_are_refused_at_every_stage() {
+    let seat = Seat::new(0);
+    let exchange = Stage::Exchange {
+        giver: seat,
+        chef_left: 2,
+        sous_chef_left: 1,
+    };
+    let ended = "fewer than two seats hold cards";
+    let cases = [
+        (Stage::Turn(seat), ended),
+        (Stage::Special(seat), "no special action is possible"),
+        (exchange, "no cards are exchanged"),
+        (Stage::Over, "the game is over but not decided"),
+    ];
+    let order = SeatOrder::from_slice(&[0, 1, 2, 3].map(Seat::new)).unwrap();
+    for (stage, expected) in cases {
+        let mut state = nobody_holds_cards();
+        state.stage = stage;
+        let error = Game::from_state(&state).unwrap_err().to_string();
+        assert!(error.contains(expected), "{stage:?}: {error}");
+    }
+    let later = [
+        (Stage::Special(seat), "two jokers"),
+        (exchange, "the exchange asks for the wrong gift"),
+        (Stage::Over, "a seat keeps its cards"),
+    ];
+    for (stage, expected) in later {
+        let mut state = nobody_holds_cards();
+        state.stage = stage;
+        state.shift = 2;
+        state.ranking = Some(order);
+        if stage == Stage::Over {
+            state.special = Some(SpecialAction::DinnerIsServed);
+            state.scores[seat] = 15;
+            state.last_order = Some(order);
+        }
+        let error = Game::from_state(&state).unwrap_err().to_string();
+        assert!(error.contains(expected), "{stage:?}: {error}");
+    }
+}
