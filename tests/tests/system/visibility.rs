@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::{Client, ConnectOptions, RandomAgent};
+use chefshat_proto::v1::analysis_service_client::AnalysisServiceClient;
 use chefshat_proto::v1::record_service_client::RecordServiceClient;
 use chefshat_proto::v1::room_service_client::RoomServiceClient;
 use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
@@ -415,6 +416,24 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
         })
     );
     ask!("Run, branch", run(client, ids));
+    let mut analyses = AnalysisServiceClient::new(client.channel());
+    let moment = v1::RecordedMoment {
+        game_id: ids.game.clone(),
+        decisions: u64::MAX,
+    };
+    ask!(
+        "Evaluate",
+        analyses.evaluate(v1::EvaluateRequest {
+            position: Some(v1::evaluate_request::Position::Moment(moment.clone())),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "LegalActions",
+        analyses.legal_actions(v1::LegalActionsRequest {
+            moment: Some(moment),
+        })
+    );
     ask!(
         "GetTournament",
         tournaments.get_tournament(v1::GetTournamentRequest {
@@ -832,6 +851,8 @@ async fn who_may_not_read_records_cannot_branch_from_them() {
         "CreateRoom, branch",
         "CreateRoom, replay",
         "Run, branch",
+        "Evaluate",
+        "LegalActions",
     ] {
         assert_eq!(of(call, &refused), Code::PermissionDenied, "{call}");
         assert_ne!(of(call, &allowed), Code::PermissionDenied, "{call}");
