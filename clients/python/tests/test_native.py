@@ -6,8 +6,10 @@ import pickle
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from chefshat import ChefsHatError, VectorEnv, pb
 from chefshat.columns import Table
 from chefshat.vector import Batch
 
-pytest.importorskip("chefshat_native")
+chefshat_native = pytest.importorskip("chefshat_native")
 
 SOURCE = Path(chefshat.__file__).parents[1]
 # Time limit in seconds.
@@ -183,7 +185,7 @@ def test_a_recorded_game_needs_its_server() -> None:
 def test_an_env_cannot_be_copied() -> None:
     with VectorEnv() as env:
         for copied in (pickle.dumps, copy.copy, copy.deepcopy):
-            with pytest.raises(TypeError, match="create another one"):
+            with pytest.raises(TypeError, match=r"fork\(\)"):
                 copied(env)
         env.step(env.sample())
 
@@ -210,6 +212,80 @@ def test_threads_play_side_by_side() -> None:
         thread.join(WAIT_S)
     assert len(found) == 4
     assert all(found[number] == found[0] for number in found)
+
+
+class InUse:
+    """Stands for games that another thread is stepping."""
+
+    def refuse(self, *_: Any) -> NoReturn:
+        """Refuses a request as the engine does."""
+        raise chefshat_native.Refused("GAMES_IN_USE", "another thread is stepping these games", {})
+
+    step = reset = save = restore = sample = refuse
+
+
+@pytest.mark.parametrize("method", ["step", "reset", "save", "restore", "sample"])
+def test_a_call_while_the_games_are_in_use_changes_nothing(method: str) -> None:
+    options: dict[str, Any] = {"games": 2, "client_seats": [0], "seed": 3, "transitions": True}
+    with VectorEnv(**options) as env, VectorEnv(**options) as undisturbed:
+        for one in (env, undisturbed):
+            one.sample(8)
+            one.step(one.sample())
+        calls: dict[str, Callable[[], object]] = {
+            "step": lambda: env.step(env.batch.masks.argmax(axis=1)),
+            "reset": lambda: env.reset(9),
+            "save": env.save,
+            "restore": lambda: env.restore([0], [b"anything"]),
+            "sample": lambda: env.sample(7),
+        }
+        games = vars(env)["_games"]
+        native, games._games = games._games, InUse()
+        with pytest.raises(ChefsHatError, match="another thread") as refused:
+            calls[method]()
+        assert refused.value.reason == "GAMES_IN_USE"
+        games._games = native
+        assert env.base_seed == 3
+        for _ in range(20):
+            assert content(env.step(env.sample())) == content(undisturbed.step(undisturbed.sample()))
+
+
+def test_two_threads_on_one_env_do_not_end_it() -> None:
+    # Enough games for steps and states to be long.
+    options: dict[str, Any] = {"games": 2048, "client_seats": [0], "opponents": "greedy", "seed": 9}
+    refusals: list[str] = []
+    done = threading.Event()
+
+    def again(call: Callable[[], object]) -> None:
+        """Calls until the other thread lets it."""
+        while True:
+            try:
+                call()
+                return
+            except ChefsHatError as error:
+                refusals.append(error.reason)
+                if error.reason != "GAMES_IN_USE":
+                    raise
+
+    def look() -> None:
+        while not done.is_set():
+            again(env.save)
+
+    steps = 0
+    with VectorEnv(**options) as env:
+        looking = threading.Thread(target=look)
+        looking.start()
+        until = time.monotonic() + WAIT_S
+        while (steps < 20 or not refusals) and time.monotonic() < until:
+            actions = env.batch.masks.argmax(axis=1)
+            again(lambda: env.step(actions))  # noqa: B023 - Called at once.
+            steps += 1
+        done.set()
+        looking.join(WAIT_S)
+        assert set(refusals) == {"GAMES_IN_USE"}
+        with VectorEnv(**options) as alone:
+            for _ in range(steps):
+                alone.step(alone.batch.masks.argmax(axis=1))
+            assert env.save() == alone.save()
 
 
 FORKED = """

@@ -139,9 +139,10 @@ impl Games {
         let message = decode::<v1::VectorSave>("save", save)?;
         let state = self.lock()?;
         let games = state.as_ref().ok_or_else(|| ended(py))?;
-        let saved = caught(|| saved_to_proto(&message, games))?;
-        let states = saved.map_err(|error| refused(py, error))?;
-        Ok(PyBytes::new(py, &states.encode_to_vec()))
+        let encode = || saved_to_proto(&message, games).map(|states| states.encode_to_vec());
+        let states = py.detach(|| caught(encode))?;
+        let states = states.map_err(|error| refused(py, error))?;
+        Ok(PyBytes::new(py, &states))
     }
 
     /// Draws a legal action for each row of the latest batch: row i takes the draw `first + i` of
@@ -161,7 +162,7 @@ impl Games {
 
     fn __reduce__(&self) -> PyResult<()> {
         Err(PyTypeError::new_err(
-            "running games cannot be pickled or copied: begin them again with the same seed",
+            "running games cannot be pickled or copied: save their states",
         ))
     }
 }

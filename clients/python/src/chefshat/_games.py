@@ -12,7 +12,7 @@ from chefshat.batch import Batch
 
 
 class Games(Protocol):
-    """Games stepped in batches. A method that raises an error has ended them.
+    """Games stepped in batches. A method that raises an error has ended them, unless its reason is GAMES_IN_USE.
 
     Attributes:
         server: the server that plays them; None: this process.

@@ -123,7 +123,10 @@ class NativeGames:
 
     def sample(self, batch: Batch, seed: int, first: int) -> NDArray[np.uint16]:
         """Draws a legal action for each row of the latest batch."""
-        return self._games.sample(seed, first)
+        try:
+            return self._games.sample(seed, first)
+        except chefshat_native.Refused as error:
+            _raise(error)
 
     def action_texts(self, faces: int) -> Sequence[str]:
         """Returns the texts of all actions."""

@@ -61,7 +61,8 @@ class VectorEnv:
     A server ends an environment after an hour without an answer (CLIENT_IDLE), and serves 64 of them at a time.
 
     Every method raises `ChefsHatError` with a reason if a request is refused. Then the environment has ended, and every further
-    call raises an error: create a new one. An environment cannot be pickled or copied: create another one with the same arguments.
+    call raises an error: create a new one. Only GAMES_IN_USE, for a call while another thread steps the games, changes nothing. An
+    environment cannot be pickled or copied: `fork` copies its games, `save` returns their states.
 
     Attributes:
         server: the server that plays the games; None: this process.
@@ -153,7 +154,7 @@ class VectorEnv:
         return f"VectorEnv(games={self.games}, client_seats={self.client_seats}, {where}, {state})"
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("a VectorEnv cannot be pickled or copied: create another one with the same arguments and seed")
+        raise TypeError("a VectorEnv cannot be pickled or copied: copy its games with fork(), or save() and restore() their states")
 
     def step(self, actions: ArrayLike) -> Batch:
         """Takes the decisions of the latest batch and returns the next batch.
@@ -168,9 +169,10 @@ class VectorEnv:
             raise ChefsHatError("GAMES_OVER", "all games are over; call reset(seed) to start new ones")
         if self._memory is not None:
             actions = checked(actions, batch)
-            self._memory.remember(batch.games, batch.attempts, batch, actions)
         try:
-            batch = self._games.step(actions, batch)
+            stepped = self._games.step(actions, batch)
+            if self._memory is not None:
+                self._memory.remember(batch.games, batch.attempts, batch, np.asarray(actions))
         except (TypeError, ValueError):
             # Wrong arguments: nothing has changed.
             raise
@@ -178,7 +180,7 @@ class VectorEnv:
             self._fail(error)
             raise
         self._fresh = False
-        self.batch = batch if self._memory is None else self._completed(batch)
+        self.batch = stepped if self._memory is None else self._completed(stepped)
         return self.batch
 
     def sample(self, seed: int | None = None) -> NDArray[np.uint16]:
@@ -188,13 +190,12 @@ class VectorEnv:
             seed: begins a new sequence of draws, 0..2**64-1; None: continues the sequence, which initially is a random one.
         """
         self._check_open()
-        if seed is not None:
-            if not 0 <= seed < 2**64:
-                raise ValueError(f"a seed is 0..={2**64 - 1}, not {seed}")
-            self._sampling_seed, self._drawn = int(seed), 0
-        first = self._drawn
-        self._drawn += len(self.batch)
-        return self._games.sample(self.batch, self._sampling_seed, first)
+        if seed is not None and not 0 <= seed < 2**64:
+            raise ValueError(f"a seed is 0..={2**64 - 1}, not {seed}")
+        chosen, first = (self._sampling_seed, self._drawn) if seed is None else (int(seed), 0)
+        actions = self._games.sample(self.batch, chosen, first)
+        self._sampling_seed, self._drawn = chosen, first + len(self.batch)
+        return actions
 
     @cached_property
     def action_texts(self) -> tuple[str, ...]:
@@ -225,15 +226,15 @@ class VectorEnv:
                 return self.batch
             chosen = self._numbers(chosen)
             request.games = chosen.tobytes()
-        if self._memory is not None:
-            self._memory.forget(chosen)
-        if seed is not None:
-            self.base_seed = request.base_seed if request.HasField("base_seed") else None
         try:
             batch = self._games.reset(request)
+            if self._memory is not None:
+                self._memory.forget(chosen)
         except BaseException as error:
             self._fail(error)
             raise
+        if seed is not None:
+            self.base_seed = request.base_seed if request.HasField("base_seed") else None
         self.batch = self._completed(batch)
         self._fresh = games is None
         return self.batch
@@ -259,8 +260,9 @@ class VectorEnv:
     def restore(self, games: ArrayLike, states: Sequence[bytes]) -> Batch:
         """Replaces games by saved ones and returns the next batch, which has every game that waits for a decision.
 
-        A restored game continues exactly as the saved one would: the same deals, the same random choices of built-in agents, and
-        later games with the same indices. Transitions that had begun in a replaced game are not completed.
+        A restored game continues exactly as the saved one would: the same deals, and the same random choices of built-in agents.
+        The game after it has the saved index plus `games`, and the seed that this environment has for that index. Transitions that
+        had begun in a replaced game are not completed.
 
         Args:
             games: the games to replace, each once.
@@ -274,10 +276,10 @@ class VectorEnv:
             raise ValueError(f"name each game once and give one state for each: {len(chosen)} games and {len(states)} states")
         if not len(chosen):
             return self.batch
-        if self._memory is not None:
-            self._memory.forget(chosen)
         try:
             batch = self._games.restore(chosen[order], [states[place] for place in order])
+            if self._memory is not None:
+                self._memory.forget(chosen)
         except BaseException as error:
             self._fail(error)
             raise
@@ -345,7 +347,9 @@ class VectorEnv:
         return batch
 
     def _fail(self, error: BaseException) -> None:
-        """Ends the environment with an error."""
+        """Ends the environment with an error, unless the games were left as they were for another thread."""
+        if isinstance(error, ChefsHatError) and error.reason == "GAMES_IN_USE":
+            return
         # After an interrupt the response may still come.
         known = error if isinstance(error, ChefsHatError) else ChefsHatError("INTERRUPTED", "a step was interrupted")
         self._ended = known

@@ -69,7 +69,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         """Starts a game.
 
         Args:
-            address: the server; None: the server shared by this process, which is started on demand.
+            address: where the game is played; None: in this process, if it can. See `VectorEnv`.
             seat: the seat of the agent.
             observation: "table", "columns", "classic", or a function. See `Form`.
             rewards: the scheme; see `VectorOptions`. With "winning", 1 for finishing first, else -0.001 for each turn.

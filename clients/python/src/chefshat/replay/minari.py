@@ -26,8 +26,8 @@ def to_minari(
 ) -> Any:  # noqa: ANN401 - A `minari.MinariDataset`.
     """Writes a dataset of Minari with an episode for each seat of each Shift (or game), and returns it.
 
-    Infos have `action_mask`, one for each observation: 1 where an action was legal. The last episode of a seat is truncated if its
-    end is not among the transitions.
+    Infos have `action_mask`, one for each observation: 1 where an action was legal. An episode is truncated if its end is not among
+    the transitions: it was the last one, or the game was abandoned by `reset` or `restore`.
 
     Args:
         transitions: for example of `from_records`, or the concatenated ones of a `VectorEnv`'s batches.
@@ -53,9 +53,15 @@ def to_minari(
 def _episodes(transitions: Transitions) -> Iterator[NDArray[np.intp]]:
     """Yields the rows of each episode. Those of a seat of a game are in the order of time."""
     order = np.lexsort((transitions.seats, transitions.games))
-    games, seats = transitions.games[order].astype(np.int64), transitions.seats[order].astype(np.int64)
-    others = (np.diff(games) != 0) | (np.diff(seats) != 0)
-    yield from np.split(order, np.flatnonzero(transitions.ended[order][:-1] | others) + 1)
+    earlier, later = order[:-1], order[1:]
+    ends = transitions.ended[earlier] | (transitions.games[earlier] != transitions.games[later])
+    # Of an abandoned game, the last transition ends in a decision that is not the next one's.
+    after, before = transitions.after, transitions.before
+    for one, other in ((after, before), (after.observations, before.observations)):
+        for name, column in one.as_dict().items():
+            differs = column[earlier] != getattr(other, name)[later]
+            ends |= differs.any(axis=tuple(range(1, differs.ndim)))
+    yield from np.split(order, np.flatnonzero(ends) + 1)
 
 
 def _episode(number: int, steps: Transitions, form: Form) -> EpisodeBuffer:
