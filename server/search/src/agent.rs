@@ -11,7 +11,7 @@ use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::{Allocation, Chance, Knowledge, Method, Sampler, ShiftHistory, evaluate};
+use crate::{Allocation, Chance, Estimate, Knowledge, Method, Sampler, ShiftHistory, evaluate};
 
 /// Steps of counting deals that the agent spends on a decision at most.
 const MAX_STEPS: u64 = 200_000;
@@ -20,12 +20,16 @@ const MAX_ROLLOUTS: u64 = 1_000_000;
 /// The most milliseconds of a decision.
 const MAX_MS: u64 = 60_000;
 
-/// What a decision may cost.
+/// Fewest deals that can show a gain: a few are often equal by chance, and their standard error 0.
+const MIN_DEALS: u64 = 16;
+
+/// What a decision may cost. Every legal action is tried in 4 deals at least, even if that costs
+/// more.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum Budget {
-    /// This many rollouts: the same seed plays the same game.
+    /// About this many rollouts: the same seed plays the same game.
     Rollouts(u64),
-    /// This much time.
+    /// About this much time, counting the possible deals included.
     Time(Duration),
 }
 
@@ -133,6 +137,19 @@ impl MonteCarlo {
     }
 }
 
+/// The action with the surest gain over the first: one that was tried to the end and gains more than
+/// `margin` standard errors. What was dropped before has few deals, in which it may have been lucky.
+fn surely_better(estimates: &[Estimate], margin: f64) -> Option<ActionId> {
+    let deals = estimates[0].rollouts.max(MIN_DEALS);
+    estimates[1..]
+        .iter()
+        .filter(|found| found.rollouts >= deals)
+        .map(|found| (found.gain() - margin * found.gain_error(), found.action))
+        .filter(|(gain, _)| *gain > 0.0)
+        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        .map(|(_, action)| action)
+}
+
 /// The agent of one seat.
 #[derive(Clone, Debug)]
 struct Player {
@@ -184,14 +201,7 @@ impl Following for Player {
             self.pool.as_deref(),
             progress,
         );
-        // Gains below the margin may be luck.
-        let sure = |gain: f64, error: f64| gain - self.plays.margin * error;
-        estimates[1..]
-            .iter()
-            .map(|found| (sure(found.gain(), found.gain_error()), found.action))
-            .filter(|(gain, _)| *gain > 0.0)
-            .max_by(|(a, _), (b, _)| a.total_cmp(b))
-            .map_or(prior, |(_, action)| action)
+        surely_better(&estimates, self.plays.margin).unwrap_or(prior)
     }
 
     fn boxed_clone(&self) -> Box<dyn Following> {
@@ -206,5 +216,52 @@ impl Player {
         let history = self.history.as_ref()?;
         let knowledge = Knowledge::new(self.rules, observation, history).ok()?;
         Sampler::new(knowledge, MAX_STEPS).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::Worth;
+
+    /// An estimate of an action with these points, where the first action has 1.
+    fn estimate(action: u16, points: &[u32]) -> Estimate {
+        let worth = |points| Worth { points, place: 1 };
+        let mut estimate = Estimate::new(ActionId::new(action));
+        (points.iter()).for_each(|&points| estimate.add(worth(points), worth(1)));
+        estimate
+    }
+
+    #[test]
+    fn only_actions_tried_to_the_end_are_taken() {
+        let first = estimate(0, &[1; 40]);
+        let good = estimate(1, &[3, 2].repeat(20));
+        // Four lucky deals have no error.
+        let dropped = estimate(2, &[5; 4]);
+        assert_eq!((dropped.gain(), dropped.gain_error()), (4.0, 0.0));
+        let check = |others: &[Estimate], expected: Option<u16>| {
+            let estimates = [&[first], others].concat();
+            let found = surely_better(&estimates, 3.0);
+            assert_eq!(found, expected.map(ActionId::new), "{others:?}");
+        };
+        check(&[good, dropped], Some(1));
+        check(&[dropped, good], Some(1));
+        check(&[dropped], None);
+        // Within the margin, and a loss.
+        check(&[estimate(3, &[0, 0, 5, 0].repeat(10))], None);
+        check(&[estimate(4, &[0; 40])], None);
+    }
+
+    #[test]
+    fn few_deals_show_no_gain() {
+        let check = |deals: usize, expected: Option<u16>| {
+            let estimates =
+                [0, 1].map(|action| estimate(action, &[1 + u32::from(action); 40][..deals]));
+            let found = surely_better(&estimates, 3.0);
+            assert_eq!(found, expected.map(ActionId::new), "{deals}");
+        };
+        check(4, None);
+        check(15, None);
+        check(16, Some(1));
     }
 }

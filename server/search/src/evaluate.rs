@@ -24,15 +24,16 @@ pub struct Estimate {
     /// Rollouts that began with it.
     pub rollouts: u64,
     points: u64,
-    points_squared: u64,
+    /// A rule set may award any 32-bit number of points, so 64 bits hold one square but no sum.
+    points_squared: u128,
     places: u64,
     /// Sum of its points minus those of the reference action, and of their squares.
     gain: i64,
-    gain_squared: u64,
+    gain_squared: u128,
 }
 
 impl Estimate {
-    fn new(action: ActionId) -> Estimate {
+    pub(crate) fn new(action: ActionId) -> Estimate {
         Estimate {
             action,
             rollouts: 0,
@@ -44,17 +45,17 @@ impl Estimate {
         }
     }
 
-    fn add(&mut self, worth: Worth, reference: Worth) {
+    pub(crate) fn add(&mut self, worth: Worth, reference: Worth) {
         let (points, gain) = (
             u64::from(worth.points),
             i64::from(worth.points) - i64::from(reference.points),
         );
         self.rollouts += 1;
         self.points += points;
-        self.points_squared += points * points;
+        self.points_squared += u128::from(points).pow(2);
         self.places += u64::from(worth.place);
         self.gain += gain;
-        self.gain_squared += gain.unsigned_abs() * gain.unsigned_abs();
+        self.gain_squared += u128::from(gain.unsigned_abs()).pow(2);
     }
 
     fn merge(&mut self, other: &Estimate) {
@@ -126,8 +127,8 @@ pub struct Method {
 
 /// Estimates what actions are worth at the sampler's decision: first those of `actions[0]`, to which
 /// the gains of the others refer. `progress` gets the number of rollouts so far and says which part
-/// of the budget is spent; the evaluation ends when it is 1 or more. A pool of threads does not
-/// change the result.
+/// of the budget is spent; the evaluation ends when it is 1 or more, but each action is tried in 4
+/// deals at least. A pool of threads does not change the result.
 ///
 /// # Panics
 /// If `actions` is empty, or one of them is not legal.
@@ -148,7 +149,7 @@ pub fn evaluate(
     let (mut worlds, mut rollouts) = (0u64, 0u64);
     for round in 1..=rounds {
         let part = f64::from(round) / f64::from(rounds);
-        while progress(rollouts) < part {
+        while worlds == 0 || progress(rollouts) < part {
             let tried: Vec<ActionId> = active.iter().map(|&index| actions[index]).collect();
             let batch = worlds..worlds + (worlds / 8).clamp(*BATCH.start(), *BATCH.end());
             let in_world = |world| evaluate_in(sampler, &tried, method.policy, seed, world);
@@ -217,19 +218,27 @@ fn evaluate_in(
         .collect()
 }
 
-/// Expected cards in each hand, by seat and kind (faces ascending, then jokers), over `deals` deals.
-pub fn likely_hands(sampler: &Sampler, seed: [u8; 32], deals: u64) -> Vec<Vec<f64>> {
+/// Expected cards in each hand, by seat and kind (faces ascending, then jokers), over deals of the
+/// sampler. `progress` gets the number of deals so far and says which part of the budget is spent;
+/// the last deal is that after which it is 1 or more.
+pub fn likely_hands(
+    sampler: &Sampler,
+    seed: [u8; 32],
+    progress: impl Fn(u64) -> f64,
+) -> Vec<Vec<f64>> {
     let rules = sampler.knowledge().rules();
     let mut sums = vec![vec![0u64; usize::from(rules.faces()) + 1]; rules.players()];
-    for world in 0..deals {
-        let game = sampler.game(&mut Chance::stream(seed, world));
+    let mut deals = 0;
+    while deals == 0 || progress(deals) < 1.0 {
+        let game = sampler.game(&mut Chance::stream(seed, deals));
+        deals += 1;
         for (sums, hand) in sums.iter_mut().zip(game.hands().values()) {
             for (sum, count) in sums.iter_mut().zip(hand.counts(rules.faces())) {
                 *sum += u64::from(count);
             }
         }
     }
-    let mean = |sum: u64| sum as f64 / deals.max(1) as f64;
+    let mean = |sum: u64| sum as f64 / deals as f64;
     (sums.into_iter())
         .map(|sums| sums.into_iter().map(mean).collect())
         .collect()

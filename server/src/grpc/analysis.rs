@@ -35,7 +35,7 @@ use crate::config::{
 };
 use crate::limits::{Places, Refused};
 
-/// Deals from which the likely hands are averaged.
+/// Most deals from which the likely hands are averaged.
 const DEALS_FOR_HANDS: u64 = 500;
 
 /// The service.
@@ -208,14 +208,16 @@ fn evaluated(
     let seat = knowledge.seat();
     let sampler = Sampler::new(knowledge, MAX_ANALYSIS_STEPS)?;
     let actions: Vec<ActionId> = sampler.legal_actions().iter().collect();
-    let progress = |rollouts: u64| {
-        let spent = rollouts as f64 / plan.rollouts as f64;
-        let elapsed = start.elapsed().as_secs_f64() / plan.time.as_secs_f64();
-        if stopped() { 1.0 } else { spent.max(elapsed) }
+    let spent = |done: u64, all: u64, time: Duration| {
+        let elapsed = start.elapsed().as_secs_f64() / time.as_secs_f64();
+        let done = done as f64 / all as f64;
+        if stopped() { 1.0 } else { done.max(elapsed) }
     };
+    // The hands take at most half of the time.
+    let of_hands = |deals: u64| spent(deals, DEALS_FOR_HANDS, plan.time / 2);
+    let hands = likely_hands(&sampler, plan.seed, of_hands);
+    let progress = |rollouts: u64| spent(rollouts, plan.rollouts, plan.time);
     let found = evaluate(&sampler, &actions, plan.method, plan.seed, None, progress);
-    let deals = if stopped() { 0 } else { DEALS_FOR_HANDS };
-    let hands = likely_hands(&sampler, plan.seed, deals);
     Ok(v1::EvaluateResponse {
         seat: seat_number(seat),
         rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
@@ -227,11 +229,10 @@ fn evaluated(
 }
 
 fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
-    let error = estimate.standard_error();
     v1::ActionEstimate {
         action: estimate.action.index().into(),
         points: estimate.points(),
-        standard_error: if error.is_finite() { error } else { 0.0 },
+        standard_error: estimate.standard_error(),
         place: estimate.place(),
         rollouts: estimate.rollouts,
     }

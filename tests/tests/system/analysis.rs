@@ -144,6 +144,22 @@ async fn a_recorded_decision_is_evaluated_by_what_its_seat_knew() {
             found
         );
     }
+    // Points of any size, and hardly any time.
+    let mut large = situation(&game, points(&game)[0]);
+    large.rules.get_or_insert_default().points = vec![u32::MAX, u32::MAX, 1, 0];
+    let brief = v1::EvaluateRequest {
+        time_ms: 1,
+        ..request(Position::Situation(large))
+    };
+    let found = evaluated(&client, brief).await.expect("estimates");
+    for action in &found.actions {
+        assert!(action.rollouts >= 4, "{action:?}");
+        assert!(
+            (0.0..=f64::from(u32::MAX)).contains(&action.points),
+            "{action:?}"
+        );
+        assert!(action.standard_error.is_finite(), "{action:?}");
+    }
     server.stop().await;
 }
 

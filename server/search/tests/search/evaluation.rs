@@ -66,6 +66,45 @@ fn a_winning_play_is_worth_the_first_place() {
 }
 
 #[test]
+fn the_largest_points_have_finite_estimates() {
+    let mut scenario = nearly_won();
+    let spec = RuleSetSpec {
+        points: vec![u32::MAX, 0],
+        ..scenario.rules.spec().clone()
+    };
+    scenario.rules = spec.validate().expect("a rule set");
+    let wins = scenario.moments[2].action;
+    let pass = scenario.rules.actions().pass();
+    let sampler = sampler(&scenario, 2);
+    let found = evaluate(&sampler, &[pass, wins], METHOD, [1; 32], None, spend(400));
+    let most = f64::from(u32::MAX);
+    assert_eq!((found[1].points(), found[1].gain()), (most, most));
+    assert!(found[1].gain_error() < 1e-6 * most, "{found:?}");
+}
+
+#[test]
+fn every_action_is_tried_even_if_the_budget_is_spent() {
+    let scenario = nearly_won();
+    let sampler = sampler(&scenario, 2);
+    let legal: Vec<ActionId> = scenario.legal(2).iter().collect();
+    for allocation in [Allocation::Uniform, Allocation::Halving] {
+        let method = Method {
+            allocation,
+            ..METHOD
+        };
+        let found = evaluate(&sampler, &legal, method, [1; 32], None, |_| 1.0);
+        assert!(
+            found
+                .iter()
+                .all(|found| found.rollouts == 4 && found.place() >= 1.0),
+            "{found:?}"
+        );
+    }
+    let hands = likely_hands(&sampler, [2; 32], |_| 1.0);
+    assert!(hands[1].iter().sum::<f64>() > 0.0, "{hands:?}");
+}
+
+#[test]
 fn the_result_does_not_depend_on_threads() {
     let scenario = Scenario::random(rules(6, 4), 3, Some(&[2, 0, 3, 1]));
     let moment = busiest(&scenario);
@@ -111,7 +150,7 @@ fn likely_hands_add_up_to_the_hidden_cards() {
     let scenario = Scenario::random(rules(6, 4), 2, Some(&[2, 0, 3, 1]));
     let moment = busiest(&scenario);
     let seen = scenario.moments[moment].observation;
-    let hands = likely_hands(&sampler(&scenario, moment), [2; 32], 200);
+    let hands = likely_hands(&sampler(&scenario, moment), [2; 32], spend(200));
     for (hand, (_, left)) in hands.iter().zip(seen.cards_left.iter()) {
         assert!(
             (hand.iter().sum::<f64>() - f64::from(*left)).abs() < 1e-9,

@@ -106,10 +106,11 @@ class EvaluateRequest(_message.Message):
     SEED_FIELD_NUMBER: _builtins.int
     rollouts: _builtins.int
     """Rollouts in all, at most 1,000,000; 0: as many as the time allows. With a number of rollouts
-    and a seed the result is always the same, if the time suffices.
+    and a seed the result is always the same, if the time suffices. Every legal action is tried in 4
+    deals at least, even if that costs more rollouts or time.
     """
     time_ms: _builtins.int
-    """Milliseconds, at most 10,000; 0: 1,000."""
+    """Milliseconds, at most 10,000; 0: 1,000. Counting the possible deals is included."""
     agent: _builtins.str
     """The built-in agent that plays all seats in rollouts: "random", "greedy" or "trained"; empty:
     "greedy".
@@ -160,11 +161,11 @@ class ActionEstimate(_message.Message):
     points: _builtins.float
     """Mean points of the Shift."""
     standard_error: _builtins.float
-    """Standard error of `points`; 0 if it is unknown because there were fewer than two rollouts."""
+    """Standard error of `points`; 0 if all rollouts had the same."""
     place: _builtins.float
     """Mean place in the Shift, from 1."""
     rollouts: _builtins.int
-    """Number of rollouts."""
+    """Number of rollouts, at least 4."""
     def __init__(
         self,
         *,
