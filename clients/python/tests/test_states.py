@@ -125,3 +125,11 @@ def test_what_cannot_be_restored_is_refused(place: str | None) -> None:
             env.restore([0], states[:1])
         with pytest.raises(ChefsHatError, match="this VectorEnv has ended"):
             env.save()
+
+
+@pytest.mark.server
+def test_a_state_too_large_for_a_message_is_refused_before_it_is_sent(real_address: str) -> None:
+    with VectorEnv(real_address, 2, **OPTIONS) as env:
+        with pytest.raises(ValueError, match="a state of 1000000 bytes is too large for a server"):
+            env.restore([0], [bytes(1_000_000)])
+        assert len(env.step(env.sample())) == 2

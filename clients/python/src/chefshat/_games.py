@@ -10,6 +10,11 @@ from chefshat import pb
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch
 
+# The most bytes of a message that a server takes (`max_vector_message_bytes`), and of the states in one, beside which their games
+# have room.
+MAX_MESSAGE_BYTES = 1024 * 1024
+MAX_STATES_BYTES = 900_000
+
 
 class Games(Protocol):
     """Games stepped in batches. A method that raises an error has ended them, unless its reason is GAMES_IN_USE.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import channels, pb
-from chefshat._games import checked
+from chefshat._games import MAX_STATES_BYTES, checked
 from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch, GameRecord
@@ -21,9 +21,8 @@ from chefshat.network import grpc
 
 # Maximum bytes of a message: the largest batch has a quarter of them (`max_vector_batch_bytes`), a part of a record far fewer.
 MAX_BATCH_BYTES = 64 * 1024 * 1024
-# Most games whose states are asked for, and most bytes of states sent, in one message (`max_vector_message_bytes` is 1 MiB).
+# Most games whose states are asked for in one message.
 SAVED_AT_ONCE = 4096
-RESTORED_BYTES = 900_000
 # An environment cannot reconnect and has no clock, so it is patient with a busy server. Times in milliseconds.
 PATIENT_CHANNEL = [
     ("grpc.max_receive_message_length", MAX_BATCH_BYTES),
@@ -124,7 +123,7 @@ class RemoteGames:
         first, size = 0, 0
         for place, state in enumerate(states):
             size += len(state)
-            if place > first and size > RESTORED_BYTES:
+            if place > first and size > MAX_STATES_BYTES:
                 self._restore(games[first:place], states[first:place])
                 first, size = place, len(state)
         return self._restore(games[first:], states[first:])

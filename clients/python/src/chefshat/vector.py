@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import local_server, pb
-from chefshat._games import Games, checked
+from chefshat._games import MAX_MESSAGE_BYTES, MAX_STATES_BYTES, Games, checked
 from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
@@ -44,8 +44,6 @@ __all__ = [
     "sample_legal",
 ]
 
-#: The most bytes of a setup that a server takes (`max_vector_message_bytes`).
-MAX_SETUP_BYTES = 1024 * 1024
 #: The address of the server shared by this process, which is started on demand.
 LOCAL = "local"
 
@@ -276,6 +274,9 @@ class VectorEnv:
             raise ValueError(f"name each game once and give one state for each: {len(chosen)} games and {len(states)} states")
         if not len(chosen):
             return self.batch
+        largest = max(len(state) for state in states)
+        if self.server is not None and largest > MAX_STATES_BYTES:
+            raise ValueError(f"a state of {largest} bytes is too large for a server: restore it in this process, without `address`")
         try:
             batch = self._games.restore(chosen[order], [states[place] for place in order])
             if self._memory is not None:
@@ -309,7 +310,7 @@ class VectorEnv:
         if setup.total_games:
             setup.total_games = setup.games
         put_seed(setup, seed)
-        if self.server is not None and setup.ByteSize() > MAX_SETUP_BYTES:
+        if self.server is not None and setup.ByteSize() > MAX_MESSAGE_BYTES:
             raise ValueError(f"{len(states)} games are too many to fork on a server at once: fork some of them at a time")
         env = type(self).__new__(type(self))
         env._start(setup, self._place, self._memory is not None, self._reward_function)
