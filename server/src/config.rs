@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_record::signature::SigningKey;
+use chefshat_vector::Limits;
 
 use crate::access::AccessSettings;
 use crate::limits::Shares;
@@ -35,9 +36,9 @@ pub const MAX_VECTOR_STREAMS: usize = 128;
 /// default share of one caller is as many as one stream may have.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 163_840;
 /// Most game seeds in one message.
-pub const MAX_VECTOR_SEEDS: usize = 16_384;
+pub const MAX_VECTOR_SEEDS: usize = Limits::DEFAULT.seeds;
 /// Most games of a vector stream with records.
-pub const MAX_VECTOR_RECORDED_GAMES: u32 = 256;
+pub const MAX_VECTOR_RECORDED_GAMES: u32 = Limits::DEFAULT.recorded_games;
 /// How long a client may take to send the setup of a vector stream.
 pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long a client may think about a batch.
@@ -104,7 +105,7 @@ pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and highest target in points.
-pub const MAX_HOSTED_SHIFTS: u32 = 1_000;
+pub const MAX_HOSTED_SHIFTS: u32 = Limits::DEFAULT.recorded_shifts;
 /// Interval of heartbeats on an idle Watch stream.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 

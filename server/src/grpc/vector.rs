@@ -33,8 +33,8 @@ use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use crate::access::Caller;
 use crate::config::{
-    MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS,
-    MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT, VECTOR_SETUP_TIMEOUT,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
+    VECTOR_SETUP_TIMEOUT,
 };
 use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
@@ -46,12 +46,6 @@ const SEND_AHEAD: usize = 4;
 const MAX_GAMES_IN_PLACE: u32 = 16;
 /// Most games that are stepped without the thread pool if fast built-in agents play.
 const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
-/// What setups may ask for.
-const LIMITS: Limits = Limits {
-    seeds: MAX_VECTOR_SEEDS,
-    recorded_games: MAX_VECTOR_RECORDED_GAMES,
-    recorded_shifts: MAX_HOSTED_SHIFTS,
-};
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -175,12 +169,11 @@ impl Runner {
                 return Err(field("SETUP_MISSING", &FieldProblem::new("setup", words)).into());
             }
         };
-        let setup = self.setup(&message).await?;
+        let setup = self.setup(*message).await?;
         let _seats = self.reserve(&setup)?;
         let _games = self.service.metrics().vector_games(setup.games());
         self.send(ResponseKind::Started(started_to_proto(&setup)))
             .await?;
-        let in_place = steps_in_place(&setup);
         let begun = self.run_on_pool(move || VectorGames::new(setup)).await?;
         let (mut games, mut batch) = begun;
         loop {
@@ -213,6 +206,7 @@ impl Runner {
                 let decisions = u64::try_from(actions.len()).unwrap_or(u64::MAX);
                 self.service.metrics().vector_decided(decisions);
             }
+            let in_place = executes_in_place(&command, games.setup());
             let step = move || (command.execute(&mut games), games);
             let stepped;
             (stepped, games) = match in_place {
@@ -233,7 +227,9 @@ impl Runner {
             None => return Ok(None),
             Some(Some(RequestKind::Save(message))) => return Ok(Some(Command::Save(message))),
             Some(Some(RequestKind::Actions(message))) => VectorRequest::actions(&message),
-            Some(Some(RequestKind::Reset(message))) => VectorRequest::reset(&message, &LIMITS),
+            Some(Some(RequestKind::Reset(message))) => {
+                VectorRequest::reset(&message, &Limits::DEFAULT)
+            }
             Some(Some(RequestKind::Restore(message))) => Ok(VectorRequest::Restore(message)),
             Some(Some(RequestKind::Setup(_))) => {
                 let words = "the games are already set up; open another stream for others";
@@ -279,18 +275,26 @@ impl Runner {
     }
 
     /// Checks a setup message and reads the recorded game it names.
-    async fn setup(&self, message: &v1::VectorSetup) -> Result<VectorSetup, Status> {
+    async fn setup(&self, message: v1::VectorSetup) -> Result<VectorSetup, Status> {
         let drawn = || u64::from_le_bytes(random_bytes());
-        let seeds = seeds_from_setup(message, &LIMITS, drawn).map_err(vector_refused)?;
-        let (rules, start) = match &message.start {
+        let seeds = seeds_from_setup(&message, &Limits::DEFAULT, drawn).map_err(vector_refused)?;
+        let branch = match &message.start {
             Some(vector_setup::Start::Branch(point)) => {
-                self.point(point, message.rules.as_ref()).await?
+                Some(self.point(point, message.rules.as_ref()).await?)
             }
-            _ => start_from_proto(message)
-                .map_err(vector_refused)?
-                .ok_or_else(internal)?,
+            _ => None,
         };
-        setup_from_proto(message, rules, start, seeds, &LIMITS).map_err(vector_refused)
+        // On the pool, because there may be many saved games or long lists of actions.
+        let read = move || {
+            let start = match branch {
+                None => start_from_proto(&message).map_err(vector_refused)?,
+                branch => branch,
+            };
+            let (rules, start) = start.ok_or_else(internal)?;
+            setup_from_proto(&message, rules, start, seeds, &Limits::DEFAULT)
+                .map_err(vector_refused)
+        };
+        self.run_on_pool(read).await?
     }
 
     /// The state of a recorded game at a point.
@@ -327,8 +331,12 @@ impl Runner {
     }
 }
 
-/// Whether a step of these games takes less time than waking a thread of the pool.
-fn steps_in_place(setup: &VectorSetup) -> bool {
+/// Whether a request takes less time than waking a thread of the pool: only a step does, in few
+/// games. Saved games take long to read, and starts may have long lists of actions.
+fn executes_in_place(request: &VectorRequest, setup: &VectorSetup) -> bool {
+    if !matches!(request, VectorRequest::Actions(_)) {
+        return false;
+    }
     let others = match setup.decisions() {
         Decisions::Turns { others } => others,
         Decisions::All => None,
@@ -442,6 +450,7 @@ fn too_late(reason: &str, what: &str, limit: Duration, advice: &str) -> Status {
 #[cfg(test)]
 mod tests {
     use chefshat_simulation::vector::Seeds;
+    use chefshat_vector::Reset;
 
     use crate::grpc::vector::*;
 
@@ -455,6 +464,11 @@ mod tests {
 
     #[test]
     fn only_short_steps_are_made_in_place() {
+        let step = VectorRequest::Actions(Vec::new());
+        let others = [
+            VectorRequest::Restore(v1::VectorRestore::default()),
+            VectorRequest::Reset(Reset::All(None)),
+        ];
         let spec = chefshat_engine::RuleSetSpec::default();
         let rules = spec.validate().expect("a valid rule set");
         let random = Some(AgentKind::Random);
@@ -477,7 +491,11 @@ mod tests {
             let setup = VectorSetup::new(rules, games, &agents, Seeds::Base(1))
                 .expect("a valid setup")
                 .with_decisions(decisions);
-            assert_eq!(steps_in_place(&setup), expected, "{games} {agents:?}");
+            let in_place = executes_in_place(&step, &setup);
+            assert_eq!(in_place, expected, "{games} {agents:?}");
+            for other in &others {
+                assert!(!executes_in_place(other, &setup), "{other:?}");
+            }
         }
     }
 }

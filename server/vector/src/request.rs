@@ -3,7 +3,7 @@
 use chefshat_engine::ActionId;
 use chefshat_proto::v1::{self, vector_reset};
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Batch, Seeds, VectorGames};
+use chefshat_simulation::vector::{Batch, Seeds, StateError, VectorGames};
 
 use crate::error::RequestError;
 use crate::setup::{Limits, seeds_from_proto};
@@ -77,6 +77,15 @@ impl Request {
 fn restore(message: &v1::VectorRestore, games: &mut VectorGames) -> Result<Batch, RequestError> {
     let refused = |problem| RequestError::field("STATES_REFUSED", &problem);
     let chosen = numbers("games", &message.games).map_err(refused)?;
+    let (given, states) = (chosen.len(), message.states.len());
+    if given != states {
+        // Before any is read.
+        return Err(StateError::Count {
+            games: given,
+            states,
+        }
+        .into());
+    }
     let states = states_from_proto(&message.states).map_err(refused)?;
     Ok(games.restore(&chosen, states)?)
 }

@@ -28,6 +28,15 @@ pub struct Limits {
     pub recorded_shifts: u32,
 }
 
+impl Limits {
+    /// Those of a server and of games in process: a setup that one accepts, the other does.
+    pub const DEFAULT: Limits = Limits {
+        seeds: 16_384,
+        recorded_games: 256,
+        recorded_shifts: 1_000,
+    };
+}
+
 /// The seeds of a setup; `drawn` supplies a base seed if it has none.
 ///
 /// # Errors
@@ -76,8 +85,9 @@ pub fn start_from_proto(
             Ok(Some((rules, Start::Listed(points.into()))))
         }
         Some(vector_setup::Start::Saved(saved)) => {
-            let states = states_from_proto(&saved.states)
-                .map_err(|problem| RequestError::field("STATES_REFUSED", &problem))?;
+            let refused = |problem| RequestError::field("STATES_REFUSED", &problem);
+            check_count(saved, message.games).map_err(refused)?;
+            let states = states_from_proto(&saved.states).map_err(refused)?;
             let start = Start::Saved {
                 games: states.into(),
                 same_deals: saved.same_deals,
@@ -86,6 +96,16 @@ pub fn start_from_proto(
         }
         Some(vector_setup::Start::Branch(_)) => Ok(None),
     }
+}
+
+/// Refuses more saved games than are played, before any is read: memory is reserved for those.
+fn check_count(saved: &v1::SavedStart, games: u32) -> Result<(), FieldProblem> {
+    let states = saved.states.len();
+    if u32::try_from(states).is_ok_and(|states| states <= games) {
+        return Ok(());
+    }
+    let words = format!("{states} saved games for {games} parallel games: give at most as many");
+    Err(FieldProblem::new("saved", words))
 }
 
 fn point_from_proto(
@@ -302,7 +322,8 @@ fn problem(error: SetupError) -> FieldProblem {
         | SetupError::ListedScript { .. }
         | SetupError::ListedAction { .. }
         | SetupError::ListedEnd { .. } => "listed",
-        SetupError::NoSaved | SetupError::Saved { .. } => "saved",
+        SetupError::NoSaved | SetupError::Saved { .. } | SetupError::Copied(_) => "saved",
+        SetupError::SavedRecords => "records",
     };
     FieldProblem::new(field, error.to_string())
 }
@@ -327,4 +348,24 @@ pub(crate) fn seeds_from_proto(
         })
     });
     Ok(Seeds::List(seeds.collect::<Result<_, _>>()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::setup::*;
+
+    #[test]
+    fn lists_of_seeds_are_limited() {
+        let setup = |seeds| v1::VectorSetup {
+            seeds: Some(vector_setup::Seeds::GameSeeds(v1::GameSeeds {
+                seeds: vec![vec![7; 32]; seeds],
+            })),
+            ..v1::VectorSetup::default()
+        };
+        let read = |seeds| seeds_from_setup(&setup(seeds), &Limits::DEFAULT, || 0);
+        assert!(read(16_384).is_ok());
+        let error = read(16_385).unwrap_err();
+        assert_eq!(error.reason, "SEED_REFUSED");
+        assert_eq!(error.message, "game_seeds: 16385 seeds; give 1 to 16384");
+    }
 }

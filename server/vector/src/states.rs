@@ -66,3 +66,41 @@ pub(crate) fn numbers(field: &'static str, column: &[u8]) -> Result<Vec<u32>, Fi
         .map(|bytes| u32::from_le_bytes(*bytes))
         .collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use chefshat_engine::RuleSetSpec;
+    use chefshat_simulation::vector::{Seeds, VectorSetup};
+
+    use crate::setup::start_from_proto;
+    use crate::states::*;
+
+    #[test]
+    fn too_many_states_are_refused_before_any_is_read() {
+        let states = vec![b"not a state".to_vec(); 3];
+        let saved = v1::SavedStart {
+            states: states.clone(),
+            same_deals: true,
+        };
+        let setup = v1::VectorSetup {
+            games: 2,
+            start: Some(v1::vector_setup::Start::Saved(saved)),
+            ..v1::VectorSetup::default()
+        };
+        let error = start_from_proto(&setup).unwrap_err();
+        assert_eq!(error.reason, "STATES_REFUSED");
+        let words = "saved: 3 saved games for 2 parallel games: give at most as many";
+        assert_eq!(error.message, words);
+
+        let rules = RuleSetSpec::default().validate().unwrap();
+        let setup = VectorSetup::new(rules, 2, &[None; 4], Seeds::Base(1)).unwrap();
+        let (mut games, _) = VectorGames::new(setup);
+        let restore = v1::VectorRestore {
+            games: [0u32, 1].map(u32::to_le_bytes).concat(),
+            states,
+        };
+        let error = crate::Request::Restore(restore).execute(&mut games);
+        let words = "games: 3 states for 2 games: give one for each";
+        assert_eq!(error.unwrap_err().message, words);
+    }
+}

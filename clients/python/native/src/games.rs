@@ -23,13 +23,6 @@ use rand::TryRng as _;
 use crate::tables::{Batch, Record, layouts};
 use crate::threads::pool;
 
-/// As a server's, so that a setup that is accepted here is accepted there.
-const LIMITS: Limits = Limits {
-    seeds: 16_384,
-    recorded_games: 256,
-    recorded_shifts: 1_000,
-};
-
 /// Most games whose step is fast.
 const MAX_FAST_GAMES: u32 = 8;
 
@@ -63,9 +56,9 @@ impl Games {
         let pool = pool(threads);
         let begun = py.detach(|| {
             caught(|| {
-                let seeds = seeds_from_setup(&message, &LIMITS, random_seed)?;
+                let seeds = seeds_from_setup(&message, &Limits::DEFAULT, random_seed)?;
                 let (rules, start) = start_from_proto(&message)?.ok_or_else(no_records_here)?;
-                let setup = setup_from_proto(&message, rules, start, seeds, &LIMITS)?;
+                let setup = setup_from_proto(&message, rules, start, seeds, &Limits::DEFAULT)?;
                 let started = started_to_proto(&setup).encode_to_vec();
                 let (games, mut columns) = VectorGames::on(setup, pool);
                 let records = records(&games, &mut columns);
@@ -124,7 +117,8 @@ impl Games {
     /// Executes a serialized `VectorReset` and returns the next batch.
     fn reset(&self, py: Python<'_>, reset: &[u8]) -> PyResult<Batch> {
         let message = decode::<v1::VectorReset>("reset", reset)?;
-        let request = Request::reset(&message, &LIMITS).map_err(|error| refused(py, error))?;
+        let request =
+            Request::reset(&message, &Limits::DEFAULT).map_err(|error| refused(py, error))?;
         self.execute(py, request)
     }
 

@@ -12,8 +12,8 @@ use super::{Episode, VectorSetup};
 
 /// The end of an episode with a place for every seat.
 const FINISHED: u8 = 1;
-/// Seat in a column where there is none.
-const NO_SEAT: u8 = u8::MAX;
+/// Seat in a column or a state where there is none.
+pub(super) const NO_SEAT: u8 = u8::MAX;
 
 /// The tables of one step.
 #[derive(Clone, PartialEq, Debug, Default)]

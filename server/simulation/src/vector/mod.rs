@@ -177,7 +177,8 @@ impl VectorGames {
     }
 
     /// Replaces these games, in ascending order, by saved ones. Each continues exactly as the saved
-    /// game would, with its index. The batch contains all open decisions; a restored game has not
+    /// game would, with its index, until its end. The game that follows has the index that is higher
+    /// by the number of games here, and the seed that it has here. The batch contains all open decisions; a restored game has not
     /// begun anew, so it is not among the beginnings.
     ///
     /// # Errors
@@ -218,11 +219,7 @@ impl VectorGames {
         times: u32,
         seeds: Option<Seeds>,
     ) -> Result<(VectorGames, Batch), SetupError> {
-        let saved = self.save(games).map_err(|error| SetupError::Saved {
-            entry: 0,
-            error: error.into(),
-        })?;
-        let setup = self.setup.forked(saved, times, seeds)?;
+        let setup = self.setup.forked(self.save(games)?, times, seeds)?;
         Ok(VectorGames::new(setup))
     }
 

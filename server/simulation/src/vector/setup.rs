@@ -1,6 +1,7 @@
 //! Validated options of a vector environment.
 
 use std::num::{NonZeroU32, NonZeroU64};
+use std::sync::Arc;
 
 use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Seed};
 
@@ -143,7 +144,8 @@ impl VectorSetup {
     /// Sets the start of each game. Saved games are checked with the options set before.
     ///
     /// # Errors
-    /// If a script is invalid under the rule set, or a saved game cannot be continued.
+    /// If a script is invalid under the rule set, or a saved game cannot be continued: not with
+    /// records, because the start of its game is unknown.
     pub fn with_start(self, mut start: Start) -> Result<VectorSetup, SetupError> {
         match &mut start {
             Start::Script(script) => {
@@ -153,12 +155,15 @@ impl VectorSetup {
                 if games.is_empty() {
                     return Err(SetupError::NoSaved);
                 }
+                if self.records {
+                    return Err(SetupError::SavedRecords);
+                }
                 let terms = self.terms();
-                let checked = games.iter().cloned().enumerate().map(|(entry, saved)| {
+                let mut games = Arc::make_mut(games).iter_mut().enumerate();
+                games.try_for_each(|(entry, saved)| {
                     let error = |error| SetupError::Saved { entry, error };
-                    saved.into_start(&terms).map_err(error)
-                });
-                *games = checked.collect::<Result<_, _>>()?;
+                    saved.become_start(&terms).map_err(error)
+                })?;
             }
             Start::Listed(points) => {
                 if points.is_empty() {
@@ -194,8 +199,9 @@ impl VectorSetup {
 
     /// Options for `times` copies of each of these games, otherwise the same. With seeds, copies
     /// differ in later deals and in the random choices of built-in agents; without, they continue
-    /// as the saved games would. If the number of games is limited, none follows a copy. Decisions
-    /// are not kept for records.
+    /// as the saved games would. If the number of games is limited, none follows a copy; otherwise
+    /// another copy does, which without seeds has the same deals again. Decisions are not kept for
+    /// records.
     ///
     /// # Errors
     /// If there are too many copies, or a game cannot be continued.

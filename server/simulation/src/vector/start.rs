@@ -6,7 +6,7 @@ use chefshat_agents::game_seed;
 use chefshat_engine::{ActionError, ActionId, Game, Script, ScriptError, Seed};
 use thiserror::Error;
 
-use super::error::StateError;
+use super::error::{StateError, StepError};
 use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 use super::saved::SavedGame;
 
@@ -64,8 +64,9 @@ pub enum Start {
         /// The games.
         games: Arc<[SavedGame]>,
         /// Whether a copy continues as the saved game would: with its seed, and its agents'
-        /// generators where they were. Otherwise later Shifts are dealt and agents choose by each
-        /// game's own seed.
+        /// generators where they were. A game that follows a copy of the same saved game then has
+        /// the same deals again: limit the total number of games, or collect the statistics of one
+        /// game each. Otherwise later Shifts are dealt and agents choose by each game's own seed.
         same_deals: bool,
     },
 }
@@ -147,6 +148,12 @@ pub enum SetupError {
     /// The list of saved games is empty.
     #[error("the list of saved games is empty: give at least one")]
     NoSaved,
+    /// Copies of saved games cannot be recorded.
+    #[error("copies of saved games cannot be recorded: leave records off")]
+    SavedRecords,
+    /// A game to be copied does not exist.
+    #[error(transparent)]
+    Copied(#[from] StepError),
     /// A saved game cannot be continued with these options.
     #[error("saved game {entry}: {error}")]
     Saved {

@@ -45,8 +45,9 @@ pub struct Difference {
     pub here: String,
 }
 
-/// The options that decide what a state contains and how its game continues. Episodes, the number
-/// of games, seeds and starts are not among them.
+/// The options that decide what a state contains, or which of its values are valid. Episodes, the
+/// number of games, seeds, starts, and whether forced decisions are skipped are not among them: they
+/// may differ where a state is restored, and apply from there.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub(super) struct Terms {
     pub(super) rules: RuleSet,

@@ -5,10 +5,8 @@ use chefshat_engine::{
 };
 
 use super::reader::Reader;
+use crate::vector::columns::NO_SEAT;
 use crate::vector::error::StateError;
-
-/// Where there is no seat.
-const NO_SEAT: u8 = u8::MAX;
 
 pub(super) fn put_game(out: &mut Vec<u8>, state: &GameState) {
     let faces = state.rules.faces();

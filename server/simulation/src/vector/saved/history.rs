@@ -3,12 +3,11 @@
 use chefshat_engine::ActionId;
 
 use super::reader::Reader;
+use crate::vector::columns::NO_SEAT;
 use crate::vector::error::StateError;
 use crate::vector::history::{Entry, History, Seen};
 use crate::vector::terms::Terms;
 
-/// Where there is no seat.
-const NO_SEAT: u8 = u8::MAX;
 /// Bytes of an entry.
 const ENTRY: usize = 5;
 

@@ -77,15 +77,14 @@ impl SavedGame {
         running.is_none_or(|running| running.is_played_from(start(running.seed)))
     }
 
-    /// The state as the start of games with these terms: without kept decisions.
+    /// Makes the state the start of games with these terms, which keep no records.
     ///
     /// # Errors
     /// If its game is over or cannot continue.
-    pub(super) fn into_start(mut self, terms: &Terms) -> Result<SavedGame, StateError> {
+    pub(super) fn become_start(&mut self, terms: &Terms) -> Result<(), StateError> {
         let running = self.running.as_mut().ok_or(StateError::Over)?;
         running.forget_decisions();
-        self.terms.records = terms.records;
-        self.check(terms)?;
-        Ok(self)
+        self.terms.records = false;
+        self.check(terms)
     }
 }

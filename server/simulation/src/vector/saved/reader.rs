@@ -3,6 +3,7 @@
 use chefshat_agents::AgentKind;
 use chefshat_engine::{BySeat, Seat};
 
+use crate::vector::columns::NO_SEAT;
 use crate::vector::error::StateError;
 
 /// Bytes not yet read.
@@ -95,9 +96,9 @@ impl<'a> Reader<'a> {
         Ok(Seat::new(index))
     }
 
-    /// A seat, or 255 for none.
+    /// A seat, or [`NO_SEAT`].
     pub(super) fn seat_or_none(&mut self, players: usize) -> Result<Option<Seat>, StateError> {
-        if self.0.first() == Some(&u8::MAX) {
+        if self.0.first() == Some(&NO_SEAT) {
             self.u8()?;
             return Ok(None);
         }

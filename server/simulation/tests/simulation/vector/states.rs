@@ -413,6 +413,14 @@ fn a_fork_with_seeds_keeps_the_cards_and_changes_what_is_dealt_later() {
         games.fork(&[0], 1, None).unwrap_err().to_string()
     };
     assert!(over.contains("is over"), "{over}");
+    let missing = games.fork(&[7], 1, None).unwrap_err().to_string();
+    assert!(missing.starts_with("game 7 does not exist"), "{missing}");
+    let recorded = Start::Saved {
+        games: games.save(&[0]).unwrap().into(),
+        same_deals: true,
+    };
+    let recorded = setup.clone().with_records(true).with_start(recorded);
+    assert_eq!(recorded.unwrap_err(), SetupError::SavedRecords);
     let none: Vec<SavedGame> = Vec::new();
     let empty = Start::Saved {
         games: none.into(),

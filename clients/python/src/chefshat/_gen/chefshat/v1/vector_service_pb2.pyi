@@ -275,14 +275,16 @@ class SavedStart(_message.Message):
     SAME_DEALS_FIELD_NUMBER: _builtins.int
     same_deals: _builtins.bool
     """Whether a copy continues exactly as the saved game would: with its seed, and with the random
-    choices of its built-in agents. Otherwise later Shifts are dealt, and built-in agents choose, by
-    the seed of each game; the cards of the current Shift stay the same.
+    choices of its built-in agents. A game that follows a copy of the same state then has the same
+    deals and choices again, and is no new sample: set total_games to `games` so that none follows.
+    Otherwise later Shifts are dealt, and built-in agents choose, by the seed of each game; the
+    cards of the current Shift stay the same.
     """
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
         """States, as in VectorStates, of running games with the same rules, seats, rewards, decisions,
-        rule for invalid actions, shift_statistics and history. The game with index i is a copy of the
-        state at i modulo their number.
+        rule for invalid actions, shift_statistics and history: at least one, at most `games`. The game
+        with index i is a copy of the state at i modulo their number.
         """
 
     def __init__(
@@ -535,8 +537,13 @@ Global___VectorSave: _TypeAlias = VectorSave  # noqa: Y015
 @_typing.final
 class VectorRestore(_message.Message):
     """Replaces games by saved ones. Each continues exactly as the saved game would, with its index and
-    its seed. The next batch has every game that waits for the client; the other games are unchanged.
-    A restored game is not among the beginnings.
+    its seed, until it is over; the game that follows has the index that is higher by `games` of this
+    stream, and the seed that it has here. The next batch has every game that waits for the client;
+    the other games are unchanged. A restored game is not among the beginnings.
+
+    A request has at most max_vector_message_bytes, fewer than VectorStates may have: restore games in
+    several requests. A single state is larger only if it has some 100,000 decisions kept for a
+    record; it can then be restored in process, not over the network.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -548,7 +555,7 @@ class VectorRestore(_message.Message):
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
         """The state of each, in the same order, from a stream whose setup differs at most in the number
-        of games, seeds, starts, episodes and skip_forced.
+        of games, seeds, starts, episodes and skip_forced. One for each game.
         """
 
     def __init__(
