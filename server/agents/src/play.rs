@@ -30,8 +30,8 @@ pub trait Listener {
     }
 }
 
-/// Plays a game to its end and returns the final standings. `decide` answers for every seat. An
-/// illegal action is reported and the decision asked again; after `max_invalid_attempts` of them,
+/// Plays a game to its end and returns the final standings. `decide` answers for every seat; for
+/// agents, which may follow events, there is [`play_agents`]. An illegal action is reported and the decision asked again; after `max_invalid_attempts` of them,
 /// if there is a limit, the default action is taken.
 ///
 /// Never returns if there is no limit and `decide` never returns a legal action.

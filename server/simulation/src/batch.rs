@@ -13,7 +13,7 @@ use thiserror::Error;
 use crate::BatchTable;
 use crate::fold::fold_in_order;
 use chefshat_agents::is_wrong_action;
-use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed, play};
+use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed, play_agents};
 
 /// Games played by one thread at a time. Part of the result: it decides how rewards and scores are
 /// grouped for summing.
@@ -138,13 +138,8 @@ impl Batch {
             let kind = self.agents.get(seat).copied().unwrap_or_default();
             BuiltInAgent::new(kind, agent_seed(seed, seat))
         });
-        play(
-            self.rules,
-            seed,
-            self.max_invalid_attempts,
-            |seat, observation, legal| agents[seat.index()].decide(observation, legal),
-            listener,
-        )
+        let attempts = self.max_invalid_attempts;
+        play_agents(self.rules, seed, attempts, &mut agents, listener)
     }
 
     /// Plays all games on the current rayon pool and returns the totals. `progress` is called from

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::seating_agent_seed;
-use chefshat_agents::{AgentKind, BuiltInAgent, Listener, game_seed, play};
+use chefshat_agents::{AgentKind, BuiltInAgent, Listener, game_seed, play_agents};
 use chefshat_tournament::{Change, Ended, Game, SeatStatistics};
 use chefshat_tournament::{State, Tournament};
 
@@ -100,13 +100,7 @@ fn play_game(game: &Game, index: usize, kinds: &[AgentKind], rules: RuleSet, see
         seats: vec![SeatStatistics::default(); game.seats.len()],
         last_shift: None,
     };
-    let standings = play(
-        rules,
-        dealt_by,
-        None,
-        |seat, observation, legal| agents[seat.index()].decide(observation, legal),
-        &mut listener,
-    );
+    let standings = play_agents(rules, dealt_by, None, &mut agents, &mut listener);
     let last = listener.last_shift.expect("a game has at least one Shift");
     let mut seats = listener.seats;
     for (place, seat, points) in standings.iter() {

@@ -2,14 +2,14 @@
 //! how much duplicate deals reduce the error of the difference, as in a tournament where replicas
 //! of a deal go to different participants. For two agents at one table see [`super::Duplicate`].
 
-use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
+use chefshat_engine::{ActionId, Event, MAX_SEATS, Mask, Observation, RuleSet, Seat};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 use super::Contender;
 use crate::fold::fold_in_order;
 use chefshat_agents::seating_agent_seed;
-use chefshat_agents::{BuiltInAgent, Listener, game_seed, play};
+use chefshat_agents::{BuiltInAgent, Following, Listener, game_seed, play_agents};
 use chefshat_tournament::statistics::Moments;
 
 /// Deals played by one thread at a time. Part of the result: it decides how figures are grouped for
@@ -112,22 +112,17 @@ impl SameSeat {
             contender.agent(&self.rules, seating_agent_seed(seed, who, seat))
         });
         let percent = (100.0 * candidate.epsilon).round() as u64;
-        // No agent has this seed: agents use the first two seatings.
-        let mut explorer = ChaCha8Rng::from_seed(seating_agent_seed(seed, 2 + who, own));
-        let standings = play(
-            self.rules,
-            seed,
-            None,
-            |seat, observation, legal| {
-                let action = agents[seat.index()].decide(observation, legal);
-                if seat == own && below(&mut explorer, 100) < percent {
-                    let index = below(&mut explorer, legal.len() as u64);
-                    return legal.nth(index as usize).unwrap_or(action);
-                }
-                action
-            },
-            &mut Silent,
-        );
+        if percent > 0 {
+            let agent = agents[own.index()].clone();
+            // No agent has this seed: agents use the first two seatings.
+            let chance = ChaCha8Rng::from_seed(seating_agent_seed(seed, 2 + who, own));
+            agents[own.index()] = BuiltInAgent::following(Box::new(Exploring {
+                agent,
+                percent,
+                chance,
+            }));
+        }
+        let standings = play_agents(self.rules, seed, None, &mut agents, &mut Silent);
         let place = standings.iter().find(|(_, seat, _)| *seat == own);
         let (place, _, _) = place.expect("every seat has a place");
         let points = self.rules.spec().points;
@@ -159,6 +154,37 @@ impl Measured {
     pub fn gain(&self) -> Option<f64> {
         (self.duplicate_error > 0.0 && self.duplicate_error.is_finite())
             .then(|| (self.independent_error / self.duplicate_error).powi(2))
+    }
+}
+
+/// An agent that now and then takes a random legal action instead.
+#[derive(Debug, Clone)]
+struct Exploring {
+    agent: BuiltInAgent,
+    percent: u64,
+    chance: ChaCha8Rng,
+}
+
+impl Following for Exploring {
+    fn name(&self) -> &'static str {
+        self.agent.name()
+    }
+
+    fn on_event(&mut self, seat: Seat, event: &Event) {
+        self.agent.on_event(seat, event);
+    }
+
+    fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId {
+        let action = self.agent.decide(observation, legal);
+        if below(&mut self.chance, 100) < self.percent {
+            let index = below(&mut self.chance, legal.len() as u64);
+            return legal.nth(index as usize).unwrap_or(action);
+        }
+        action
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Following> {
+        Box::new(self.clone())
     }
 }
 

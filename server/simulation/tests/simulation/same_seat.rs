@@ -1,7 +1,9 @@
 //! Comparison in the same seats: duplicate deals need fewer games, and the stated errors are right.
 
-use chefshat_agents::AgentKind;
-use chefshat_engine::{RuleSetSpec, Stop};
+use std::sync::Arc;
+
+use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent, Following};
+use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, RuleSetSpec, Seat, Stop};
 use chefshat_simulation::{Candidate, Contender, Measured, SameSeat};
 
 fn measured(random_percent: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> {
@@ -71,4 +73,62 @@ fn the_stated_error_matches_many_repetitions() {
         .sum::<f64>()
         / count;
     assert!((0.7..1.4).contains(&(found / stated)), "{found} {stated}");
+}
+
+/// Makes agents that need the events of the game.
+#[derive(Debug)]
+struct Followers;
+
+impl AgentMaker for Followers {
+    fn agent(&self, _: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
+        BuiltInAgent::following(Box::new(Follower {
+            agent: BuiltInAgent::new(AgentKind::Random, seed),
+            pizzas: 0,
+        }))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Follower {
+    agent: BuiltInAgent,
+    pizzas: u32,
+}
+
+impl Following for Follower {
+    fn name(&self) -> &'static str {
+        "follower"
+    }
+
+    fn on_event(&mut self, _: Seat, event: &Event) {
+        self.pizzas += u32::from(matches!(event, Event::PizzaDone { .. }));
+    }
+
+    fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId {
+        assert_eq!(self.pizzas + 1, observation.pizza, "it sees every pizza");
+        self.agent.decide(observation, legal)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Following> {
+        Box::new(self.clone())
+    }
+}
+
+#[test]
+fn agents_see_the_events_of_the_game() {
+    let spec = RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::default()
+    };
+    let candidate = |epsilon| Candidate {
+        plays: Contender::Made(Arc::new(Followers)),
+        epsilon,
+    };
+    let same_seat = SameSeat {
+        rules: spec.validate().unwrap(),
+        candidates: [candidate(0.0), candidate(0.5)],
+        others: Contender::Made(Arc::new(Followers)),
+        seed: 3,
+    };
+    let measured = same_seat.measure(&[8], |_| {});
+    assert!(measured[0].duplicate_error > 0.0, "{measured:?}");
 }
