@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 use crate::holders::{Counts, Holders, MAX_KINDS};
-use crate::table::Table;
+use crate::table::{Steps, Table};
 use crate::{Knowledge, KnowledgeError, World};
 
 /// The random numbers of a search, in an order that a seed determines.
@@ -60,15 +60,16 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Counts the deals that are consistent with what a seat knows.
+    /// Counts the deals that are consistent with what a seat knows. A step takes 8 bytes at most.
     ///
     /// # Errors
     /// If there is none, or counting takes more than `max_steps` steps.
     pub fn new(knowledge: Knowledge, max_steps: u64) -> Result<Sampler, KnowledgeError> {
+        let mut steps = Steps::new(max_steps);
         let mut cases = Vec::new();
         for drawn in drawn_seats(&knowledge) {
             if let Some(holders) = Holders::new(&knowledge, drawn)? {
-                let table = Table::new(holders, max_steps)?;
+                let table = Table::new(holders, &mut steps)?;
                 cases.push(Case { drawn, table });
             }
         }
@@ -104,6 +105,11 @@ impl Sampler {
     /// see, with the seats that may have been drawn for the opening.
     pub fn ways(&self) -> f64 {
         self.ways
+    }
+
+    /// The numbers that it keeps, 8 bytes each.
+    pub fn states(&self) -> usize {
+        self.cases.iter().map(|case| case.table.states()).sum()
     }
 
     /// Draws a deal.

@@ -34,6 +34,25 @@ pub(crate) struct Split {
     weight: f64,
 }
 
+/// The steps that counting may still take, over all tables of a decision. A step is to lay out a
+/// state, which takes 8 bytes, or to try a way to split a kind.
+pub(crate) struct Steps {
+    all: u64,
+    left: u64,
+}
+
+impl Steps {
+    pub(crate) fn new(all: u64) -> Steps {
+        Steps { all, left: all }
+    }
+
+    fn take(&mut self, steps: u64) -> Result<(), KnowledgeError> {
+        let left = self.left.checked_sub(steps);
+        self.left = left.ok_or(KnowledgeError::TooManySteps(self.all))?;
+        Ok(())
+    }
+}
+
 /// The deals that are possible.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
@@ -41,35 +60,39 @@ pub(crate) struct Table {
     variables: Vec<Variable>,
     /// Of each kind, the number of completions of each state; NaN if not counted yet.
     layers: Vec<Vec<f64>>,
-    steps: u64,
-    max_steps: u64,
 }
 
 impl Table {
     /// Counts the deals.
     ///
     /// # Errors
-    /// If that takes more than `max_steps` steps.
-    pub(crate) fn new(holders: Holders, max_steps: u64) -> Result<Table, KnowledgeError> {
+    /// If that takes more `steps` than are left.
+    pub(crate) fn new(holders: Holders, steps: &mut Steps) -> Result<Table, KnowledgeError> {
         let mut table = Table {
             variables: variables(&holders),
             holders,
             layers: Vec::new(),
-            steps: 0,
-            max_steps,
         };
         if !table.is_feasible() {
             return Ok(table);
         }
+        let mut sizes = Vec::new();
         for kind in 0..=table.holders.kinds() {
             let size = table.index_layer(kind);
-            if size as u64 > max_steps {
-                return Err(KnowledgeError::TooManySteps(max_steps));
-            }
-            table.layers.push(vec![f64::NAN; size]);
+            steps.take(size as u64)?;
+            sizes.push(size);
         }
-        table.count(0, State::default())?;
+        // Nothing is allocated before it is clear that all of it is allowed.
+        table.layers = (sizes.into_iter())
+            .map(|size| vec![f64::NAN; size])
+            .collect();
+        table.count(0, State::default(), steps)?;
         Ok(table)
+    }
+
+    /// The number of states that are laid out.
+    pub(crate) fn states(&self) -> usize {
+        self.layers.iter().map(Vec::len).sum()
     }
 
     /// The number of ways to deal the hidden cards and to choose the hidden gifts, physical cards
@@ -162,7 +185,12 @@ impl Table {
     }
 
     /// Counts the completions of a state.
-    fn count(&mut self, kind: usize, state: State) -> Result<f64, KnowledgeError> {
+    fn count(
+        &mut self,
+        kind: usize,
+        state: State,
+        steps: &mut Steps,
+    ) -> Result<f64, KnowledgeError> {
         let index = self.index(kind, &state);
         let known = self.layers[kind][index];
         if !known.is_nan() {
@@ -177,12 +205,9 @@ impl Table {
                 splits.push((split.next, split.weight));
                 ControlFlow::Continue(())
             });
-            self.steps += splits.len() as u64 + 1;
-            if self.steps > self.max_steps {
-                return Err(KnowledgeError::TooManySteps(self.max_steps));
-            }
+            steps.take(splits.len() as u64)?;
             for (next, weight) in splits {
-                sum += weight * self.count(kind + 1, next)?;
+                sum += weight * self.count(kind + 1, next, steps)?;
             }
         }
         self.layers[kind][index] = sum;

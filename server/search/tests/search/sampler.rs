@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use chefshat_engine::{DecisionKind, Opening, PassScope, RuleSet, RuleSetSpec};
-use chefshat_search::{Chance, Sampler};
+use chefshat_search::{Chance, KnowledgeError, Sampler};
 
 use crate::enumeration::{Outcome, enumerate};
 use crate::scenario::Scenario;
@@ -109,6 +109,34 @@ fn check_frequencies(sampler: &Sampler, expected: &HashMap<Outcome, f64>, all: f
         deviate < DEVIATE,
         "{what}: chi-square {statistic:.1} with {df} degrees of freedom"
     );
+}
+
+#[test]
+fn the_limit_of_steps_is_for_all_counts() {
+    // Each of five seats may have been drawn for the opening.
+    let rules = rules(|spec| {
+        (spec.players, spec.faces) = (5, 6);
+        spec.opening = Opening::AnyTopFace;
+    });
+    let scenario = Scenario::random(rules, 1, None);
+    for moment in [0, scenario.moments.len() / 2] {
+        let sampler = |steps| Sampler::new(scenario.knowledge(moment), steps);
+        // The fewest steps that suffice.
+        let (mut low, mut high) = (0, MAX_STEPS);
+        while low < high {
+            let middle = low.midpoint(high);
+            match sampler(middle) {
+                Ok(_) => high = middle,
+                Err(_) => low = middle + 1,
+            }
+        }
+        let states = sampler(high).expect("a deal").states() as u64;
+        assert!((1..high).contains(&states), "{states} states, {high} steps");
+        assert_eq!(
+            sampler(high - 1).err(),
+            Some(KnowledgeError::TooManySteps(high - 1))
+        );
+    }
 }
 
 #[test]
