@@ -24,6 +24,13 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Refuses tests that need the real server without their mark: `-m "not server"` would run them."""
+    for item in items:
+        if "real_binary" in getattr(item, "fixturenames", ()) and item.get_closest_marker("server") is None:
+            raise pytest.UsageError(f"{item.nodeid} needs the real server: mark it with @pytest.mark.server")
+
+
 @pytest.fixture(autouse=True)
 def no_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
     """Removes a ticket, a token and authorities from the environment."""

@@ -10,15 +10,10 @@ from chefshat import VectorEnv, history, pb
 PASS = 199
 
 
-@pytest.fixture(params=["process", "server"])
-def env(request: pytest.FixtureRequest) -> Iterator[VectorEnv]:
+@pytest.fixture
+def env(anywhere: str | None) -> Iterator[VectorEnv]:
     """Games of all seats with a history, in this process and on the real server."""
-    place = None
-    if request.param == "process":
-        pytest.importorskip("chefshat_native")
-    else:
-        place = request.getfixturevalue("real_address")
-    with VectorEnv(place, 3, history=24, seed=4) as games:
+    with VectorEnv(anywhere, 3, history=24, seed=4) as games:
         yield games
 
 

@@ -42,6 +42,7 @@ def columns(situations: Situations, row: int) -> bytes:
     return b"".join(name.encode() + array[row].tobytes() for name, array in tables)
 
 
+@pytest.mark.server
 def test_the_same_function_plays_live_and_on_a_vector_environment(real_address: str) -> None:
     live = Live()
     with Client(real_address) as client:

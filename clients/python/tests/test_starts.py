@@ -6,21 +6,11 @@ import pytest
 from chefshat import ChefsHatError, VectorEnv, pb
 
 
-@pytest.fixture(params=["process", "server"])
-def place(request: pytest.FixtureRequest) -> str | None:
-    """Where the games are played: None is this process."""
-    if request.param == "process":
-        pytest.importorskip("chefshat_native")
-        return None
-    address: str = request.getfixturevalue("real_address")
-    return address
-
-
-def dealt(place: str | None, seed: int, length: int) -> tuple[pb.ScriptedShift, list[int]]:
+def dealt(anywhere: str | None, seed: int, length: int) -> tuple[pb.ScriptedShift, list[int]]:
     """Returns hands that a seed deals, and the lowest legal actions from there."""
     hands: dict[int, pb.SeatCards] = {}
     actions: list[int] = []
-    with VectorEnv(place, seed=seed) as env:
+    with VectorEnv(anywhere, seed=seed) as env:
         while len(hands) < 4 or len(actions) < length:
             seat, seen = int(env.batch.seats[0]), env.batch.observations
             if seat not in hands:
@@ -32,12 +22,12 @@ def dealt(place: str | None, seed: int, length: int) -> tuple[pb.ScriptedShift, 
     return pb.ScriptedShift(hands=[hands[seat] for seat in range(4)]), actions[:length]
 
 
-def test_games_begin_with_the_starts_in_turn(place: str | None) -> None:
-    starts = [dealt(place, 3, 0), dealt(place, 4, 9), dealt(place, 5, 4)]
-    with VectorEnv(place, 5, starts=starts, history=16) as env:
+def test_games_begin_with_the_starts_in_turn(anywhere: str | None) -> None:
+    starts = [dealt(anywhere, 3, 0), dealt(anywhere, 4, 9), dealt(anywhere, 5, 4)]
+    with VectorEnv(anywhere, 5, starts=starts, history=16) as env:
         assert env.batch.observations.history_counts.tolist() == [0, 9, 4, 0, 9]
         for row in (1, 4):
-            with VectorEnv(place, seed=4, history=16) as alone:
+            with VectorEnv(anywhere, seed=4, history=16) as alone:
                 for action in starts[1][1]:
                     alone.step([action])
                 for name, column in alone.batch.observations.as_dict().items():
@@ -46,14 +36,14 @@ def test_games_begin_with_the_starts_in_turn(place: str | None) -> None:
         assert env.reset(games=[0]).observations.history_counts[0] == 4
 
 
-def test_wrong_starts_are_refused_by_entry_and_action(place: str | None) -> None:
-    hands, actions = dealt(place, 3, 5)
+def test_wrong_starts_are_refused_by_entry_and_action(anywhere: str | None) -> None:
+    hands, actions = dealt(anywhere, 3, 5)
     with pytest.raises(ChefsHatError, match="start 1, action 3 of its list: `give J` does not fit"):
-        VectorEnv(place, starts=[(hands, actions), (hands, [*actions[:3], 211])])
+        VectorEnv(anywhere, starts=[(hands, actions), (hands, [*actions[:3], 211])])
     with pytest.raises(ChefsHatError, match="start 0: hands") as refused:
-        VectorEnv(place, starts=[(pb.ScriptedShift(), [])])
+        VectorEnv(anywhere, starts=[(pb.ScriptedShift(), [])])
     assert refused.value.reason == "SCRIPT_REFUSED"
     with pytest.raises(ChefsHatError, match="the list of starts is empty"):
-        VectorEnv(place, starts=[])
+        VectorEnv(anywhere, starts=[])
     with pytest.raises(ValueError, match="starts excludes"):
-        VectorEnv(place, starts=[(hands, [])], hands=hands)
+        VectorEnv(anywhere, starts=[(hands, [])], hands=hands)
