@@ -1,13 +1,13 @@
-//! Converts events of the engine to the protocol, and those of a Shift back. Redaction comes before, in `Event::seen_by`:
-//! everything present is written.
+//! Converts events of the engine to the protocol, and those of a Shift back. Redaction comes
+//! before, in `Event::seen_by`: everything present is written.
 
-use chefshat_engine::{
-    ActionSpace, BySeat, Cards, Event, Role, RuleSet, Seat, SpecialAction, Standings,
-};
+use chefshat_engine::{ActionSpace, BySeat, Event, Role, RuleSet, SpecialAction, Standings};
 use chefshat_proto::v1::{self, game_event::Kind};
 
+use super::numbers::{
+    action_id, ascending, cards_from_numbers, seat_cards, seat_from_number, seat_number,
+};
 use super::rules::{FieldProblem, role_from_number};
-use super::start::{action_id, cards_from_numbers, seat_from_number};
 
 /// The cause of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,15 +176,6 @@ pub fn event_from_proto(kind: &Kind, rules: &RuleSet) -> Result<Option<Event>, F
     }))
 }
 
-/// Converts the cards of a seat.
-pub fn seat_cards(seat: Seat, cards: Cards, faces: u8) -> v1::SeatCards {
-    v1::SeatCards {
-        seat: seat_number(seat),
-        cards: ascending(cards, faces),
-        golden: cards.has_golden(),
-    }
-}
-
 fn roles_to_proto(roles: &BySeat<Option<Role>>) -> Vec<i32> {
     roles
         .values()
@@ -200,10 +191,6 @@ pub fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
     }
 }
 
-fn ascending(cards: Cards, faces: u8) -> Vec<u32> {
-    cards.ascending(faces).map(u32::from).collect()
-}
-
 /// Converts final standings, best first.
 pub fn final_table(standings: &Standings) -> Vec<v1::Standing> {
     standings
@@ -214,9 +201,4 @@ pub fn final_table(standings: &Standings) -> Vec<v1::Standing> {
             place: place.into(),
         })
         .collect()
-}
-
-/// The number of a seat in messages.
-pub fn seat_number(seat: Seat) -> u32 {
-    u32::try_from(seat.index()).expect("a seat is below six")
 }

@@ -1,12 +1,9 @@
-//! Converts scripted Shifts, and the numbers of seats, cards and actions. The engine validates
-//! scripts; its errors become field names here.
+//! Converts scripted Shifts. The engine validates them; its errors become field names here.
 
-use chefshat_engine::{
-    ActionId, BySeat, Cards, Game, RuleSet, Script, ScriptError, Seat, SeatOrder, Seed,
-};
+use chefshat_engine::{BySeat, Cards, Game, RuleSet, Script, ScriptError, SeatOrder, Seed};
 use chefshat_proto::v1;
 
-use super::events::{seat_cards, seat_number};
+use super::numbers::{cards_from_numbers, seat_cards, seat_from_number, seat_number};
 use super::rules::FieldProblem;
 
 /// Reads a script. `Game::scripted` accepts the result with these rules and any seed.
@@ -77,26 +74,6 @@ pub fn script_to_proto(script: &Script, faces: u8) -> v1::ScriptedShift {
     }
 }
 
-/// Reads cards in any order: faces 1..=F, F+1 for a joker; one card of face F is Golden if
-/// `golden`. `None` if no deck with F faces contains them.
-pub fn cards_from_numbers(numbers: &[u32], golden: bool, faces: u8) -> Option<Cards> {
-    let mut counts = vec![0u8; usize::from(faces) + 1];
-    for &number in numbers {
-        let index = usize::try_from(number).ok()?.checked_sub(1)?;
-        let count = counts.get_mut(index)?;
-        *count = count.checked_add(1)?;
-    }
-    Cards::from_counts(faces, &counts, golden)
-}
-
-/// The seat with a number; `None` if out of range.
-pub fn seat_from_number(number: u32, players: usize) -> Option<Seat> {
-    usize::try_from(number)
-        .ok()
-        .filter(|&index| index < players)
-        .map(Seat::new)
-}
-
 /// The hands of all seats, each of which must be listed once.
 fn hands_from_proto(
     listed: &[v1::SeatCards],
@@ -139,9 +116,4 @@ fn field_of(error: &ScriptError) -> &'static str {
         ScriptError::Ended => "points",
         ScriptError::Drawn => "drawn_seat",
     }
-}
-
-/// The action with an index; an index out of range gives an action that does not exist.
-pub(crate) fn action_id(action: u32) -> ActionId {
-    ActionId::new(u16::try_from(action).unwrap_or(u16::MAX))
 }
