@@ -1,88 +1,202 @@
 //! Histories: complete within their width, and the same in two worlds that a seat cannot tell apart.
 
+use std::cell::Cell;
+
 use chefshat_agents::game_seed;
-use chefshat_engine::{Game, Script, Seat, SeatOrder};
+use chefshat_engine::{Action, BySeat, Cards, Game, Script, Seat, SeatOrder};
 use chefshat_simulation::vector::{MAX_HISTORY, SetupError, Start, VectorGames, VectorSetup};
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 
 use super::*;
 
-/// The rows of a seat, with all columns of its observations.
-fn seen_by(batch: &Batch, seat: u8) -> Option<String> {
-    let row = batch.seats.iter().position(|of| *of == seat)?;
-    assert_eq!(batch.rows, 1);
-    assert_eq!(row, 0);
-    Some(format!(
+/// Faces of the default deck.
+const FACES: u8 = 11;
+
+/// All columns of the only row, which is of this seat.
+fn seen_by(batch: &Batch, seat: u8) -> String {
+    assert_eq!(batch.seats, [seat]);
+    format!(
         "{:?} {:?} {:?} {:?}",
         batch.observations, batch.masks, batch.kinds, batch.rewards
-    ))
+    )
 }
 
 /// One game of the client that begins with these hands.
-fn scripted(script: Script) -> VectorSetup {
+fn scripted(script: Script, width: u16) -> VectorSetup {
     all_client(1)
-        .with_history(64)
+        .with_history(width)
         .unwrap()
         .with_start(Start::Script(Box::new(script)))
         .unwrap()
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 256,
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    })]
+/// Moves a joker from one seat to another, which gives its most common card.
+fn move_joker(hands: &mut BySeat<Cards>, from: Seat, to: Seat) {
+    let jokers = usize::from(FACES);
+    let mut counts = [from, to].map(|seat| hands[seat].count_array(FACES));
+    // Not of the last face, of which one may be the Golden card.
+    let given = (0..jokers - 1).rev().find(|face| counts[1][*face] > 0);
+    let given = given.expect("a hand has more cards than the last face");
+    for (card, giver, receiver) in [(jokers, 0, 1), (given, 1, 0)] {
+        counts[giver][card] -= 1;
+        counts[receiver][card] += 1;
+    }
+    for (seat, counts) in [from, to].into_iter().zip(counts) {
+        let golden = hands[seat].has_golden();
+        hands[seat] = Cards::from_counts(FACES, &counts[..=jokers], golden).unwrap();
+    }
+}
 
-    #[test]
-    fn a_seat_cannot_tell_hidden_cards_apart(
-        seed in any::<u64>(), viewer in 0u8..4, order in Just([0, 1, 2, 3]).prop_shuffle(),
-        salt in any::<u64>(), later in any::<bool>(),
-    ) {
-        let hands = *Game::new(rules(), game_seed(seed, 0), |_| {}).hands();
-        // Two others change hands, jokers included.
-        let others: Vec<usize> = (0..4).filter(|seat| *seat != usize::from(viewer)).collect();
-        let (one, other) = (Seat::new(others[salt as usize % 3]), Seat::new(others[(salt as usize + 1) % 3]));
-        let mut changed = hands;
-        changed[one] = hands[other];
-        changed[other] = hands[one];
-        let script = |hands| {
-            let mut script = Script::first_shift(hands);
-            if later {
-                script.shift = 2;
-                script.last_order = SeatOrder::from_slice(&order.map(Seat::new));
-            }
-            script
-        };
-        let (mut first, mut a) = VectorGames::new(scripted(script(hands)));
-        let (mut second, mut b) = VectorGames::new(scripted(script(changed)));
-        // The viewer's own exchange shows it other cards, and another opening is public.
-        let mut told = false;
-        for step in 0..80 {
-            let pair = (masks(&a)[0], masks(&b)[0]);
-            if a.seats != b.seats || a.kinds != b.kinds {
-                break;
-            }
-            let received = |batch: &Batch| batch.observations.received.clone();
-            if a.seats == [viewer] && received(&a) == received(&b) {
-                prop_assert_eq!(seen_by(&a, viewer), seen_by(&b, viewer));
-                told = true;
-            } else if a.seats == [viewer] {
-                break;
-            }
-            let common: Vec<_> = pair.0.iter().filter(|action| pair.1.contains(*action)).collect();
-            if common.is_empty() {
-                break;
-            }
-            let action = common[(salt.wrapping_add(step * 7919) % common.len() as u64) as usize];
-            a = first.step(&[action]).unwrap();
-            b = second.step(&[action]).unwrap();
-            if u32s(&a.observations.shifts) != u32s(&b.observations.shifts) || a.endings.rows > 0 {
-                break;
+/// Steps past special actions, which their seats decline. Returns who did.
+fn declined(games: &mut VectorGames, batch: &mut Batch) -> Option<u8> {
+    let decline = rules().actions().encode(Action::Decline).unwrap();
+    let mut by = None;
+    while masks(batch)[0].contains(decline) {
+        by = Some(batch.seats[0]);
+        *batch = games.step(&[decline]).unwrap();
+    }
+    by
+}
+
+/// What two other seats have otherwise in the second world.
+#[derive(Copy, Clone, Debug)]
+enum Change {
+    /// Each the hand of the other.
+    Hands,
+    /// Each the hand of the other; one of them has both jokers.
+    HandsWithJokers,
+    /// One joker each: in the first world one of them has both.
+    Joker,
+}
+
+/// What two worlds differ in, and how they are played.
+#[derive(Clone, Debug)]
+struct Worlds {
+    seed: u64,
+    viewer: u8,
+    /// The order of the last Shift; `None` for a first Shift.
+    order: Option<[usize; 4]>,
+    change: Change,
+    width: u16,
+    salt: u64,
+}
+
+fn worlds() -> impl Strategy<Value = Worlds> {
+    let order = prop::option::weighted(0.8, Just([0, 1, 2, 3]).prop_shuffle());
+    let changes = prop::sample::select(vec![Change::Hands, Change::HandsWithJokers, Change::Joker]);
+    let width = prop::sample::select(vec![1, 8, 20, 64]);
+    let salt = any::<u64>();
+    (any::<u64>(), 0u8..4, order, changes, width, salt).prop_map(
+        |(seed, viewer, order, change, width, salt)| Worlds {
+            seed,
+            viewer,
+            order,
+            change,
+            width,
+            salt,
+        },
+    )
+}
+
+/// The comparisons made.
+#[derive(Default, Debug)]
+struct Compared {
+    all: Cell<u32>,
+    /// Those after special actions that other seats declined, in one world or another seat in each.
+    declined: Cell<u32>,
+    /// Those of them in which the declined one is not kept any more.
+    forgotten: Cell<u32>,
+}
+
+/// Plays both worlds alike for as long as the viewer cannot know which one it is in, and compares
+/// what it sees.
+fn compare(worlds: &Worlds, compared: &Compared) -> Result<(), TestCaseError> {
+    let &Worlds { viewer, salt, .. } = worlds;
+    let others: Vec<usize> = (0..4).filter(|seat| *seat != usize::from(viewer)).collect();
+    let one = Seat::new(others[salt as usize % 3]);
+    let other = Seat::new(others[(salt as usize + 1) % 3]);
+    let mut hands = *Game::new(rules(), game_seed(worlds.seed, 0), |_| {}).hands();
+    if !matches!(worlds.change, Change::Hands) {
+        for seat in hands.seats().filter(|seat| *seat != one) {
+            while hands[seat].jokers() > 0 {
+                move_joker(&mut hands, seat, one);
             }
         }
-        prop_assume!(told);
     }
+    let mut changed = hands;
+    match worlds.change {
+        Change::Joker => move_joker(&mut changed, one, other),
+        _ => (changed[one], changed[other]) = (hands[other], hands[one]),
+    }
+    let begin = |hands| {
+        let mut script = Script::first_shift(hands);
+        if let Some(order) = worlds.order {
+            script.shift = 2;
+            script.last_order = SeatOrder::from_slice(&order.map(Seat::new));
+        }
+        VectorGames::new(scripted(script, worlds.width))
+    };
+    let ((mut first, mut a), (mut second, mut b)) = (begin(hands), begin(changed));
+    let by = [declined(&mut first, &mut a), declined(&mut second, &mut b)];
+    let hidden = by[0] != by[1];
+    for step in 0..80 {
+        // Another opening is public.
+        if a.seats != b.seats || a.kinds != b.kinds {
+            break;
+        }
+        if a.seats == [viewer] {
+            // Its own exchange may have shown it other cards.
+            if a.observations.received != b.observations.received {
+                break;
+            }
+            prop_assert_eq!(seen_by(&a, viewer), seen_by(&b, viewer));
+            let count = |comparisons: &Cell<u32>, is_one| {
+                comparisons.set(comparisons.get() + u32::from(is_one));
+            };
+            let entries = u32s(&a.observations.history_counts)[0];
+            count(&compared.all, true);
+            count(&compared.declined, hidden);
+            // At least 17 entries are kept.
+            let kept = u32::from(worlds.width.max(16)) + 1;
+            count(&compared.forgotten, hidden && entries > kept);
+        }
+        let allowed = masks(&b)[0];
+        let common: Vec<_> = (masks(&a)[0].iter())
+            .filter(|action| allowed.contains(*action))
+            .collect();
+        if common.is_empty() {
+            break;
+        }
+        let action = common[(salt.wrapping_add(step * 7919) % common.len() as u64) as usize];
+        a = first.step(&[action]).unwrap();
+        b = second.step(&[action]).unwrap();
+        if u32s(&a.observations.shifts) != u32s(&b.observations.shifts) || a.endings.rows > 0 {
+            break;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_seat_cannot_tell_hidden_cards_apart() {
+    let compared = Compared::default();
+    let config = ProptestConfig {
+        cases: 1024,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
+    let found = TestRunner::new(config).run(&worlds(), |worlds| compare(&worlds, &compared));
+    if let Err(error) = found {
+        panic!("{error}");
+    }
+    let Compared {
+        all,
+        declined,
+        forgotten,
+    } = &compared;
+    let enough = all.get() > 2000 && declined.get() > 800 && forgotten.get() > 400;
+    assert!(enough, "{compared:?}");
 }
 
 #[test]
