@@ -22,7 +22,7 @@ EXAMPLES = """examples:
   python -m chefshat.learn evaluate strong.safetensors --opponents greedy --games 2000
   python -m chefshat.learn play strong.safetensors --address 127.0.0.1:50051 --code CODE --name Strong
 
-Without --address the command starts a server of its own.
+Without --address the games are played in this process (chefshat-native), or by a server that the command starts.
 
 exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments, 130 interrupted
 """

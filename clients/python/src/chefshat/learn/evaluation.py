@@ -68,10 +68,10 @@ def evaluate(
         games: number of games.
         seed: seed of the deals.
         rules: the rule set.
-        address: of a server; None: a server started by this process.
+        address: where the games are played; see `VectorEnv`.
 
     Raises:
-        ChefsHatError: the server refused, or there is none.
+        ChefsHatError: the games are refused, or the server does not answer.
         ValueError: the network was trained for games of another size.
     """
     with VectorEnv(

@@ -28,7 +28,7 @@ class Trainer:
     """A running training; a context manager that ends its games."""
 
     def __init__(self, training: Training, *, address: str | ServerAddress | None = None) -> None:
-        """Starts the games. Raises `ChefsHatError` if there is no server or it refuses."""
+        """Starts the games. Raises `ChefsHatError` if they are refused, or the server does not answer."""
         plan = training.plan
         runs = training.progress.runs + 1
         self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))

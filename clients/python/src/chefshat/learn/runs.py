@@ -28,7 +28,7 @@ INTERRUPTED = 130
 
 
 def full_rules(rules: Rules, address: str | ServerAddress | None) -> pb.RuleSet:
-    """Returns a rule set with every field set by the server."""
+    """Returns a rule set with every field set."""
     with VectorEnv(address, 1, rules=rules, seed=0) as env:
         return env.rules
 
