@@ -10,12 +10,12 @@ use chefshat_record::convert::{
 use prost::Message as _;
 
 use super::decision::source_to_proto;
+use super::kind::kind_to_proto;
 use super::policy::policy_of;
 use super::room::{abort_reason, participants, seed_commitment};
 use super::table::violation_to_proto;
 use chefshat_room::Core;
 use chefshat_room::log::RoomEvent;
-use chefshat_vector::policy::kind_to_proto;
 
 /// The event at a position of the log (from 0), redacted for `viewer`. `None` beyond the end.
 pub fn event_to_proto(core: &Core, position: usize, viewer: Viewer) -> Option<v1::GameEvent> {

@@ -23,3 +23,14 @@ pub fn kind_from_proto(
         )),
     }
 }
+
+/// Converts a kind to its number.
+pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
+    match kind {
+        None => v1::ParticipantKind::Unspecified,
+        Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
+        Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
+        Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
+    }
+    .into()
+}

@@ -1,6 +1,6 @@
 //! Translation between rooms and the protocol: policies, seats, decisions, the log.
 //! `chefshat-record` translates rule sets and the engine's events, which records share;
-//! `chefshat-vector` vector environments, and what games without rooms share.
+//! `chefshat-vector` vector environments and the names of built-in agents.
 
 mod decision;
 mod event;
@@ -18,13 +18,12 @@ mod summary;
 mod table;
 mod tournament;
 
-pub use chefshat_vector::policy::{kind_to_proto, millis, policy_to_proto};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
-pub use kind::kind_from_proto;
+pub use kind::{kind_from_proto, kind_to_proto};
 pub use name::checked_name;
 pub use players::recorded_player;
-pub use policy::policy_from_proto;
+pub use policy::{millis, policy_from_proto, policy_to_proto};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines};
 pub use room::{

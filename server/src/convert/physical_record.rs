@@ -14,12 +14,12 @@ use tracing::error;
 
 use super::decision::source_to_proto;
 use super::event::event_to_proto;
+use super::policy::millis;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, Fill, GameHeader};
 use chefshat_room::log::RoomEvent;
-use chefshat_vector::policy::millis;
 
 /// Where an entry of the record stands: after the changes before, and among what follows from the
 /// same change.

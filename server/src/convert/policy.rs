@@ -4,10 +4,10 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use chefshat_proto::v1;
-use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto};
-use chefshat_vector::policy::{agent_from_proto, millis, policy_to_proto};
+use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
+use chefshat_vector::agent_from_proto;
 
-use super::kind::kind_from_proto;
+use super::kind::{kind_from_proto, kind_to_proto};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy, Visibility};
 use chefshat_room::{Core, State};
@@ -82,6 +82,45 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
+/// A policy with every field set, except a pace that depends on the participants.
+pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: Some(millis(policy.decision_time)),
+        bank_ms: Some(millis(policy.bank)),
+        max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
+        max_timeouts: Some(policy.max_timeouts),
+        substitute: policy.substitute.name().into(),
+        abort: match policy.abort {
+            AbortPolicy::AllLost => v1::AbortPolicy::AllLost,
+            AbortPolicy::AnyLost => v1::AbortPolicy::AnyLost,
+            AbortPolicy::Never => v1::AbortPolicy::Never,
+        }
+        .into(),
+        reward_scheme: reward_scheme_to_proto(policy.reward_scheme).into(),
+        pace_ms: policy.pace.map(millis),
+        waiting_time_ms: Some(millis(policy.waiting_time)),
+        spectators: Some(policy.spectators),
+        spectator_delay_decisions: Some(
+            u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
+        ),
+        spectators_see_hands: Some(policy.spectators_see_hands),
+        durability: match policy.durability {
+            Durability::Durable => v1::Durability::Durable,
+            Durability::Ephemeral => v1::Durability::Ephemeral,
+        }
+        .into(),
+        clocks: (policy.clocks.iter())
+            .map(|clock| v1::KindClock {
+                kind: kind_to_proto(Some(clock.kind)),
+                decision_time_ms: clock.decision_time.map(millis),
+                bank_ms: clock.bank.map(millis),
+            })
+            .collect(),
+        one_seat_per_client: policy.one_seat_per_client,
+        visibility: visibility_to_proto(policy.visibility).into(),
+    }
+}
+
 /// The policy of a room. A pace that depends on the participants is set once the game has started.
 pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     let mut policy = policy_to_proto(&core.header().policy);
@@ -89,6 +128,16 @@ pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
         policy.pace_ms = Some(millis(core.pace()));
     }
     policy
+}
+
+/// As in responses and records. What is public has the same bytes as before there was a choice, so
+/// that signatures of older records stay valid.
+pub(super) fn visibility_to_proto(visibility: Visibility) -> v1::Visibility {
+    match visibility {
+        Visibility::Public => v1::Visibility::Unspecified,
+        Visibility::Unlisted => v1::Visibility::Unlisted,
+        Visibility::Private => v1::Visibility::Private,
+    }
 }
 
 /// Who sees a room, tournament or recorded game.
@@ -122,6 +171,11 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
         clocks.push(KindClock::PEOPLE);
     }
     Ok(clocks)
+}
+
+/// Whole milliseconds, as messages count time.
+pub fn millis(time: Duration) -> u32 {
+    u32::try_from(time.as_millis()).unwrap_or(u32::MAX)
 }
 
 fn time(
@@ -184,5 +238,17 @@ mod tests {
             chosen.decision_time_of(Some(ParticipantKind::Human)),
             Duration::from_millis(2000)
         );
+    }
+
+    #[test]
+    fn games_without_a_room_are_recorded_with_the_policy_of_one() {
+        let policy = Policy {
+            max_invalid_attempts: Some(5),
+            pace: Some(Duration::ZERO),
+            clocks: Vec::new(),
+            ..Policy::default()
+        };
+        let recorded = chefshat_vector::simulation_policy(Some(5), None);
+        assert_eq!(recorded, policy_to_proto(&policy));
     }
 }

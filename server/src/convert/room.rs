@@ -7,14 +7,14 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
-use super::kind::kind_from_proto;
+use super::kind::{kind_from_proto, kind_to_proto};
 use super::name::checked_name;
 use super::policy::policy_of;
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Core, State};
-use chefshat_vector::policy::{agent_from_proto, kind_to_proto};
+use chefshat_vector::agent_from_proto;
 
 /// The participants of a new room's seats. An empty list leaves all seats open.
 ///

@@ -7,12 +7,11 @@ use chefshat_room::journal::Entry;
 use chefshat_room::{Core, PhysicalTable};
 
 use super::event::standings;
-use super::policy::policy_of;
+use super::policy::{policy_of, visibility_to_proto};
 use super::room::{
     aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
 };
 use super::start::{origin, start_to_proto};
-use chefshat_vector::policy::visibility_to_proto;
 
 /// Version of this server, as its records name it.
 pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");

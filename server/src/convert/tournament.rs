@@ -9,12 +9,12 @@ use chefshat_tournament::{
     Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
 };
 
-use super::kind::kind_from_proto;
+use super::kind::{kind_from_proto, kind_to_proto};
 use super::number;
-use super::policy::policy_from_proto;
+use super::policy::{policy_from_proto, policy_to_proto};
 use chefshat_room::ids::Id;
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_vector::policy::{agent_from_proto, kind_to_proto, policy_to_proto};
+use chefshat_vector::agent_from_proto;
 
 /// Defaults of fields that a request leaves unset.
 const DEFAULT_PARTICIPANTS: u32 = 64;

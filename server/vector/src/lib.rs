@@ -4,7 +4,6 @@
 
 mod batch;
 mod error;
-pub mod policy;
 mod record;
 mod request;
 mod setup;
@@ -12,7 +11,10 @@ mod states;
 
 pub use batch::{MAX_BATCH_BYTES, batch_to_proto};
 pub use error::RequestError;
-pub use record::{record_lines, record_parts};
+pub use record::{record_lines, record_parts, simulation_policy};
 pub use request::{Request, Reset};
-pub use setup::{Limits, seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto};
+pub use setup::{
+    Limits, agent_from_proto, seeds_from_setup, setup_from_proto, start_from_proto,
+    started_to_proto,
+};
 pub use states::saved_to_proto;

@@ -1,15 +1,40 @@
 //! Records of finished games, in parts of bounded size.
 
 use chefshat_agents::AgentKind;
+use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
-use chefshat_record::convert::Played;
+use chefshat_record::convert::{Played, reward_scheme_to_proto};
 use chefshat_simulation::vector::{InvalidActions, PlayedGame, VectorSetup};
 use prost::Message as _;
 
-use crate::policy::simulation_policy;
-
 /// Size from which a part of a record is sent, bytes.
 const RECORD_PART_BYTES: usize = 512 * 1024;
+
+/// The policy in the record of a game without a room: that of a room, without clocks and pauses.
+/// Only its limits and rewards have a meaning.
+pub fn simulation_policy(
+    max_invalid_attempts: Option<u32>,
+    reward_scheme: Option<RewardScheme>,
+) -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: Some(10_000),
+        bank_ms: Some(60_000),
+        max_invalid_attempts: Some(max_invalid_attempts.unwrap_or(0)),
+        max_timeouts: Some(3),
+        substitute: AgentKind::Random.name().into(),
+        abort: v1::AbortPolicy::AllLost.into(),
+        reward_scheme: reward_scheme_to_proto(reward_scheme).into(),
+        pace_ms: Some(0),
+        waiting_time_ms: Some(3_600_000),
+        spectators: Some(true),
+        spectator_delay_decisions: Some(0),
+        spectators_see_hands: Some(false),
+        durability: v1::Durability::Durable.into(),
+        clocks: Vec::new(),
+        one_seat_per_client: false,
+        visibility: v1::Visibility::Unspecified.into(),
+    }
+}
 
 /// The lines of the record of a game.
 pub fn record_lines(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::RecordLine> {

@@ -14,7 +14,6 @@ use chefshat_simulation::vector::{
 };
 
 use crate::error::RequestError;
-use crate::policy::agent_from_proto;
 use crate::states::states_from_proto;
 
 /// What a setup may ask for.
@@ -243,6 +242,26 @@ fn agents(
             })
         })
         .collect())
+}
+
+/// The built-in agent with this name; `None` for the empty name.
+///
+/// # Errors
+/// There is no such agent.
+pub fn agent_from_proto(
+    field: &'static str,
+    name: &str,
+) -> Result<Option<AgentKind>, FieldProblem> {
+    if name.is_empty() {
+        return Ok(None);
+    }
+    AgentKind::from_name(name).map(Some).ok_or_else(|| {
+        let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+        FieldProblem::new(
+            field,
+            format!("{name:?} is not a built-in agent; use one of {known}"),
+        )
+    })
 }
 
 fn decisions(message: &v1::VectorSetup) -> Result<Decisions, FieldProblem> {

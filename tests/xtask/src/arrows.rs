@@ -54,7 +54,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-agents",
             "chefshat-simulation",
             "chefshat-record",
-            "chefshat-room",
         ],
     ),
     (

@@ -11,7 +11,7 @@ use chefshat_record::jsonl::RecordFileError;
 use chefshat_simulation::Batch;
 
 use chefshat_record::convert::Played;
-use chefshat_vector::policy::simulation_policy;
+use chefshat_vector::simulation_policy;
 
 /// Plays a game of a batch, by its index from 0, and writes its record to a directory.
 ///
