@@ -107,7 +107,7 @@ def test_many_states_are_several_messages(real_address: str, monkeypatch: pytest
         states = env.save()
         expected = played(env, 20, 2)
         monkeypatch.setattr("chefshat._remote.SAVED_AT_ONCE", 3)
-        monkeypatch.setattr("chefshat._remote.RESTORED_BYTES", 2 * max(map(len, states)))
+        monkeypatch.setattr("chefshat._remote.MAX_STATES_BYTES", 2 * max(map(len, states)))
         steps = env.batch.step
         env.restore(range(7), states)
         # A batch answers each message.
