@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, Network};
-use chefshat_search::MonteCarlo;
+use chefshat_search::{CountedMonteCarlo, MonteCarlo};
 use chefshat_simulation::{
     Comparison, Contender, Duplicate, DuplicateError, Figure, RulesForm, SeatPlan,
 };
@@ -20,6 +20,8 @@ use super::output::{self, heading, line, table};
 use super::rules_args::RulesArgs;
 use super::{CommandError, progress, threads};
 
+/// Maximum length of an agent's name in the title.
+const MAX_NAME: usize = 25;
 /// Maximum length of an agent's name in a table.
 const MAX_LABEL: usize = 14;
 
@@ -86,9 +88,11 @@ enum SeatsFlag {
 struct Entrant {
     /// As given on the command line.
     given: String,
-    /// Short name for tables.
+    /// Short name for the title and tables.
     label: String,
     contender: Contender,
+    /// Of an agent that searches.
+    search: Option<CountedMonteCarlo>,
 }
 
 impl Compare {
@@ -145,14 +149,20 @@ impl Entrant {
                 given: given.to_owned(),
                 label: given.to_owned(),
                 contender: Contender::Kind(kind),
+                search: None,
             });
         }
         if given.split(':').next() == Some(MonteCarlo::NAME) {
-            let agent: MonteCarlo = given.parse().map_err(|error| format!("{error}"))?;
+            let plays: MonteCarlo = given.parse().map_err(|error| format!("{error}"))?;
+            let search = CountedMonteCarlo {
+                plays,
+                decisions: Arc::default(),
+            };
             return Ok(Entrant {
                 given: given.to_owned(),
-                label: MonteCarlo::NAME.to_owned(),
-                contender: Contender::Made(Arc::new(agent)),
+                label: plays.to_string(),
+                contender: Contender::Made(Arc::new(search.clone())),
+                search: Some(search),
             });
         }
         let path = Path::new(given);
@@ -173,6 +183,7 @@ impl Entrant {
             given: given.to_owned(),
             label: stem.chars().filter(|letter| !letter.is_control()).collect(),
             contender: Contender::Network(Arc::new(network)),
+            search: None,
         })
     }
 }
@@ -217,7 +228,7 @@ impl Played<'_> {
         let [a, b] = self
             .entrants
             .each_ref()
-            .map(|entrant| shortened(&entrant.label));
+            .map(|entrant| shortened(&entrant.label, MAX_NAME));
         let seed = self.compare.seed;
         heading(
             &mut text,
@@ -282,6 +293,13 @@ impl Played<'_> {
         });
         table(&mut text, &header, &[0], rows.into_iter());
         text.push('\n');
+        for search in self
+            .entrants
+            .iter()
+            .filter_map(|entrant| entrant.search.as_ref())
+        {
+            line(&mut text, &searched(search));
+        }
         line(&mut text, &self.gain());
         text
     }
@@ -303,7 +321,7 @@ impl Played<'_> {
         let [a, b] = self
             .entrants
             .each_ref()
-            .map(|entrant| shortened(&entrant.label));
+            .map(|entrant| shortened(&entrant.label, MAX_LABEL));
         if a == b {
             ["A".to_owned(), "B".to_owned()]
         } else {
@@ -312,11 +330,24 @@ impl Played<'_> {
     }
 }
 
-fn shortened(label: &str) -> String {
-    if label.chars().count() <= MAX_LABEL {
+/// How an agent that searches took its decisions, in words.
+fn searched(search: &CountedMonteCarlo) -> String {
+    let decisions = &search.decisions;
+    let others = decisions.too_many_deals() + decisions.history_unknown();
+    format!(
+        "{}: {} searched, {} taken as {} does.",
+        search.plays,
+        counted(decisions.searched(), "decision"),
+        counted(others, "decision"),
+        search.plays.prior.name(),
+    )
+}
+
+fn shortened(label: &str, most: usize) -> String {
+    if label.chars().count() <= most {
         return label.to_owned();
     }
-    let beginning: String = label.chars().take(MAX_LABEL - 1).collect();
+    let beginning: String = label.chars().take(most - 1).collect();
     format!("{beginning}…")
 }
 
@@ -327,6 +358,18 @@ fn signed(number: f64) -> String {
 }
 
 fn entrant_json(entrant: &Entrant) -> Value {
+    if let Some(search) = &entrant.search {
+        return json!({
+            "agent": search.plays.to_string(),
+            "prior": search.plays.prior.name(),
+            "margin": search.plays.margin,
+            "decisions": {
+                "searched": search.decisions.searched(),
+                "too_many_deals": search.decisions.too_many_deals(),
+                "history_unknown": search.decisions.history_unknown(),
+            },
+        });
+    }
     match &entrant.contender {
         Contender::Kind(kind) => json!({"agent": kind.name()}),
         Contender::Made(_) => json!({"agent": entrant.given}),

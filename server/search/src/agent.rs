@@ -4,6 +4,7 @@
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent, Following};
@@ -11,7 +12,10 @@ use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use crate::{Allocation, Chance, Estimate, Knowledge, Method, Sampler, ShiftHistory, evaluate};
+use crate::{
+    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, Sampler, ShiftHistory,
+    evaluate,
+};
 
 /// Steps of counting deals that the agent spends on a decision at most.
 const MAX_STEPS: u64 = 200_000;
@@ -126,6 +130,16 @@ impl MonteCarlo {
         seed: [u8; 32],
         pool: Option<Arc<ThreadPool>>,
     ) -> BuiltInAgent {
+        self.counted(rules, seed, pool, Arc::default())
+    }
+
+    fn counted(
+        self,
+        rules: &RuleSet,
+        seed: [u8; 32],
+        pool: Option<Arc<ThreadPool>>,
+        decisions: Arc<Decisions>,
+    ) -> BuiltInAgent {
         BuiltInAgent::following(Box::new(Player {
             plays: self,
             rules: *rules,
@@ -133,7 +147,58 @@ impl MonteCarlo {
             chance: Chance::stream(seed, 1),
             history: None,
             pool,
+            decisions,
         }))
+    }
+}
+
+/// Agents that count how they take their decisions.
+#[derive(Clone, Debug)]
+pub struct CountedMonteCarlo {
+    /// How they play.
+    pub plays: MonteCarlo,
+    /// The decisions of all of them.
+    pub decisions: Arc<Decisions>,
+}
+
+impl AgentMaker for CountedMonteCarlo {
+    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
+        (self.plays).counted(rules, seed, None, Arc::clone(&self.decisions))
+    }
+}
+
+/// Numbers of decisions with more than one legal action, by how they were taken.
+#[derive(Debug, Default)]
+pub struct Decisions {
+    searched: AtomicU64,
+    too_many_deals: AtomicU64,
+    history_unknown: AtomicU64,
+}
+
+impl Decisions {
+    /// Those that were searched.
+    pub fn searched(&self) -> u64 {
+        self.searched.load(Ordering::Relaxed)
+    }
+
+    /// Those played as the prior does because there were too many possible deals to count.
+    pub fn too_many_deals(&self) -> u64 {
+        self.too_many_deals.load(Ordering::Relaxed)
+    }
+
+    /// Those played as the prior does because the agent did not see the Shift from its start. 0 if it
+    /// sees all events of its games.
+    pub fn history_unknown(&self) -> u64 {
+        self.history_unknown.load(Ordering::Relaxed)
+    }
+
+    fn count(&self, sampler: Result<&Sampler, &KnowledgeError>) {
+        let number = match sampler {
+            Ok(_) => &self.searched,
+            Err(KnowledgeError::TooManySteps(_)) => &self.too_many_deals,
+            Err(_) => &self.history_unknown,
+        };
+        number.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -159,6 +224,7 @@ struct Player {
     chance: Chance,
     history: Option<ShiftHistory>,
     pool: Option<Arc<ThreadPool>>,
+    decisions: Arc<Decisions>,
 }
 
 impl Following for Player {
@@ -178,7 +244,9 @@ impl Following for Player {
         if legal.len() <= 1 {
             return prior;
         }
-        let Some(sampler) = self.sampler(observation) else {
+        let sampler = self.sampler(observation);
+        self.decisions.count(sampler.as_ref());
+        let Ok(sampler) = sampler else {
             return prior;
         };
         let others = legal.iter().filter(|action| *action != prior);
@@ -210,12 +278,12 @@ impl Following for Player {
 }
 
 impl Player {
-    /// The deals that are possible; `None` if there are too many to count, or the history of the
+    /// The deals that are possible. An error if there are too many to count, or the history of the
     /// Shift is not known from its start.
-    fn sampler(&self, observation: &Observation) -> Option<Sampler> {
-        let history = self.history.as_ref()?;
-        let knowledge = Knowledge::new(self.rules, observation, history).ok()?;
-        Sampler::new(knowledge, MAX_STEPS).ok()
+    fn sampler(&self, observation: &Observation) -> Result<Sampler, KnowledgeError> {
+        let history = self.history.as_ref().ok_or(KnowledgeError::History)?;
+        let knowledge = Knowledge::new(self.rules, observation, history)?;
+        Sampler::new(knowledge, MAX_STEPS)
     }
 }
 

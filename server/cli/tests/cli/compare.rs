@@ -52,11 +52,34 @@ fn a_number_of_rollouts_makes_games_repeatable() {
         )
     );
     assert_eq!(once["a"]["agent"], "monte_carlo:20:random");
+    let decisions = &once["a"]["decisions"];
+    assert!(decisions["searched"].as_u64().unwrap() > 50, "{decisions}");
+    assert_eq!(decisions["history_unknown"], 0);
     assert_eq!(once["shifts"], 16);
     assert_ne!(
         once["points_per_shift"],
         json("random", "random", flags)["points_per_shift"]
     );
+}
+
+#[test]
+fn agents_that_search_are_named_with_their_budgets() {
+    let text = compare(
+        "monte_carlo:10:random",
+        "monte_carlo:11:random",
+        "--deals 2 --shifts 1 --faces 4",
+    )
+    .well()
+    .stdout;
+    let title = "monte_carlo:10:random against monte_carlo:11:random: 2 deals";
+    assert!(text.contains(title), "{text}");
+    assert!(text.contains("monte_carlo:11:random: "), "{text}");
+    assert!(
+        text.contains(" searched, 0 decisions taken as trained does."),
+        "{text}"
+    );
+    let table = text.split("Per seat").nth(1).unwrap();
+    assert!(table.contains(" A ") && table.contains(" B "), "{text}");
 }
 
 #[test]
