@@ -19,7 +19,7 @@ pub enum SecretsRefused {
     TooMany,
     /// One is neither an owner token nor a ticket.
     #[error(
-        "`{SECRET_HEADER}` must be an owner token or a ticket, 96 hexadecimal digits; a join code is not a secret"
+        "`{SECRET_HEADER}` must be an owner token or a ticket, 96 hexadecimal digits (a join code is not a secret): check it, or join again"
     )]
     Malformed,
 }

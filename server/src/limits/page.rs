@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use super::{background, calls, frames};
 use crate::config::{
-    FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS,
-    MAX_RECORDS_SENT, MAX_TOURNAMENTS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
-    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
+    FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
+    MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_TOURNAMENTS,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
+    VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
 use crate::room::MAX_SPECTATORS;
@@ -117,6 +118,15 @@ fn of_all() -> String {
                 "{}; others wait. {} without a part end one",
                 number(MAX_IMPORTS),
                 seconds(IMPORT_IDLE_TIMEOUT)
+            ),
+            "",
+        ),
+        (
+            "analyses at a time",
+            format!(
+                "{}, for {} at most each; those without a thread wait",
+                number(MAX_ANALYSES),
+                seconds(MAX_ANALYSIS_TIME)
             ),
             "",
         ),

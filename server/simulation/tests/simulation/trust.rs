@@ -48,8 +48,8 @@ impl Chance {
     }
 }
 
-/// How often the first of two equal participants is called better. Their scores in game n are
-/// `of(n)`, each with its occasion.
+/// How often one of two equal participants is called better. Their scores in game n are `of(n)`,
+/// each with its occasion.
 fn called_sure(games: u64, of: impl Fn(&mut Chance, u64) -> [Scored; 2]) -> f64 {
     let repetitions = 3000;
     let mut chance = Chance(17);
@@ -57,7 +57,11 @@ fn called_sure(games: u64, of: impl Fn(&mut Chance, u64) -> [Scored; 2]) -> f64 
         .filter(|_| {
             let both: Vec<[Scored; 2]> = (0..games).map(|game| of(&mut chance, game)).collect();
             let scores = |who: usize| both.iter().map(|both| both[who]).collect::<Vec<_>>();
-            order_confidence(&scores(0), &scores(1)).confidence > SURE
+            let (first, second) = (scores(0), scores(1));
+            // The standings have the one with the higher mean above.
+            [(&first, &second), (&second, &first)]
+                .iter()
+                .any(|(upper, lower)| order_confidence(upper, lower).confidence > SURE)
         })
         .count();
     sure as f64 / f64::from(repetitions)
@@ -95,7 +99,7 @@ fn equal_participants_are_called_different_as_rarely_as_stated() {
         ),
     ];
     for (how, share) in shares {
-        assert!((0.035..0.065).contains(&share), "{how}: {share}");
+        assert!((0.03..0.06).contains(&share), "{how}: {share}");
     }
 }
 
@@ -110,8 +114,8 @@ fn rules() -> RuleSet {
 /// A Swiss tournament of these agents that has begun.
 fn swiss(agents: &[AgentKind], deals: Deals, draw: u8) -> Tournament {
     let settings = Settings {
-        rounds: Some(6),
-        games_per_pairing: 20,
+        rounds: Some(12),
+        games_per_pairing: 10,
         deals,
         max_participants: 24,
         draw_seed: [draw; 32],
