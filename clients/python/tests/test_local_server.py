@@ -1,6 +1,6 @@
 """The local server: finding the program, the error without it, and stopping with the process."""
 
-import importlib
+import importlib.util
 import os
 import signal
 import subprocess
@@ -152,8 +152,13 @@ def test_the_shared_server_stops_with_its_process(way: str) -> None:
 
 
 def test_the_package_of_the_server_finds_its_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "server" / "src"))
-    package = importlib.import_module("chefshat_server")
+    # Not imported, so that other tests do not find it installed.
+    source = Path(__file__).parents[1] / "server" / "src" / "chefshat_server" / "__init__.py"
+    spec = importlib.util.spec_from_file_location("chefshat_server", source)
+    assert spec is not None
+    assert spec.loader is not None
+    package = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(package)
     scripts = tmp_path / "scripts"
     scripts.mkdir()
     monkeypatch.setattr("sysconfig.get_path", lambda name, scheme=None: str(scripts if scheme is None else tmp_path))

@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,8 @@ def test_the_need_for_the_program_is_explained(tmp_path: Path, monkeypatch: pyte
     monkeypatch.delenv(BINARY, raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(local_server, "_cargo_targets", list)
+    # As if the package chefshat-server were not installed.
+    monkeypatch.setitem(sys.modules, "chefshat_server", None)
     with pytest.raises(ChefsHatError, match=r"BINARY_MISSING.*replay the records.*on this machine.*cargo build") as refused:
         replay.from_records(tmp_path)
     assert "address" not in refused.value.message
