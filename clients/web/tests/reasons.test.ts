@@ -6,7 +6,8 @@ import { join } from "node:path";
 import { expect, test } from "vitest";
 import { en } from "../src/i18n/en";
 
-const SERVER = join(import.meta.dirname, "../../../server/src");
+/** The crates of the server that name reasons. */
+const SERVER = ["server/src", "server/vector/src"].map((folder) => join(import.meta.dirname, "../../..", folder));
 
 /** Reasons without a text on the page. */
 const WITHOUT_TEXT: Record<string, readonly string[]> = {
@@ -74,8 +75,10 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
 };
 
 test("each reason of the server has a text, or a cause not to have one", () => {
-  const files = readdirSync(SERVER, { recursive: true, encoding: "utf8" }).filter((path) => path.endsWith(".rs"));
-  const sources = files.map((path) => readFileSync(join(SERVER, path), "utf8"));
+  const files = SERVER.flatMap((folder) =>
+    readdirSync(folder, { recursive: true, encoding: "utf8" }).map((path) => join(folder, path)),
+  );
+  const sources = files.filter((path) => path.endsWith(".rs")).map((path) => readFileSync(path, "utf8"));
   const found = sources.flatMap((text) => [...text.matchAll(/"([A-Z]+(?:_[A-Z]+)+|INTERNAL)"/g)].map(([, it]) => it));
   const handled = [...Object.keys(en.faults.byReason), ...Object.values(WITHOUT_TEXT).flat()];
   expect(handled.toSorted()).toEqual([...new Set(found)].toSorted());
