@@ -58,6 +58,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SETUP_MISSING",
     "SETUP_REFUSED",
     "SETUP_TOO_LATE",
+    "STATES_REFUSED",
     "STATES_TOO_LARGE",
     "STREAM_SILENT",
     "TOO_MANY_ANALYSES",
