@@ -1,7 +1,7 @@
 //! Plays a possible game on, to the end of its Shift, and says what that was worth.
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
-use chefshat_engine::{ActionId, Event, Game, MAX_SEATS, Seat, ShiftEnd, Viewer};
+use chefshat_engine::{ActionId, Event, Game, MAX_SEATS, Seat, Viewer};
 
 /// What a Shift was worth to a seat.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
@@ -36,7 +36,7 @@ pub(crate) fn rollout(
                 seat: finished,
                 place: reached,
             } if finished == seat => place = Some(reached),
-            Event::ShiftEnded(end) => place = place.or(place_of(&end, seat)),
+            Event::ShiftEnded(end) => place = place.or(end.order.place_of(seat)),
             _ => {}
         })
         .expect("a legal action");
@@ -54,8 +54,4 @@ pub(crate) fn rollout(
             _ => agents[decision.seat.index()].decide(&observation, &legal),
         };
     }
-}
-
-fn place_of(end: &ShiftEnd, seat: Seat) -> Option<u8> {
-    end.order.place_of(seat)
 }

@@ -2,7 +2,6 @@
 //! stay responsive. `chefshat_search` estimates; this file reads positions and writes the answers.
 //! Only what the seat knows goes into a position, and games that are running have none.
 
-use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -20,13 +19,14 @@ use chefshat_search::{
     Allocation, Estimate, Knowledge, KnowledgeError, Method, Sampler, ShiftHistory, evaluate,
     likely_hands,
 };
-use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{mpsc, oneshot};
+use rayon::{ThreadPool, ThreadPoolBuildError};
+use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
 use super::limits::charged;
+use super::pool::{on_pool, pool};
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
 use crate::access::Caller;
@@ -67,14 +67,10 @@ impl Analyses {
         threads: usize,
         closing: CancellationToken,
     ) -> Result<Self, ThreadPoolBuildError> {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|index| format!("analysis-{index}"))
-            .build()?;
         let places = Places::new(MAX_ANALYSES, recorded.rooms().shares());
         Ok(Self {
             recorded,
-            pool: Arc::new(pool),
+            pool: pool("analysis", threads)?,
             places,
             closing,
         })
@@ -112,25 +108,16 @@ impl Analyses {
             .ok_or_else(internal)
     }
 
-    /// Works on a thread of the pool. `stopped` says whether the client has gone or the server stops.
-    async fn on_pool<T: Send + 'static>(
+    /// Runs work on a thread of the pool. `stopped` says whether the client has gone or the server stops.
+    async fn run_on_pool<T: Send + 'static>(
         &self,
         work: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, Status> {
         let gone = CancellationToken::new();
         let guard = gone.clone().drop_guard();
         let closing = self.closing.clone();
-        let (done, result) = oneshot::channel();
-        self.pool.spawn(move || {
-            let stopped = || gone.is_cancelled() || closing.is_cancelled();
-            // Rooms share the process, so a panic ends only this work.
-            let worked = std::panic::catch_unwind(AssertUnwindSafe(|| work(&stopped)));
-            if let Ok(value) = worked {
-                // It fails only if the client has gone.
-                let _ = done.send(value);
-            }
-        });
-        let value = result.await.map_err(|_| internal());
+        let work = move || work(&|| gone.is_cancelled() || closing.is_cancelled());
+        let value = on_pool(&self.pool, work).await;
         drop(guard);
         match self.closing.is_cancelled() {
             true => Err(shutting_down()),
@@ -161,7 +148,7 @@ impl AnalysisService for Analyses {
         let (responses, stream) = mpsc::channel(1);
         let service = self.clone();
         tokio::spawn(async move {
-            let work = service.on_pool(move |stopped| {
+            let work = service.run_on_pool(move |stopped| {
                 // Work that was given up keeps its place until it ends.
                 let _place = place;
                 evaluated(knowledge, &plan, stopped)

@@ -10,6 +10,7 @@ mod limits;
 mod new_room;
 mod pages;
 mod play;
+mod pool;
 mod reach;
 mod recorded;
 mod records;

@@ -2,11 +2,9 @@
 //! stay responsive; small batches are stepped without it. `chefshat_simulation::vector` plays the
 //! games; this file reads and writes the streams and splits records into messages.
 
-use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, Seed};
 use chefshat_proto::v1::{
     self, run_request::Request as RequestKind, run_response::Response as ResponseKind,
@@ -14,14 +12,14 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Decisions, Start, VectorGames, VectorSetup};
+use chefshat_simulation::vector::{Start, VectorGames, VectorSetup};
 use chefshat_vector::{
     Limits, Request as VectorRequest, batch_to_proto, record_parts, saved_to_proto,
     seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto,
 };
-use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use rayon::{ThreadPool, ThreadPoolBuildError};
+use tokio::sync::mpsc;
 use tokio::sync::mpsc::error::SendTimeoutError;
-use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -29,6 +27,7 @@ use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::limits::charged;
 use super::new_room::branch_refused;
+use super::pool::{caught, on_pool, pool};
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use crate::access::Caller;
@@ -69,14 +68,10 @@ impl Vectors {
         threads: usize,
         closing: CancellationToken,
     ) -> Result<Self, ThreadPoolBuildError> {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|index| format!("vector-{index}"))
-            .build()?;
         let shares = recorded.rooms().shares();
         Ok(Self {
             recorded,
-            pool: Arc::new(pool),
+            pool: pool("vector", threads)?,
             streams: Places::new(MAX_VECTOR_STREAMS, shares),
             seats: Places::new(MAX_VECTOR_SEATS_IN_ALL, shares),
             closing,
@@ -337,48 +332,14 @@ fn executes_in_place(request: &VectorRequest, setup: &VectorSetup) -> bool {
     if !matches!(request, VectorRequest::Actions(_)) {
         return false;
     }
-    let others = match setup.decisions() {
-        Decisions::Turns { others } => others,
-        Decisions::All => None,
-    };
-    let built_in: Vec<_> = (setup.agents().values().copied().chain([others]))
-        .flatten()
-        .collect();
-    // A network takes long for a decision, and an agent that may pass at any time for a Shift.
-    let slow = [AgentKind::Trained, AgentKind::RandomUnmasked];
-    let most = if built_in.iter().any(|agent| slow.contains(agent)) {
+    let most = if setup.has_slow_agents() {
         0
-    } else if built_in.is_empty() {
+    } else if setup.built_in().next().is_none() {
         MAX_GAMES_IN_PLACE
     } else {
         MAX_GAMES_IN_PLACE_WITH_BUILT_IN
     };
     setup.games() <= most
-}
-
-/// Runs work; `None` if it panics, which ends only this work because rooms share the process.
-fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
-    // The state of the work is dropped, so it is never seen half done.
-    let done = std::panic::catch_unwind(AssertUnwindSafe(work));
-    if done.is_err() {
-        tracing::error!("the games of a client were given up: stepping them panicked");
-    }
-    done.ok()
-}
-
-/// Runs work on a pool's threads.
-async fn on_pool<T: Send + 'static>(
-    pool: &ThreadPool,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Status> {
-    let (done, result) = oneshot::channel();
-    pool.spawn(move || {
-        if let Some(value) = caught(work) {
-            // It fails only if the client has gone.
-            let _ = done.send(value);
-        }
-    });
-    result.await.map_err(|_| internal())
 }
 
 /// The content of the next message, if set; `None` when the client has ended the stream.
@@ -449,18 +410,11 @@ fn too_late(reason: &str, what: &str, limit: Duration, advice: &str) -> Status {
 
 #[cfg(test)]
 mod tests {
-    use chefshat_simulation::vector::Seeds;
+    use chefshat_agents::AgentKind;
+    use chefshat_simulation::vector::{Decisions, Seeds};
     use chefshat_vector::Reset;
 
     use crate::grpc::vector::*;
-
-    #[tokio::test]
-    async fn a_panic_ends_only_its_own_work() {
-        let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let failed = on_pool(&pool, || -> u32 { panic!("on purpose") }).await;
-        assert_eq!(failed.unwrap_err().code(), Code::Internal);
-        assert_eq!(on_pool(&pool, || 7).await.unwrap(), 7);
-    }
 
     #[test]
     fn only_short_steps_are_made_in_place() {

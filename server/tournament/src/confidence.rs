@@ -119,8 +119,9 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
 
 /// The probability of at least this difference, in either direction, if the two exchanged their
 /// scores on each occasion with a toss of a coin: exact for equal participants (Fisher's
-/// randomisation test). `None` unless both played equally often on every occasion for whole
-/// numbers, and not for so many that computing it is long; then Student's distribution will do.
+/// randomisation test). `None` if the two did not play equally often on every occasion for whole
+/// numbers, or if the differences sum to more than [`MOST_EXACT`], where Student's distribution is
+/// close enough.
 fn by_exchange(upper: &[Scored], lower: &[Scored]) -> Option<f64> {
     let mut by_occasion: BTreeMap<u64, (i64, i64)> = BTreeMap::new();
     for (scores, sign) in [(upper, 1), (lower, -1)] {

@@ -91,7 +91,7 @@ impl Games {
 
     /// Takes one action for each row of the latest batch and returns the next batch. Raises
     /// `TypeError` for anything but an array of uint16 or int64, and `ValueError` if there is not
-    /// one action for each row, or a number that is no action; then the games are unchanged.
+    /// one action for each row, or a number is not an action; then the games are unchanged.
     fn step(&self, py: Python<'_>, actions: &Bound<'_, PyAny>) -> PyResult<Batch> {
         let actions = if let Ok(actions) = actions.cast::<PyArray1<u16>>() {
             let actions = actions.try_readonly()?;

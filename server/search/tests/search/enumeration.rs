@@ -76,7 +76,7 @@ fn gifts_by(scenario: &Scenario, seat: Seat, before: &[Moment]) -> Vec<Vec<Actio
                     _ => counts[usize::from(scenario.rules.faces())] += 1,
                 }
             }
-            // Whoever is the partner is public; the events say it.
+            // The partner is public: the events name it.
             is_partner(scenario, before.len(), giver, seat)
                 && received.counts(scenario.rules.faces()).eq(counts)
         };

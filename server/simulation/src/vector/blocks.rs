@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use chefshat_agents::AgentKind;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -54,9 +53,7 @@ pub(super) fn run(
 
 /// The number of games up to which one thread is faster than several.
 fn fewest_for_threads(setup: &VectorSetup) -> usize {
-    let agents = setup.agents().values().copied().flatten();
-    let slow = [AgentKind::Trained, AgentKind::RandomUnmasked];
-    match agents.into_iter().any(|agent| slow.contains(&agent)) {
+    match setup.has_slow_agents() {
         true => BLOCK,
         false => MANY,
     }

@@ -178,8 +178,8 @@ impl VectorGames {
 
     /// Replaces these games, in ascending order, by saved ones. Each continues exactly as the saved
     /// game would, with its index, until its end. The game that follows has the index that is higher
-    /// by the number of games here, and the seed that it has here. The batch contains all open decisions; a restored game has not
-    /// begun anew, so it is not among the beginnings.
+    /// by the number of games here, and the seed that it has here. The batch contains all open
+    /// decisions; a restored game has not begun anew, so it is not among the beginnings.
     ///
     /// # Errors
     /// If the games do not exist or are not ascending, or a state cannot be continued here. Then

@@ -270,6 +270,22 @@ impl VectorSetup {
         &self.agents
     }
 
+    /// All built-in agents: those of seats, and the one for decisions that the client does not take.
+    pub fn built_in(&self) -> impl Iterator<Item = AgentKind> + '_ {
+        let others = match self.decisions {
+            Decisions::Turns { others } => others,
+            Decisions::All => None,
+        };
+        self.agents.values().copied().chain([others]).flatten()
+    }
+
+    /// Whether steps are long because of the agents: a network takes long for a decision, and an
+    /// agent that may pass at any time for a Shift.
+    pub fn has_slow_agents(&self) -> bool {
+        let slow = [AgentKind::Trained, AgentKind::RandomUnmasked];
+        self.built_in().any(|agent| slow.contains(&agent))
+    }
+
     /// The seats of the client, ascending.
     pub fn client_seats(&self) -> impl Iterator<Item = Seat> + '_ {
         self.agents
