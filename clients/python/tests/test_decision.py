@@ -46,7 +46,7 @@ def decision(hand: bytes = HAND, legal: tuple[int, ...] = (0, 8, 199, 213), deal
 
 
 def test_views_show_the_message() -> None:
-    view = decision(board_face=4, board_size=3, board_jokers=1)
+    view = decision(board_face=4, board_size=3, board_jokers=1, board_owner=0)
     assert view.hand.tolist() == list(HAND)
     assert view.hand.dtype == np.uint8
     assert view.played.tolist() == [1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 4, 1]
@@ -57,7 +57,7 @@ def test_views_show_the_message() -> None:
     assert view.points.tolist() == [5, 3, 1, 300]
     assert view.gave.tolist() == []
     assert view.received.tolist() == [1, 1, *[0] * 10]
-    assert (view.board_face, view.board_size, view.board_jokers) == (4, 3, 1)
+    assert (view.board_face, view.board_size, view.board_jokers, view.board_owner) == (4, 3, 1, 0)
     assert (view.shift, view.pizza, view.golden, view.seat) == (2, 3, True, 2)
     assert (view.decision_id, view.kind, view.time_left_ms, view.bank_left_ms) == (9, pb.DECISION_KIND_TURN, 9_000, 60_000)
     assert repr(view) == "Decision(seat=2, decision_id=9, kind=TURN)"

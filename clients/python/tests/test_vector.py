@@ -124,6 +124,7 @@ def test_columns_are_read_only_views_of_the_right_shape(toy: FakeVector) -> None
             "hands": (3, 12),
             "golden": (3,),
             "boards": (3, 3),
+            "board_owners": (3,),
             "cards_left": (3, 4),
             "passed": (3, 4),
             "places": (3, 4),

@@ -172,13 +172,14 @@ describe("the Golden card", () => {
 });
 
 test("a viewer who joins in the middle of a Shift does not take the next turn for its first", () => {
-  const observation = { shift: 1, pizza: 3, played: [0, 0, 2], passed: [0, 0], cardsLeft: [3, 3] };
+  const observation = { shift: 1, pizza: 3, played: [0, 0, 2], passed: [0, 0], cardsLeft: [3, 3], boardOwner: 0 };
   const bytes = Object.fromEntries(
     Object.entries(observation).map(([name, value]) => [name, Array.isArray(value) ? Uint8Array.from(value) : value]),
   );
   const gameStarted = { rules: {}, seats: [{ seat: 0 }, { seat: 1 }] };
   const snapshot = create(SnapshotSchema, { nextSequence: 40n, gameStarted, observation: bytes });
   const table = applySnapshot(emptyTable(), snapshot, undefined);
+  expect(table.boardBy).toBe(0);
   expect(publicRequirement(table)).toMatchObject({ lowestFace: 1, highestFace: 11, loneJoker: true });
   expect(playElevens(table, 1, 2).board).toEqual([ELEVEN, ELEVEN]);
 });

@@ -238,6 +238,12 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         |row| row.seen.board.jokers.into(),
     ),
     Column::new(
+        "board_owner",
+        Type::Uint8,
+        "The seat that played the cards on the board; null if it is empty.",
+        |row| row.seen.board_owner.map(|seat| seat.index() as u8).into(),
+    ),
+    Column::new(
         "cards_left",
         COUNTS,
         "Cards in each hand, index = seat.",

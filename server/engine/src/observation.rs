@@ -25,6 +25,8 @@ pub struct Observation {
     pub hand: Cards,
     /// The board.
     pub board: Board,
+    /// The seat that played the cards on the board; `None` if it is empty.
+    pub board_owner: Option<Seat>,
     /// Number of cards in each hand. A card given in the exchange leaves the hand at once.
     pub cards_left: BySeat<u8>,
     /// Whether each seat has passed in this pizza; with [`crate::PassScope::Turn`], since the last

@@ -112,4 +112,9 @@ fn put_observation(out: &mut Vec<u8>, observation: &Observation) {
             put_cards(out, field, cards);
         }
     }
+    if let Some(owner) = observation.board_owner {
+        // Written even if it is seat 0.
+        encode_key(16, WireType::Varint, out);
+        encode_varint(seat_number(owner).into(), out);
+    }
 }

@@ -86,6 +86,7 @@ fn observations(columns: ObservationColumns) -> v1::ObservationColumns {
         received: columns.received.into(),
         history: columns.history.into(),
         history_counts: columns.history_counts.into(),
+        board_owners: columns.board_owners.into(),
     }
 }
 

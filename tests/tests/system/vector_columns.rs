@@ -75,6 +75,8 @@ async fn every_column_equals_the_engines_value() {
                     .map(|part| u32::from(*part))
                     .eq(board)
             );
+            let owner = expected.board_owner.unwrap_or(255);
+            assert_eq!(u32::from(seen.board_owners[row]), owner);
             assert_eq!(part(&seen.cards_left, 4), expected.cards_left);
             assert_eq!(part(&seen.passed, 4), expected.passed);
             assert_eq!(part(&seen.places, 4), expected.places);

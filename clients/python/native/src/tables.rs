@@ -234,6 +234,7 @@ fn observed(
         ("hands", seen.hands),
         ("golden", seen.golden),
         ("boards", seen.boards),
+        ("board_owners", seen.board_owners),
         ("cards_left", seen.cards_left),
         ("passed", seen.passed),
         ("places", seen.places),

@@ -21,6 +21,8 @@ from chefshat.errors import ChefsHatError
 from chefshat.masks import unpack
 
 Scalar = TypeVar("Scalar", bound=np.generic)
+#: In a column of seats: there is none.
+NO_SEAT = 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +213,8 @@ class Observations(Table):
     """(R,): 1 if the hand has the Golden card."""
     boards = Column[np.uint8]("u1", 3)
     """(R, 3): face on the board (0 empty, F+1 a joker alone), number of cards, jokers among them."""
+    board_owners = Column[np.uint8]("u1")
+    """(R,): the seat that played the cards on the board; `NO_SEAT` if it is empty."""
     cards_left = Column[np.uint8]("u1", "players")
     """(R, N): cards in each hand."""
     passed = Column[np.uint8]("u1", "players")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chefshat import pb
-from chefshat.columns import Observations, Situations, Sizes
+from chefshat.columns import NO_SEAT, Observations, Situations, Sizes
 
 Counts: TypeAlias = NDArray[np.uint8]
 
@@ -202,6 +202,12 @@ class Decision:
         return self.request.observation.board_jokers
 
     @property
+    def board_owner(self) -> int | None:
+        """The seat that played the cards on the board; None if it is empty."""
+        seen = self.request.observation
+        return seen.board_owner if seen.HasField("board_owner") else None
+
+    @property
     def cards_left(self) -> Counts:
         """Number of cards in each seat's hand: N numbers."""
         return np.frombuffer(self.request.observation.cards_left, np.uint8)
@@ -269,6 +275,7 @@ class Decision:
             "pizzas": np.array([seen.pizza], np.uint32),
             "golden": np.array([seen.golden], np.uint8),
             "boards": np.array([boards], np.uint8),
+            "board_owners": np.array([seen.board_owner if seen.HasField("board_owner") else NO_SEAT], np.uint8),
             "points": np.minimum([seen.points], np.iinfo(np.uint32).max).astype(np.uint32),
         }
         for name in ("hands", "cards_left", "passed", "places", "roles", "played", "gave", "received"):

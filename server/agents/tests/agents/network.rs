@@ -65,6 +65,7 @@ impl Row {
             pizza: self.pizza,
             hand: Cards::from_counts(faces, &self.hands, self.golden).unwrap(),
             board: Board { face, size, jokers },
+            board_owner: None,
             cards_left: BySeat::from_slice(&self.cards_left).unwrap(),
             passed: BySeat::from_slice(&self.passed)
                 .unwrap()

@@ -6,7 +6,7 @@ use chefshat_dataset::decision_columns;
 use chefshat_engine::RewardScheme;
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::signature::SigningKey;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{Stage, a_record, counted, number, players};
 
@@ -71,6 +71,25 @@ fn rows_agree_with_the_engines_metrics() {
             }
         }
     }
+}
+
+#[test]
+fn the_owner_of_a_board_is_the_seat_that_played_last() {
+    let stage = Stage::new(&[("a.jsonl", a_record(3))]);
+    stage.run(&stage.export()).unwrap();
+    let (mut pizza, mut owner, mut owned) = (Value::Null, Value::Null, 0);
+    for row in stage.rows("decisions") {
+        let now = json!([row["shift"], row["pizza"]]);
+        if now != pizza {
+            (pizza, owner) = (now, Value::Null);
+        }
+        assert_eq!(row["board_owner"], owner);
+        owned += u32::from(!owner.is_null());
+        if row["phase"] == "turn" && row["text"] != "pass" {
+            owner = row["seat"].clone();
+        }
+    }
+    assert!(owned > 100, "{owned}");
 }
 
 #[test]

@@ -31,6 +31,7 @@ impl Game {
             pizza: state.pizza,
             hand: own(&self.hands),
             board: state.board,
+            board_owner: state.last_to_play,
             cards_left: self.cards_left,
             passed: BySeat::from_fn(self.rules.players(), |seat| state.passed & bit(seat) != 0),
             places: state.places,

@@ -1,10 +1,10 @@
 //! Observations and classic vectors.
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, Seed, Stop, Viewer,
+    BySeat, Cards, DecisionKind, Event, Game, RuleSetSpec, Script, Seat, Seed, Stop, Viewer,
 };
 
-use crate::support::{act, cards, hands};
+use crate::support::{Chance, act, cards, hands};
 
 fn seat(index: usize) -> Seat {
     Seat::new(index)
@@ -51,6 +51,36 @@ fn the_standard_vector_has_228_numbers() {
         .collect();
     assert_eq!(vector[28..], legal[..]);
     assert_eq!(vector[28..].iter().sum::<f32>(), mask.len() as f32);
+}
+
+#[test]
+fn the_owner_of_the_board_is_the_seat_that_played_last() {
+    for (number, players) in [(1, 2), (2, 4), (3, 6)] {
+        let spec = RuleSetSpec {
+            players,
+            stop: Stop::Shifts(3),
+            ..RuleSetSpec::default()
+        };
+        let mut game = Game::new(spec.validate().unwrap(), Seed([number; 32]), |_| {});
+        let (mut owner, mut finished) = (None, 0);
+        let mut chance = Chance(u64::from(number));
+        while !game.is_over() {
+            let action = chance.legal_action(&game);
+            game.apply(action, |event| match event {
+                Event::Played { seat, .. } => owner = Some(seat),
+                Event::PizzaDone { .. } | Event::ShiftStarted { .. } => owner = None,
+                _ => {}
+            })
+            .unwrap();
+            for viewer in (0..players).map(|index| Viewer::Seat(seat(index.into()))) {
+                let seen = game.observe(viewer);
+                assert_eq!(seen.board_owner, owner);
+                assert_eq!(seen.board_owner.is_none(), seen.board.size == 0);
+                finished += u32::from(owner.is_some_and(|owner| seen.places[owner] > 0));
+            }
+        }
+        assert!(players == 2 || finished > 0);
+    }
 }
 
 #[test]

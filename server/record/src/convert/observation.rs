@@ -5,7 +5,7 @@ use chefshat_engine::{
 };
 use chefshat_proto::v1;
 
-use super::{FieldProblem, role_from_number, seat_number, special_to_proto};
+use super::{FieldProblem, role_from_number, seat_from_number, seat_number, special_to_proto};
 
 /// Converts a kind of decision.
 pub fn decision_kind(kind: DecisionKind) -> v1::DecisionKind {
@@ -49,6 +49,7 @@ pub fn observation_to_proto(observation: &Observation) -> v1::Observation {
         played: counts(observation.played, faces),
         gave: own(observation.gave),
         received: own(observation.received),
+        board_owner: observation.board_owner.map(seat_number),
     }
 }
 
@@ -130,6 +131,13 @@ pub fn observation_from_proto(
             face: small("board_face", message.board_face)?,
             size: small("board_size", message.board_size)?,
             jokers: small("board_jokers", message.board_jokers)?,
+        },
+        board_owner: match message.board_owner {
+            Some(number) => Some(
+                seat_from_number(number, players)
+                    .ok_or_else(|| FieldProblem::new("board_owner", "no such seat"))?,
+            ),
+            None => None,
         },
         cards_left: of_seats("cards_left", &message.cards_left)?,
         passed: of_seats("passed", &message.passed)?.map(|byte| byte != 0),

@@ -65,6 +65,8 @@ pub struct ObservationColumns {
     pub golden: Vec<u8>,
     /// u8, 3 wide: face, size, jokers.
     pub boards: Vec<u8>,
+    /// u8: seat that played the board, or 255.
+    pub board_owners: Vec<u8>,
     /// u8 by seat.
     pub cards_left: Vec<u8>,
     /// u8 by seat.
@@ -304,6 +306,7 @@ impl ObservationColumns {
         self.hands.extend(next.hands);
         self.golden.extend(next.golden);
         self.boards.extend(next.boards);
+        self.board_owners.extend(next.board_owners);
         self.cards_left.extend(next.cards_left);
         self.passed.extend(next.passed);
         self.places.extend(next.places);
@@ -326,6 +329,7 @@ impl ObservationColumns {
             hands: of_cards(),
             golden: of(1),
             boards: of(3),
+            board_owners: of(1),
             cards_left: of(seats),
             passed: of(seats),
             places: of(seats),
@@ -355,6 +359,7 @@ impl ObservationColumns {
         let board = seen.board;
         self.boards
             .extend_from_slice(&[board.face, board.size, board.jokers]);
+        self.board_owners.push(seat_or_none(seen.board_owner));
         self.cards_left
             .extend_from_slice(seen.cards_left.as_slice());
         self.passed
@@ -466,8 +471,7 @@ impl Shifts {
             Some(SpecialAction::DinnerIsServed) => 2,
         });
         self.adjudicated.push(shift.adjudicated.into());
-        self.game_winners
-            .push(winner.map_or(NO_SEAT, |seat| seat.index() as u8));
+        self.game_winners.push(seat_or_none(winner));
         for seat in shift.seats.values() {
             self.places.push(seat.place);
             put_u32(&mut self.points, seat.points);
@@ -504,6 +508,10 @@ const fn kind_number(kind: DecisionKind) -> u8 {
         DecisionKind::Exchange => 2,
         DecisionKind::SpecialAction => 3,
     }
+}
+
+fn seat_or_none(seat: Option<Seat>) -> u8 {
+    seat.map_or(NO_SEAT, |seat| seat.index() as u8)
 }
 
 fn put_u32(column: &mut Vec<u8>, value: u32) {

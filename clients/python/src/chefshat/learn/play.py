@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chefshat import Agent, Client, Decision, SeatInfo, join_options, outcome, pb
-from chefshat.columns import Observations, Sizes
+from chefshat.columns import NO_SEAT, Observations, Sizes
 from chefshat.errors import exit_code
 from chefshat.learn import features, network
 from chefshat.learn.network import Network, NetworkFileError
@@ -64,6 +64,7 @@ def observations_of(request: Decision) -> Observations:
     columns: dict[str, npt.ArrayLike] = {name: getattr(request, name) for name in Observations.columns() if hasattr(request, name)}
     columns |= {"shifts": request.shift, "pizzas": request.pizza}
     columns["boards"] = [request.board_face, request.board_size, request.board_jokers]
+    columns["board_owners"] = NO_SEAT if request.board_owner is None else request.board_owner
     columns["points"] = np.minimum(request.points, np.iinfo(np.uint32).max)
     # The message omits empty gifts, which are then zeros.
     rows = {name: np.array(value)[np.newaxis] for name, value in columns.items() if np.size(value)}

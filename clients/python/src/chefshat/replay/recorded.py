@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.address import ServerAddress
-from chefshat.columns import Sizes
+from chefshat.columns import NO_SEAT, Sizes
 from chefshat.errors import ChefsHatError
 from chefshat.files import write_record
 from chefshat.learn import features
@@ -191,6 +191,7 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
         "pizzas": table.numbers("pizza", np.uint32),
         "golden": table.numbers("golden", np.uint8),
         "boards": np.stack([table.numbers(f"board_{part}", np.uint8) for part in ("face", "size", "jokers")], axis=1),
+        "board_owners": _board_owners(table),
         "hands": table.lists("hand", sizes.card_kinds, np.uint8)[0],
         "points": np.minimum(table.lists("points", sizes.players, np.uint64)[0], np.iinfo(np.uint32).max).astype(np.uint32),
     }
@@ -202,7 +203,7 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
     for name, array in situations.items():
         columns[f"before.{name}"] = array[before]
         columns[f"after.{name}"] = array[after]
-        columns[f"after.{name}"][ended] = 0
+        columns[f"after.{name}"][ended] = NO_SEAT if name == "board_owners" else 0
     columns["after.seats"] = columns["before.seats"]
     shifts = table.numbers("shift", np.int64)
     last_shifts = np.zeros(games.max() + 1, np.int64)
@@ -219,6 +220,13 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
     places = table.numbers("game_place" if by_game else "shift_place", np.uint8)[before]
     columns["places_taken"] = np.where(ended, places, 0).astype(np.uint8)
     return columns
+
+
+def _board_owners(table: Decisions) -> NDArray[np.uint8]:
+    """Returns the seat that played the board of each row, NO_SEAT where it is empty or the dataset does not say."""
+    if not table.has("board_owner"):
+        return np.full(table.rows, NO_SEAT, np.uint8)
+    return np.where(table.numbers("board_size", np.uint8) > 0, table.numbers("board_owner", np.uint8), np.uint8(NO_SEAT))
 
 
 def _with_attempts(table: Decisions, steps: _Steps, scheme: str, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

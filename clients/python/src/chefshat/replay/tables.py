@@ -24,6 +24,10 @@ class Decisions(ABC):
     rows: int
 
     @abstractmethod
+    def has(self, name: str) -> bool:
+        """Whether there is such a column: datasets of earlier versions lack later ones."""
+
+    @abstractmethod
     def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
         """Returns a column of numbers or booleans, (R,); null is 0."""
 
@@ -91,8 +95,11 @@ class _Arrow(Decisions):
         self._table = pyarrow.parquet.read_table(file)
         self.rows = self._table.num_rows
 
+    def has(self, name: str) -> bool:
+        return name in self._table.column_names
+
     def _column(self, name: str) -> Any:  # noqa: ANN401 - pyarrow has no types.
-        if name not in self._table.column_names:
+        if not self.has(name):
             raise _lacks(self._file, name)
         column = self._table.column(name)
         return column.combine_chunks() if column.num_chunks != 1 else column.chunk(0)
@@ -142,8 +149,11 @@ class _Rows(Decisions):
         if not self._cells:
             raise ValueError(f"{file} has no rows; is there a game in the dataset?")
 
+    def has(self, name: str) -> bool:
+        return name in self._cells
+
     def _column(self, name: str, *, text: bool = False) -> list[Any]:
-        if name not in self._cells:
+        if not self.has(name):
             raise _lacks(self._file, name)
         cells = self._cells[name]
         if self._parse is None or text:

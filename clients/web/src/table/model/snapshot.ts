@@ -41,6 +41,7 @@ export function applyObservation(table: TableState, seen: Observation, own: numb
     ...table,
     seats,
     board,
+    boardBy: seen.boardOwner,
     turn: isFirstTurn(seen) ? 1 : Math.max(2, table.turn),
     phase: seen.pizza > 0 ? "pizza" : "dealt",
     shift: seen.shift,

@@ -146,6 +146,7 @@ class Observation(_message.Message):
     PLAYED_FIELD_NUMBER: _builtins.int
     GAVE_FIELD_NUMBER: _builtins.int
     RECEIVED_FIELD_NUMBER: _builtins.int
+    BOARD_OWNER_FIELD_NUMBER: _builtins.int
     shift: _builtins.int
     """Number of the current Shift, from 1."""
     pizza: _builtins.int
@@ -186,6 +187,10 @@ class Observation(_message.Message):
     """Cards that the seat received in this Shift's exchange, F+1 counts; empty if none, and until the
     exchange is complete.
     """
+    board_owner: _builtins.int
+    """The seat that played the cards on the board, also if it has finished since; unset if the board
+    is empty.
+    """
     @_builtins.property
     def points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Points of each seat in the game so far, N numbers."""
@@ -208,12 +213,15 @@ class Observation(_message.Message):
         played: _builtins.bytes = ...,
         gave: _builtins.bytes = ...,
         received: _builtins.bytes = ...,
+        board_owner: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_board_owner", b"_board_owner", "board_owner", b"board_owner"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["board_face", b"board_face", "board_jokers", b"board_jokers", "board_size", b"board_size", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hand", b"hand", "passed", b"passed", "pizza", b"pizza", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shift", b"shift"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_board_owner", b"_board_owner", "board_face", b"board_face", "board_jokers", b"board_jokers", "board_owner", b"board_owner", "board_size", b"board_size", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hand", b"hand", "passed", b"passed", "pizza", b"pizza", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shift", b"shift"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__board_owner: _TypeAlias = _typing.Literal["board_owner"]  # noqa: Y015
+    _WhichOneofArgType__board_owner: _TypeAlias = _typing.Literal["_board_owner", b"_board_owner"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__board_owner) -> _WhichOneofReturnType__board_owner | None: ...
 
 Global___Observation: _TypeAlias = Observation  # noqa: Y015
 

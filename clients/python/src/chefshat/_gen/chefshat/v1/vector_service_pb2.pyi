@@ -814,6 +814,7 @@ class ObservationColumns(_message.Message):
     RECEIVED_FIELD_NUMBER: _builtins.int
     HISTORY_FIELD_NUMBER: _builtins.int
     HISTORY_COUNTS_FIELD_NUMBER: _builtins.int
+    BOARD_OWNERS_FIELD_NUMBER: _builtins.int
     shifts: _builtins.bytes
     """u32: number of the Shift."""
     pizzas: _builtins.bytes
@@ -854,6 +855,8 @@ class ObservationColumns(_message.Message):
     """u32: number of these actions since the Shift began, also those beyond the width; empty if there
     is no history.
     """
+    board_owners: _builtins.bytes
+    """u8: the seat that played the cards on the board; 255 if the board is empty."""
     def __init__(
         self,
         *,
@@ -872,10 +875,11 @@ class ObservationColumns(_message.Message):
         received: _builtins.bytes = ...,
         history: _builtins.bytes = ...,
         history_counts: _builtins.bytes = ...,
+        board_owners: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["boards", b"boards", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hands", b"hands", "history", b"history", "history_counts", b"history_counts", "passed", b"passed", "pizzas", b"pizzas", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shifts", b"shifts"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["board_owners", b"board_owners", "boards", b"boards", "cards_left", b"cards_left", "gave", b"gave", "golden", b"golden", "hands", b"hands", "history", b"history", "history_counts", b"history_counts", "passed", b"passed", "pizzas", b"pizzas", "places", b"places", "played", b"played", "points", b"points", "received", b"received", "roles", b"roles", "shifts", b"shifts"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
