@@ -11,7 +11,8 @@ mod seeds;
 
 pub use built_in::{AgentKind, AgentMaker, BuiltInAgent, Following};
 pub use network::{
-    MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
+    MAX_FILE_BYTES, Network, NetworkBatch, NetworkError, NetworkInfo, NetworkInput, NetworkOutput,
+    table_features,
 };
 pub use participant::ParticipantKind;
 pub use play::{Answer, Listener, ask, is_wrong_action, play, play_agents};

@@ -4,6 +4,8 @@
 
 use chefshat_engine::{ActionSpace, Cards, DecisionKind, Mask, Observation, Seat};
 
+use super::sparse::SparseRows;
+
 /// Upper bound of points.
 const MAX_POINTS: u8 = 15;
 /// Upper bound of the pizza's number.
@@ -50,63 +52,67 @@ pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
 ///
 /// A spectator's observation, which has no seat, is seen from seat 0.
 pub fn table_features(observation: &Observation, legal: &Mask) -> Vec<f32> {
+    let (mut rows, mut features) = (SparseRows::default(), Vec::new());
+    let length = write_table(observation, legal, &mut rows);
+    rows.write(length, &mut features);
+    features
+}
+
+/// Writes [`table_features`] as a row. Returns their number.
+pub(super) fn write_table(observation: &Observation, legal: &Mask, out: &mut SparseRows) -> usize {
     let faces = observation.faces;
     let players = observation.cards_left.len();
     let space = ActionSpace::new(faces).expect("an observation has 4 to 15 faces");
     let own = observation.seat.unwrap_or_default().index();
     let seats = || (0..players).map(|left| Seat::new((own + left) % players));
-    let length = table_len(players, space);
-    let mut out = Vec::with_capacity(length);
 
-    shares(&mut out, observation.hand, faces);
-    out.push(flag(observation.hand.has_golden()));
-    one_hot(
-        &mut out,
-        observation.board.face.into(),
-        usize::from(faces) + 2,
-    );
-    out.push(f32::from(observation.board.size) / f32::from(faces));
-    out.push(f32::from(observation.board.jokers) / JOKERS);
+    put_shares(out, observation.hand, faces);
+    out.put(flag(observation.hand.has_golden()));
+    let face = usize::from(observation.board.face);
+    out.put_ones([face], usize::from(faces) + 2);
+    out.put(f32::from(observation.board.size) / f32::from(faces));
+    out.put(f32::from(observation.board.jokers) / JOKERS);
 
     let hand_size = f32::from(observation.hand_size);
-    out.extend(seats().map(|seat| f32::from(observation.cards_left[seat]) / hand_size));
-    out.extend(seats().map(|seat| flag(observation.passed[seat])));
+    seats().for_each(|seat| out.put(f32::from(observation.cards_left[seat]) / hand_size));
+    seats().for_each(|seat| out.put(flag(observation.passed[seat])));
     let places = players as f32;
-    out.extend(seats().map(|seat| f32::from(observation.places[seat]) / places));
+    seats().for_each(|seat| out.put(f32::from(observation.places[seat]) / places));
     for seat in seats() {
         let role = observation.roles[seat].map_or(0, |role| role as usize);
-        one_hot(&mut out, role, ROLES);
+        out.put_ones([role], ROLES);
     }
-    out.extend(seats().map(|seat| {
+    for seat in seats() {
         let points = u8::try_from(observation.points[seat]).unwrap_or(MAX_POINTS);
-        f32::from(points.min(MAX_POINTS)) / f32::from(MAX_POINTS)
-    }));
+        out.put(f32::from(points.min(MAX_POINTS)) / f32::from(MAX_POINTS));
+    }
 
-    shares(&mut out, observation.played, faces);
+    put_shares(out, observation.played, faces);
     let known = observation
         .hand
         .counts(faces)
         .zip(observation.played.counts(faces));
-    out.extend(sizes(faces).zip(known).map(|(size, (hand, played))| {
-        f32::from(size.saturating_sub(hand).saturating_sub(played)) / f32::from(size)
-    }));
+    for (size, (hand, played)) in sizes(faces).zip(known) {
+        out.put(f32::from(size.saturating_sub(hand).saturating_sub(played)) / f32::from(size));
+    }
     for cards in [observation.gave, observation.received] {
-        out.extend(cards.counts(faces).map(|count| f32::from(count) / 2.0));
+        (cards.counts(faces)).for_each(|count| out.put(f32::from(count) / 2.0));
     }
 
-    let kind = match observation.kind {
-        Some(DecisionKind::Turn) => 0,
-        Some(DecisionKind::Exchange) => 1,
-        Some(DecisionKind::SpecialAction) => 2,
-        None => KINDS,
-    };
-    one_hot(&mut out, kind, KINDS);
+    let kind = observation.kind.map(|kind| match kind {
+        DecisionKind::Turn => 0,
+        DecisionKind::Exchange => 1,
+        DecisionKind::SpecialAction => 2,
+    });
+    out.put_ones(kind, KINDS);
     let pizza = u8::try_from(observation.pizza).unwrap_or(MAX_PIZZAS);
-    out.push(f32::from(pizza.min(MAX_PIZZAS)) / f32::from(MAX_PIZZAS));
-    out.extend(space.iter().map(|action| flag(legal.contains(action))));
+    out.put(f32::from(pizza.min(MAX_PIZZAS)) / f32::from(MAX_PIZZAS));
+    let legal = legal.iter().map(|action| usize::from(action.index()));
+    out.put_ones(legal, usize::from(space.size()));
 
-    debug_assert_eq!(out.len(), length);
-    out
+    let length = out.end_row();
+    debug_assert_eq!(length, table_len(players, space));
+    length
 }
 
 /// Number of cards of each face in a deck, jokers last.
@@ -114,15 +120,11 @@ fn sizes(faces: u8) -> impl Iterator<Item = u8> {
     (1..=faces).chain([chefshat_engine::MAX_JOKERS])
 }
 
-/// Each count as a share of the deck's count.
-fn shares(out: &mut Vec<f32>, cards: Cards, faces: u8) {
-    let counts = cards.counts(faces).zip(sizes(faces));
-    out.extend(counts.map(|(count, size)| f32::from(count) / f32::from(size)));
-}
-
-/// `length` zeros, with a 1 at `index` if that is in range.
-fn one_hot(out: &mut Vec<f32>, index: usize, length: usize) {
-    out.extend((0..length).map(|slot| flag(slot == index)));
+/// Writes each count as a share of the deck's count.
+fn put_shares(out: &mut SparseRows, cards: Cards, faces: u8) {
+    for (count, size) in cards.counts(faces).zip(sizes(faces)) {
+        out.put(f32::from(count) / f32::from(size));
+    }
 }
 
 fn flag(set: bool) -> f32 {

@@ -113,10 +113,11 @@ impl Network {
         }
         let hidden = layers
             .into_iter()
-            .map(|layer| Hidden::new(&layer.weights, layer.bias))
+            .map(|layer| Hidden::new(&layer.weights, &layer.bias))
             .collect();
         Ok(Network {
             info,
+            inputs,
             hidden,
             output: Output::new(weights, bias),
         })

@@ -1,15 +1,19 @@
-//! Agents that play by a network: what a network is and how it decides. `features` computes the
-//! inputs, `layers` the outputs, `file` reads network files. The Python package trains networks.
+//! Agents that play by a network: what a network is. `features` computes the inputs, `layers` the
+//! outputs, `batch` decides from them, `file` reads network files. The Python package trains
+//! networks.
 
+mod batch;
 mod features;
 mod file;
 mod layers;
+mod sparse;
 
 use std::sync::{Arc, LazyLock};
 
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Mask, Observation, RuleSet};
 
 use crate::greedy::greedy;
+pub use batch::NetworkBatch;
 pub use features::table_features;
 use layers::{Hidden, Output};
 
@@ -70,6 +74,8 @@ pub struct NetworkInfo {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     info: NetworkInfo,
+    /// Length of the input.
+    inputs: usize,
     hidden: Vec<Hidden>,
     output: Output,
 }
@@ -108,55 +114,24 @@ impl Network {
         }
     }
 
-    /// The T or A outputs for an input from [`Network::features`]. After tanh the last digits may
-    /// differ between platforms.
-    ///
-    /// # Panics
-    /// If the input has the wrong length.
-    pub fn outputs(&self, features: &[f32]) -> Vec<f32> {
-        let last = self.last_hidden(features);
-        (0..self.output.len())
-            .map(|index| self.output.value(index, &last))
-            .map(|sum| if self.info.tanh { sum.tanh() } else { sum })
-            .collect()
-    }
-
-    /// Chooses the legal action with the highest output before tanh, the lowest index of equals.
-    /// NaN, from weights too large to sum, counts as the lowest. Without an output for the decision
-    /// takes the default action ([`Observation::default_action`]). In a game that the network does
-    /// not fit plays as the built-in agent `greedy`.
+    /// The action that [`Network::decide`] takes, if it depends on no output: there is no choice, no
+    /// output for the decision, or the network does not fit the game.
     ///
     /// # Panics
     /// If `legal` is empty.
-    pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
+    fn decide_without_outputs(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
         if !self.knows(observation) {
             let space =
                 ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
-            return greedy(observation, legal, space);
+            return Some(greedy(observation, legal, space));
         }
         if self.info.output == NetworkOutput::Turns && observation.kind != Some(DecisionKind::Turn)
         {
-            return (observation.default_action(legal)).expect("a decision has a legal action");
+            let action = observation.default_action(legal);
+            return Some(action.expect("a decision has a legal action"));
         }
-        let mut best = legal.nth(0).expect("a decision has a legal action");
-        if legal.len() == 1 {
-            return best;
-        }
-        let last = self.last_hidden(&self.features(observation, legal));
-        let mut highest = f32::NEG_INFINITY;
-        for action in legal.iter() {
-            let index = usize::from(action.index());
-            if index >= self.output.len() {
-                continue;
-            }
-            // Before tanh, which keeps the order but differs between platforms and saturates. NaN
-            // compares as not greater.
-            let sum = self.output.value(index, &last);
-            if sum > highest {
-                (best, highest) = (action, sum);
-            }
-        }
-        best
+        let first = legal.nth(0).expect("a decision has a legal action");
+        (legal.len() == 1).then_some(first)
     }
 
     /// Whether the observation's numbers of seats, faces and cards dealt are those of training.
@@ -164,22 +139,6 @@ impl Network {
         observation.cards_left.len() == usize::from(self.info.players)
             && observation.faces == self.info.faces
             && observation.hand_size == self.info.hand_size
-    }
-
-    /// The values of the last hidden layer, or the features themselves if there is none.
-    fn last_hidden(&self, features: &[f32]) -> Vec<f32> {
-        let mut values = features.to_vec();
-        let mut next = Vec::new();
-        for layer in &self.hidden {
-            layer.forward(&values, &mut next);
-            std::mem::swap(&mut values, &mut next);
-        }
-        assert_eq!(
-            values.len(),
-            self.output.inputs(),
-            "there are as many features as the network has inputs"
-        );
-        values
     }
 }
 

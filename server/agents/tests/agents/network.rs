@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chefshat_agents::{
-    AgentKind, BuiltInAgent, Network, NetworkInput, NetworkOutput, table_features,
+    AgentKind, BuiltInAgent, Network, NetworkBatch, NetworkInput, NetworkOutput, table_features,
 };
 use chefshat_engine::{
     ActionId, Board, BySeat, Cards, DecisionKind, Game, Mask, Observation, Role, RuleSetSpec, Seat,
@@ -345,4 +345,45 @@ fn hidden_layers_and_half_floats_count() {
     assert_eq!(network.outputs(&features), [1.25; 200]);
     features[28] = 1.0;
     assert_eq!(network.outputs(&features), [1.0; 200]);
+}
+
+#[test]
+fn decisions_taken_together_are_those_taken_alone() {
+    let seen = decisions(&shifts(12));
+    let fixtures = ["table-actions", "classic-turns", "small-table"]
+        .map(|name| Network::load(&fixture(&format!("{name}.safetensors"))).unwrap());
+    // Without a hidden layer.
+    let mut linear = NetworkFile::new("classic", "actions");
+    let weights: Vec<f32> = (0..228 * 214u32).map(|n| (n % 97) as f32 / 97.0).collect();
+    linear.layer(0, 228, &weights, &[0.0; 214]);
+    let linear = linear.network();
+    for network in [&**Network::trained(), &linear]
+        .into_iter()
+        .chain(&fixtures)
+    {
+        let alone: Vec<ActionId> = (seen.iter())
+            .map(|(observation, legal)| network.decide(observation, legal))
+            .collect();
+        let mut batch = NetworkBatch::default();
+        for size in [1, 2, 7, 64, seen.len()] {
+            let mut together = Vec::new();
+            for chunk in seen.chunks(size) {
+                let mut actions: Vec<Option<ActionId>> = Vec::new();
+                let mut waiting = Vec::new();
+                for (place, (observation, legal)) in chunk.iter().enumerate() {
+                    let action = network.decide_or_wait(observation, legal, &mut batch);
+                    waiting.extend(action.is_none().then_some(place));
+                    actions.push(action);
+                }
+                assert_eq!(batch.len(), waiting.len());
+                network.decide_all(&mut batch, |place, action| {
+                    assert_eq!(actions[waiting[place]].replace(action), None);
+                });
+                assert!(batch.is_empty());
+                together.extend(actions.into_iter().map(Option::unwrap));
+            }
+            let name = &network.info().name;
+            assert_eq!(together, alone, "{name:?} in batches of {size}");
+        }
+    }
 }
