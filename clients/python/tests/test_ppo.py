@@ -11,13 +11,18 @@ from hand_made import hand_made
 
 from chefshat import pb
 from chefshat.learn import features, network, ppo, ppo_checkpoint
-from chefshat.learn.ppo import Hyperparameters, Samples
+from chefshat.learn.ppo import Hyperparameters, Rates, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress
 from chefshat.learn.training_file import TrainingFileError
 
 HYPER = Hyperparameters(policy_widths=(16,), value_widths=(16,), minibatches=4)
 DATA = Path(__file__).parent / "data"
 RULES = pb.RuleSet(players=4, faces=11, jokers=2)
+
+
+def no_hands(count: int) -> jax.Array:
+    """Returns the column of samples whose value network does not see the hands of others."""
+    return jnp.zeros((count, 0))
 
 
 def rows(count: int, seed: int) -> np.ndarray:
@@ -33,10 +38,9 @@ def test_samples_are_legal_and_match_their_probabilities() -> None:
     legal = inputs[:, -214:] > 0
     draws = 400
     drawn = jax.vmap(ppo.act, in_axes=(None, 0, None))(params, jax.random.split(jax.random.key(2), draws), inputs)
-    actions, log_probabilities, values = (np.asarray(column) for column in drawn)
+    actions, log_probabilities = (np.asarray(column) for column in drawn)
     assert np.take_along_axis(legal[np.newaxis], actions[:, :, np.newaxis], axis=2).all()
     assert (log_probabilities <= 1e-6).all()
-    assert np.isfinite(values).all()
     # The row with the most legal actions, and its first sample.
     row = int(np.argmax(legal.sum(axis=1)))
     likely = float(np.exp(log_probabilities[0, row]))
@@ -52,18 +56,24 @@ def test_it_learns_which_action_pays() -> None:
     best = legal.argmax(axis=1)
 
     def share(params: ppo.Params) -> float:
-        actions, _, _ = ppo.act(params, jax.random.key(9), inputs)
+        actions, _ = ppo.act(params, jax.random.key(9), inputs)
         return float((np.asarray(actions) == best).mean())
 
     before = share(learner.params)
     for number in range(60):
-        actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(100 + number), inputs)
+        actions, log_probabilities = ppo.act(learner.params, jax.random.key(100 + number), inputs)
         paid = np.where(np.asarray(actions) == best, 1.0, -1.0).astype(np.float32)
         weights = np.ones(256, np.float32)
         samples = Samples(
-            jnp.asarray(inputs), actions, log_probabilities, jnp.asarray(paid), jnp.asarray(paid), jnp.asarray(weights)
+            jnp.asarray(inputs),
+            no_hands(256),
+            actions,
+            log_probabilities,
+            jnp.asarray(paid),
+            jnp.asarray(paid),
+            jnp.asarray(weights),
         )
-        learner, losses = ppo.learn(learner, samples, jnp.float32(3e-3), jnp.float32(0.0), HYPER)
+        learner, losses = ppo.learn(learner, samples, Rates(3e-3, 3e-3), jnp.float32(0.0), HYPER)
         assert all(np.isfinite(float(value)) for value in losses)
     assert share(learner.params) > max(0.8, before + 0.2)
 
@@ -71,26 +81,46 @@ def test_it_learns_which_action_pays() -> None:
 def test_rows_without_weight_are_ignored() -> None:
     learner = ppo.start(1, 334, 214, HYPER)
     inputs = jnp.asarray(rows(32, seed=4))
-    actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(1), inputs)
+    actions, log_probabilities = ppo.act(learner.params, jax.random.key(1), inputs)
     gains = jnp.linspace(-1, 1, 32)
-    nothing = Samples(inputs, actions, log_probabilities, gains, gains, jnp.zeros(32))
+    nothing = Samples(inputs, no_hands(len(inputs)), actions, log_probabilities, gains, gains, jnp.zeros(32))
     # Adam's epsilon prevents a division by zero: the networks do not change.
-    after, losses = ppo.learn(learner, nothing, jnp.float32(1.0), jnp.float32(1.0), HYPER)
+    after, losses = ppo.learn(learner, nothing, Rates(1.0, 1.0), jnp.float32(1.0), HYPER)
     for old, new in zip(jax.tree.leaves(learner.params), jax.tree.leaves(after.params), strict=True):
         np.testing.assert_array_equal(old, new)
     assert float(losses.value) == 0
+
+
+def test_the_value_network_may_see_other_hands_and_learn_alone() -> None:
+    hyper = dataclasses.replace(HYPER, all_hands=True)
+    learner = ppo.start(1, 334, 214, hyper, hidden=36)
+    inputs = jnp.asarray(rows(32, seed=4))
+    hidden = jax.random.uniform(jax.random.key(2), (32, 36))
+    values = ppo.values(learner.params, inputs, hidden)
+    assert (values != ppo.values(learner.params, inputs, hidden[::-1])).any()
+    # It does not see the mask, which follows from the rest.
+    np.testing.assert_array_equal(values, ppo.values(learner.params, inputs.at[:, -214:].set(1), hidden))
+
+    actions, log_probabilities = ppo.act(learner.params, jax.random.key(1), inputs)
+    gains = jnp.linspace(-1, 1, 32)
+    samples = Samples(inputs, hidden, actions, log_probabilities, gains, gains, jnp.ones(32))
+    after, losses = ppo.learn(learner, samples, Rates(0.0, 1e-2), jnp.float32(0.01), hyper)
+    jax.tree.map(np.testing.assert_array_equal, after.params.policy, learner.params.policy)
+    again = jnp.square(ppo.values(after.params, inputs, hidden) - gains).mean()
+    assert float(again) < float(jnp.square(values - gains).mean())
+    assert np.isfinite(float(losses.policy))
 
 
 def test_a_training_resumes_exactly_from_a_file(tmp_path: Path) -> None:
     plan = Plan(games=8, steps=16, hyper=HYPER)
     training = ppo_checkpoint.begin(plan, 7, RULES, "a command")
     inputs = jnp.asarray(rows(32, seed=4))
-    actions, log_probabilities, _ = ppo.act(training.learner.params, jax.random.key(1), inputs)
+    actions, log_probabilities = ppo.act(training.learner.params, jax.random.key(1), inputs)
     gains = jnp.linspace(-1, 1, 32)
-    samples = Samples(inputs, actions, log_probabilities, gains, gains, jnp.ones(32))
+    samples = Samples(inputs, no_hands(len(inputs)), actions, log_probabilities, gains, gains, jnp.ones(32))
 
     def learned(learner: ppo.Learner) -> ppo.Learner:
-        after, _ = ppo.learn(learner, samples, jnp.float32(1e-3), jnp.float32(0.01), HYPER)
+        after, _ = ppo.learn(learner, samples, Rates(1e-3, 1e-3), jnp.float32(0.01), HYPER)
         return ppo.Learner(*after)
 
     training = ppo_checkpoint.Training(plan, 7, RULES, learned(training.learner), Progress(1, 128, 0.5, 1), "a command")
@@ -110,10 +140,10 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
     case = hand_made(16, seed=4, players=2, faces=4, jokers=2)
     size = features.dealt(2, 4, 2)
     inputs = jnp.asarray(features.table(case, case.seats, case.kinds, case.mask_bits, players=2, faces=4, hand_size=size))
-    actions, log_probabilities, _ = ppo.act(old.learner.params, jax.random.key(1), inputs)
+    actions, log_probabilities = ppo.act(old.learner.params, jax.random.key(1), inputs)
     gains = jnp.linspace(-1, 1, 16)
-    samples = Samples(inputs, actions, log_probabilities, gains, gains, jnp.ones(16))
-    learner, _ = ppo.learn(old.learner, samples, jnp.float32(1e-2), jnp.float32(0.01), old.plan.hyper)
+    samples = Samples(inputs, no_hands(len(inputs)), actions, log_probabilities, gains, gains, jnp.ones(16))
+    learner, _ = ppo.learn(old.learner, samples, Rates(1e-2, 1e-2), jnp.float32(0.01), old.plan.hyper)
     learned = dataclasses.replace(old, learner=ppo.Learner(*learner))
     for now, then in zip(learned.network("now").layers, network.load(DATA / "ppo-1.safetensors").layers, strict=True):
         np.testing.assert_allclose(now.weight, then.weight, rtol=1e-5, atol=1e-6)

@@ -48,6 +48,25 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
         assert trainer.training.progress.decisions == 16 * 16
 
 
+def test_the_value_network_may_see_all_hands_and_learn_first(real_address: str, tmp_path: Path) -> None:
+    plan = replace(PLAN, games=8, steps=16, value_updates=1, hyper=replace(PLAN.hyper, all_hands=True))
+    begun = ppo_checkpoint.begin(plan, 1, full_rules(SMALL, real_address), "a test")
+    trainings = [begun]
+    with Trainer(begun, address=real_address) as trainer:
+        for _ in range(2):
+            trainer.update(0.0)
+            trainings.append(trainer.training)
+    policies, values = (
+        [network[kind]["Dense_0"]["kernel"] for network in (training.learner.params for training in trainings)] for kind in (0, 1)
+    )
+    np.testing.assert_array_equal(policies[0], policies[1])
+    assert (policies[1] != policies[2]).any()
+    assert (values[0] != values[1]).any()
+    assert (values[1] != values[2]).any()
+    ppo_checkpoint.save(tmp_path / "t", trainings[-1])
+    assert ppo_checkpoint.load(tmp_path / "t").plan == plan
+
+
 def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "small.safetensors"
     options = ["ppo", "--out", str(out), "--address", real_address, "--seed", "3", "--name", "small", "--json"]
@@ -119,6 +138,9 @@ def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: p
         command.main(["ppo", "--out", nothing, "--decisions", "1", "--games", "3", "--steps", "3", "--address", real_address]) == 1
     )
     assert "do not split" in capsys.readouterr().err
+    both = ["ppo", "--out", nothing, "--decisions", "1", "--all-hands", "--opponent-games", "8", "--address", real_address]
+    assert command.main(both) == 1
+    assert "leave out --all-hands" in capsys.readouterr().err
     assert command.main(["evaluate", nothing, "--address", real_address]) == 1
     assert "nothing.safetensors" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -6,13 +6,13 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from chefshat.learn.self_play import Ends, Rollout, advantages, place_rewards
+from chefshat.learn.self_play import Ends, Floats, Rollout, advantages, place_rewards
 
 STEPS, GAMES, PLAYERS = 40, 6, 4
 
 
-def made_up(seed: int) -> Rollout:
-    """Returns a rollout in which deciding seats, skipped games and ends of Shifts are random; some Shifts end twice in a step."""
+def made_up(seed: int) -> tuple[Rollout, Floats]:
+    """Returns a rollout and its values. Deciding seats, skipped games and ends are random; some Shifts end twice in a step."""
     chance = np.random.default_rng(seed)
     shape = (STEPS, GAMES)
     ends = []
@@ -21,18 +21,18 @@ def made_up(seed: int) -> Rollout:
         games = np.repeat(np.array(ended, np.uint32), PLAYERS)
         seats = np.tile(np.arange(PLAYERS, dtype=np.uint8), len(ended))
         ends.append(Ends(games, seats, chance.normal(size=len(games)).astype(np.float32)))
-    return Rollout(
+    rollout = Rollout(
         inputs=np.zeros((*shape, 1), np.float32),
         actions=np.zeros(shape, np.int32),
         log_probabilities=np.zeros(shape, np.float32),
-        values=chance.normal(size=shape).astype(np.float32),
         seats=chance.integers(0, PLAYERS, shape, dtype=np.uint8),
         present=chance.random(shape) < 0.9,
         ends=ends,
     )
+    return rollout, chance.normal(size=shape).astype(np.float32)
 
 
-def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
+def plain(rollout: Rollout, estimates: Floats, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
     """Returns the advantage of every decision that has one, by step and game."""
     # For each game and seat, in order: its decisions (step) and the rewards of its ends (None, reward).
     stories: dict[tuple[int, int], list[int | float]] = defaultdict(list)
@@ -50,7 +50,7 @@ def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[in
             if isinstance(what, int):
                 chain.append(what)
                 continue
-            values = [float(rollout.values[step, game]) for step in chain]
+            values = [float(estimates[step, game]) for step in chain]
             # A chain that continues bootstraps from its last decision.
             deltas = [discount * later - value for value, later in itertools.pairwise(values)]
             if what is not None and values:
@@ -63,9 +63,9 @@ def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[in
 
 @pytest.mark.parametrize("seed", range(5))
 def test_advantages_equal_those_of_a_plain_loop(seed: int) -> None:
-    rollout = made_up(seed)
-    found, known = advantages(rollout, PLAYERS, discount=0.9, gae_lambda=0.8)
-    expected = plain(rollout, 0.9, 0.8)
+    rollout, estimates = made_up(seed)
+    found, known = advantages(rollout, estimates, PLAYERS, discount=0.9, gae_lambda=0.8)
+    expected = plain(rollout, estimates, 0.9, 0.8)
     assert len(expected) > 100
     assert {(int(step), int(game)) for step, game in np.argwhere(known)} == set(expected)
     for (step, game), advantage in expected.items():

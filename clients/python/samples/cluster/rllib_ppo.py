@@ -105,7 +105,11 @@ class JaxPPO(Algorithm):  # type: ignore[misc]
         samples = joined(parts)
         for _ in range(plan.epochs):
             self._learner, losses = ppo.learn(
-                self._learner, samples, jnp.float32(plan.learning_rate), jnp.float32(plan.entropy_bonus), plan.hyper
+                self._learner,
+                samples,
+                ppo.Rates(plan.learning_rate, plan.learning_rate),
+                jnp.float32(plan.entropy_bonus),
+                plan.hyper,
             )
         self.metrics.log_value("decisions", samples.actions.size, reduce="lifetime_sum")
         for name, value in losses._asdict().items():

@@ -114,7 +114,21 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--minibatches", type=_count, default=16, help="number of parts they are split into")
     plan.add_argument("--width", type=_count, default=256, help="units of each of the policy network's two hidden layers")
     plan.add_argument("--value-width", type=_count, default=128, help="units of each of the value network's two hidden layers")
+    plan.add_argument(
+        "--all-hands",
+        action=_Given,
+        nargs=0,
+        const=True,
+        default=False,
+        help="show the hands of all seats to the value network, which no game needs; with self-play only",
+    )
+    plan.add_argument(
+        "--value-updates", type=_natural, default=0, help="first updates, which learn only the value network; see --begin-with"
+    )
     plan.add_argument("--learning-rate", type=_above_zero, default=5e-4, help="initial learning rate; decays to a twentieth")
+    plan.add_argument(
+        "--value-learning-rate", type=float, default=0.0, help="initial learning rate of the value network; 0: the same"
+    )
     plan.add_argument("--entropy-bonus", type=float, default=0.01, help="initial weight of the entropy; decays to a tenth")
     plan.add_argument("--gae-lambda", "--trace", type=float, default=0.95, help="lambda of the advantage estimation")
     plan.add_argument("--clip", type=_above_zero, default=0.2, help="clip range of the probability ratio")

@@ -51,6 +51,11 @@ def table_width(players: int, faces: int) -> int:
     return 6 * (faces + 1) + 5 + (4 + ROLES) * players + KINDS + num_actions(faces)
 
 
+def turn_column(players: int, faces: int) -> int:
+    """Returns the column of `table` that is 1 at a turn and 0 at other decisions."""
+    return table_width(players, faces) - num_actions(faces) - 1 - KINDS
+
+
 def classic(observations: Observations, mask_bits: Bytes, *, faces: int, hand_size: int, out: Floats | None = None) -> Floats:
     """Computes the paper's vector: the board, the hand, the legal actions of a turn.
 

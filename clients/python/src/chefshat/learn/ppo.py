@@ -1,8 +1,8 @@
 """Proximal policy optimisation with an action mask, as pure functions in JAX: the networks, acting, and one epoch of learning.
 
 The policy network has an output for each action; illegal actions are masked out before sampling or comparing. The value network
-is separate and estimates the seat's reward at the end of the Shift. Games and samples are in `self_play`, the training loop is in
-`ppo_training`.
+is separate and estimates the seat's reward at the end of the Shift, from the policy's input or, since no player needs it in a game,
+with the hands of the other seats. Games and samples are in `self_play`, the training loop is in `ppo_training`.
 """
 
 from dataclasses import dataclass
@@ -25,6 +25,18 @@ class Params(NamedTuple):
     value: mlp.Params
 
 
+class Rates(NamedTuple):
+    """The learning rates of an epoch. The gradients' moments also follow those of a network whose rate is 0.
+
+    Attributes:
+        policy: of the policy network.
+        value: of the value network.
+    """
+
+    policy: float | jax.Array
+    value: float | jax.Array
+
+
 class Learner(NamedTuple):
     """The state of a training, except for its games.
 
@@ -44,6 +56,7 @@ class Samples(NamedTuple):
 
     Attributes:
         inputs: (B, width) features; the last A of them are the mask.
+        hidden: (B, H) the hands of the other seats, which only the value network sees; H is 0 if it does not.
         actions: (B,) the actions taken.
         log_probabilities: (B,) of these actions, when they were taken.
         advantages: (B,) estimated advantages.
@@ -52,6 +65,7 @@ class Samples(NamedTuple):
     """
 
     inputs: jax.Array
+    hidden: jax.Array
     actions: jax.Array
     log_probabilities: jax.Array
     advantages: jax.Array
@@ -87,6 +101,7 @@ class Hyperparameters:
         clip: clip range of the probability ratio.
         max_gradient_norm: gradients are clipped to this global norm.
         minibatches: number of parts an epoch's rows are split into; a divisor of their number.
+        all_hands: whether the value network sees the hands of all seats, instead of the mask.
     """
 
     policy_widths: tuple[int, ...] = (256, 256)
@@ -94,24 +109,33 @@ class Hyperparameters:
     clip: float = 0.2
     max_gradient_norm: float = 0.5
     minibatches: int = 16
+    all_hands: bool = False
 
 
-def _optimizer(hyper: Hyperparameters, learning_rate: float | jax.Array) -> optax.GradientTransformation:
-    return optax.chain(
-        optax.clip_by_global_norm(hyper.max_gradient_norm), optax.scale_by_adam(eps=1e-5), optax.scale(-learning_rate)
-    )
+def _optimizer(hyper: Hyperparameters) -> optax.GradientTransformation:
+    """Returns Adam with a learning rate of 1."""
+    return optax.chain(optax.clip_by_global_norm(hyper.max_gradient_norm), optax.scale_by_adam(eps=1e-5), optax.scale(-1.0))
 
 
-def start(seed: int, inputs: int, actions: int, hyper: Hyperparameters) -> Learner:
-    """Returns a new learner: orthogonal weights, with small ones in the policy's last layer for a near-uniform first policy."""
+def start(seed: int, inputs: int, actions: int, hyper: Hyperparameters, hidden: int = 0) -> Learner:
+    """Returns a new learner: orthogonal weights, with small ones in the policy's last layer for a near-uniform first policy.
+
+    Args:
+        seed: of the weights and of what follows.
+        inputs: width of the features.
+        actions: A.
+        hyper: the widths, among others.
+        hidden: numbers that describe the hands of the other seats; 0: the value network does not see them.
+    """
     key, policy, value = jax.random.split(jax.random.key(seed), 3)
 
-    def params(key: jax.Array, widths: tuple[int, ...], gain: float) -> mlp.Params:
+    def params(key: jax.Array, inputs: int, widths: tuple[int, ...], gain: float) -> mlp.Params:
         orthogonal = nn.initializers.orthogonal
         return Mlp(widths, orthogonal(2**0.5), orthogonal(gain)).start(key, inputs)
 
-    both = Params(params(policy, (*hyper.policy_widths, actions), 0.01), params(value, (*hyper.value_widths, 1), 1.0))
-    return Learner(both, _optimizer(hyper, 1.0).init(both), key)
+    seen = inputs - actions + hidden if hidden else inputs
+    both = Params(params(policy, inputs, (*hyper.policy_widths, actions), 0.01), params(value, seen, (*hyper.value_widths, 1), 1.0))
+    return Learner(both, _optimizer(hyper).init(both), key)
 
 
 def _forward(params: mlp.Params, inputs: jax.Array) -> jax.Array:
@@ -127,7 +151,7 @@ def _logits(params: Params, inputs: jax.Array) -> jax.Array:
 
 
 @jax.jit
-def act(params: Params, key: jax.Array, inputs: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+def act(params: Params, key: jax.Array, inputs: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Samples an action for each row.
 
     Args:
@@ -136,12 +160,21 @@ def act(params: Params, key: jax.Array, inputs: jax.Array) -> tuple[jax.Array, j
         inputs: (B, width) features, at least one legal action in each row.
 
     Returns:
-        (B,) actions, (B,) their log-probabilities, (B,) values.
+        (B,) actions, (B,) their log-probabilities.
     """
     logits = _logits(params, inputs)
     actions = jax.random.categorical(key, logits)
     chosen = jnp.take_along_axis(logits, actions[:, None], axis=1)[:, 0]
-    return actions, chosen, _forward(params.value, inputs)[:, 0]
+    return actions, chosen
+
+
+@jax.jit
+def values(params: Params, inputs: jax.Array, hidden: jax.Array) -> jax.Array:
+    """Returns the outputs of the value network, (B,); the arguments are those of `Samples`."""
+    if hidden.shape[1]:
+        actions = params.policy[f"Dense_{len(params.policy) - 1}"]["bias"].shape[-1]
+        inputs = jnp.concatenate([inputs[:, :-actions], hidden], axis=1)
+    return _forward(params.value, inputs)[:, 0]
 
 
 def _loss(params: Params, samples: Samples, entropy_bonus: jax.Array, hyper: Hyperparameters) -> tuple[jax.Array, Losses]:
@@ -158,34 +191,35 @@ def _loss(params: Params, samples: Samples, entropy_bonus: jax.Array, hyper: Hyp
     # Where the probability is 0 its logarithm is not finite; the product counts as 0, and so must its gradient.
     finite = jnp.where(logits > -jnp.inf, logits, 0)
     entropy = mean(-(jnp.exp(logits) * finite).sum(axis=1))
-    value = mean(jnp.square(_forward(params.value, samples.inputs)[:, 0] - samples.returns))
+    value = mean(jnp.square(values(params, samples.inputs, samples.hidden) - samples.returns))
     losses = Losses(policy, value, entropy, mean(ratio - 1 - change), mean((jnp.abs(ratio - 1) > hyper.clip).astype(jnp.float32)))
     return policy + value - entropy_bonus * entropy, losses
 
 
 @partial(jax.jit, static_argnames="hyper")
 def learn(
-    learner: Learner, samples: Samples, learning_rate: jax.Array, entropy_bonus: jax.Array, hyper: Hyperparameters
+    learner: Learner, samples: Samples, rates: Rates, entropy_bonus: jax.Array, hyper: Hyperparameters
 ) -> tuple[Learner, Losses]:
     """Runs one epoch over the samples, in minibatches drawn anew.
 
     Args:
         learner: the state after the last epoch.
         samples: B rows, a multiple of `hyper.minibatches`.
-        learning_rate: of this epoch.
+        rates: the learning rates of this epoch.
         entropy_bonus: weight of the entropy in the loss of this epoch.
         hyper: the ones the learner was started with.
     """
     key, shuffle = jax.random.split(learner.key)
     parts = jax.random.permutation(shuffle, len(samples.actions)).reshape(hyper.minibatches, -1)
-    optimizer = _optimizer(hyper, learning_rate)
+    optimizer = _optimizer(hyper)
 
     def step(state: tuple[Params, optax.OptState], rows: jax.Array) -> tuple[tuple[Params, optax.OptState], Losses]:
         params, optimizer_state = state
         part = Samples(*(column[rows] for column in samples))
         gradients, losses = jax.grad(_loss, has_aux=True)(params, part, entropy_bonus, hyper)
         updates, optimizer_state = optimizer.update(gradients, optimizer_state, params)
-        return (optax.apply_updates(params, updates), optimizer_state), losses
+        scaled = Params(*(optax.tree.scale(rate, part) for rate, part in zip(rates, updates, strict=True)))
+        return (optax.apply_updates(params, scaled), optimizer_state), losses
 
     (params, optimizer_state), losses = jax.lax.scan(step, (learner.params, learner.optimizer), parts)
     return Learner(params, optimizer_state, key), Losses(*(values.mean() for values in losses))

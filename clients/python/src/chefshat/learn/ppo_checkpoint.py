@@ -12,7 +12,7 @@ from typing import Any, Self
 import jax
 
 from chefshat import pb
-from chefshat.learn import mlp, ppo, training_file
+from chefshat.learn import all_hands, mlp, ppo, training_file
 from chefshat.learn.features import num_actions, table_width
 from chefshat.learn.mlp import Params
 from chefshat.learn.network import Network
@@ -32,9 +32,11 @@ class Plan:
         games: parallel games of self-play; 0: only those against the opponents, for a best response to them.
         opponent_games: further games, in which the policy plays only seat 0.
         opponents: the built-in agent of the other seats of these.
+        value_updates: first updates, which learn only the value network.
         steps: decisions in each game between two updates.
         epochs: passes over the samples of an update.
         learning_rate: initial; it decays linearly to a twentieth.
+        value_learning_rate: that of the value network, which decays likewise; 0: the same.
         entropy_bonus: initial; it decays linearly to a tenth.
         discount: factor of a reward one decision later, gamma.
         gae_lambda: lambda of the generalised advantage estimation.
@@ -45,9 +47,11 @@ class Plan:
     games: int = 256
     opponent_games: int = 0
     opponents: str = "greedy"
+    value_updates: int = 0
     steps: int = 128
     epochs: int = 2
     learning_rate: float = 5e-4
+    value_learning_rate: float = 0.0
     entropy_bonus: float = 0.01
     discount: float = 1.0
     gae_lambda: float = 0.95
@@ -115,7 +119,8 @@ def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str, begin_with:
         trained_by: the command.
         begin_with: the initial policy, with the hidden layers of the plan; None: a new one.
     """
-    learner = ppo.start(seed, table_width(rules.players, rules.faces), num_actions(rules.faces), plan.hyper)
+    hidden = all_hands.width(rules.players, rules.faces) if plan.hyper.all_hands else 0
+    learner = ppo.start(seed, table_width(rules.players, rules.faces), num_actions(rules.faces), plan.hyper, hidden)
     if begin_with is not None:
         policy: Params = jax.tree.map(lambda leaf: leaf[0], mlp.stack([begin_with.layers]))
         learner = learner._replace(params=learner.params._replace(policy=policy))

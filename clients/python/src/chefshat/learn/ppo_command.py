@@ -68,9 +68,11 @@ def _start(options: argparse.Namespace) -> Training:
         games=options.games,
         opponent_games=options.opponent_games,
         opponents=options.opponents,
+        value_updates=options.value_updates,
         steps=options.steps,
         epochs=options.epochs,
         learning_rate=options.learning_rate,
+        value_learning_rate=options.value_learning_rate,
         entropy_bonus=options.entropy_bonus,
         gae_lambda=options.gae_lambda,
         evaluation_games=options.evaluation_games,
@@ -79,8 +81,11 @@ def _start(options: argparse.Namespace) -> Training:
             value_widths=(options.value_width,) * 2,
             clip=options.clip,
             minibatches=options.minibatches,
+            all_hands=options.all_hands,
         ),
     )
+    if plan.hyper.all_hands and plan.opponent_games:
+        raise ValueError("hands of built-in agents are not shown: leave out --all-hands or --opponent-games")
     if plan.steps * (plan.games + plan.opponent_games) % plan.hyper.minibatches:
         raise ValueError(
             f"{plan.steps} steps of {plan.games + plan.opponent_games} games do not split into {plan.hyper.minibatches} parts"

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from chefshat.address import ServerAddress
 from chefshat.learn import ppo
+from chefshat.learn.all_hands import other_hands
 from chefshat.learn.ppo import Params, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
 from chefshat.learn.runs import SEED_STEP
@@ -73,32 +74,43 @@ class Trainer:
         key, *keys = jax.random.split(learner.key, 1 + len(self._collectors))
         parts = [play(collector, learner.params, key, plan) for collector, key in zip(self._collectors, keys, strict=True)]
         samples, learner = joined(parts), learner._replace(key=key)
-        learning_rate = jnp.float32(plan.learning_rate * (1 - 0.95 * done))
         entropy_bonus = jnp.float32(plan.entropy_bonus * (1 - 0.9 * done))
+        progress, decay = self.training.progress, 1 - 0.95 * done
+        learns_policy = progress.updates >= plan.value_updates
+        rates = ppo.Rates(
+            policy=jnp.float32(plan.learning_rate * decay * learns_policy),
+            value=jnp.float32((plan.value_learning_rate or plan.learning_rate) * decay),
+        )
         for _ in range(plan.epochs):
-            learner, losses = ppo.learn(learner, samples, learning_rate, entropy_bonus, plan.hyper)
-        progress = self.training.progress
+            learner, losses = ppo.learn(learner, samples, rates, entropy_bonus, plan.hyper)
+        # Waits until it has learned, which the time includes.
+        found = {name: float(value) for name, value in losses._asdict().items()}
         decisions = sum(collector.decisions for collector in self._collectors) - before
         progress = Progress(
             progress.updates + 1, progress.decisions + decisions, progress.seconds + time.monotonic() - began, progress.runs
         )
         self.training = dataclasses.replace(self.training, learner=learner, progress=progress)
-        return {name: float(value) for name, value in losses._asdict().items()}
+        return found
 
 
 def play(collector: Collector, params: Params, key: jax.Array, plan: Plan) -> Samples:
     """Plays `plan.steps` batches. Returns the samples: numpy arrays, valid until the collector plays again."""
     numbers = itertools.count()
 
-    def act(inputs: Floats) -> tuple[npt.NDArray[np.int32], Floats, Floats]:
-        actions, log_probabilities, values = ppo.act(params, jax.random.fold_in(key, next(numbers)), inputs)
-        return np.asarray(actions), np.asarray(log_probabilities), np.asarray(values)
+    def act(inputs: Floats) -> tuple[npt.NDArray[np.int32], Floats]:
+        actions, log_probabilities = ppo.act(params, jax.random.fold_in(key, next(numbers)), inputs)
+        return np.asarray(actions), np.asarray(log_probabilities)
 
     rollout = collector.collect(act)
-    gains, known = advantages(rollout, collector.players, discount=plan.discount, gae_lambda=plan.gae_lambda)
-    returns, weights = gains + rollout.values, known.astype(np.float32)
-    columns: list[Any] = [rollout.inputs, rollout.actions, rollout.log_probabilities, gains, returns, weights]
-    return Samples(*(column.reshape(-1, *column.shape[2:]) for column in columns))
+    steps, games, _ = rollout.inputs.shape
+    hidden = np.zeros((steps, games, 0), np.float32)
+    if plan.hyper.all_hands:
+        hidden = other_hands(rollout, collector.players, collector.faces)
+    values = np.stack([np.asarray(ppo.values(params, *step)) for step in zip(rollout.inputs, hidden, strict=True)])
+    gains, known = advantages(rollout, values, collector.players, discount=plan.discount, gae_lambda=plan.gae_lambda)
+    returns, weights = gains + values, known.astype(np.float32)
+    columns: list[Any] = [rollout.inputs, hidden, rollout.actions, rollout.log_probabilities, gains, returns, weights]
+    return Samples(*(column.reshape(steps * games, *column.shape[2:]) for column in columns))
 
 
 def joined(parts: Sequence[Samples]) -> Samples:

@@ -15,8 +15,8 @@ from chefshat.learn import features
 from chefshat.vector import Batch, VectorEnv
 
 Floats: TypeAlias = npt.NDArray[np.float32]
-# Features (n, width) to actions, their log-probabilities and values, each (n,).
-Act: TypeAlias = Callable[[Floats], tuple[npt.NDArray[np.integer], Floats, Floats]]
+# Features (n, width) to actions and their log-probabilities, each (n,).
+Act: TypeAlias = Callable[[Floats], tuple[npt.NDArray[np.integer], Floats]]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,6 @@ class Rollout:
         inputs: (steps, n, width) features; 1 where a row has never been present.
         actions: (steps, n) the actions taken.
         log_probabilities: (steps, n) of these actions.
-        values: (steps, n) outputs of the value network.
         seats: (steps, n) the deciding seats.
         present: (steps, n) whether the game waited for the client.
         ends: for each step, the chains that ended after its decisions and before the next ones.
@@ -51,7 +50,6 @@ class Rollout:
     inputs: Floats
     actions: npt.NDArray[np.int32]
     log_probabilities: Floats
-    values: Floats
     seats: npt.NDArray[np.uint8]
     present: npt.NDArray[np.bool_]
     ends: list[Ends]
@@ -82,14 +80,13 @@ class Collector:
             inputs=np.ones((*shape, width), np.float32),
             actions=np.zeros(shape, np.int32),
             log_probabilities=np.zeros(shape, np.float32),
-            values=np.zeros(shape, np.float32),
             seats=np.zeros(shape, np.uint8),
             present=np.zeros(shape, np.bool_),
             ends=[],
         )
         self._rows = np.empty((games, width), np.float32)
-        #: Seats of a game.
-        self.players = env.players
+        #: Seats of a game, and faces of its deck.
+        self.players, self.faces = env.players, env.faces
         #: Decisions taken so far.
         self.decisions = 0
 
@@ -102,7 +99,7 @@ class Collector:
             rows = batch.games
             inputs = rollout.inputs[step]
             inputs[rows] = features.table_of(batch, self._rows[: len(batch)])
-            actions, rollout.log_probabilities[step], rollout.values[step] = act(inputs)
+            actions, rollout.log_probabilities[step] = act(inputs)
             rollout.actions[step] = actions
             rollout.present[step] = False
             rollout.present[step, rows] = True
@@ -117,11 +114,14 @@ class Collector:
         return Ends(endings.games, endings.seats, self._rewards[endings.places_taken.astype(np.intp) - 1])
 
 
-def advantages(rollout: Rollout, players: int, *, discount: float, gae_lambda: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def advantages(
+    rollout: Rollout, values: Floats, players: int, *, discount: float, gae_lambda: float
+) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Estimates the advantage of each decision by generalised advantage estimation (GAE) along the seat's chain.
 
     Args:
         rollout: the games.
+        values: (steps, n) outputs of the value network.
         players: seats of a game.
         discount: gamma.
         gae_lambda: lambda: 0 trusts the value network alone, 1 the rewards alone.
@@ -130,7 +130,7 @@ def advantages(rollout: Rollout, players: int, *, discount: float, gae_lambda: f
         (steps, n) advantages; (steps, n) whether they are known: unknown for the last decision of a chain that continues after the
         rollout. The decisions before it bootstrap from its value.
     """
-    shape = rollout.values.shape
+    shape = values.shape
     result, known = np.zeros(shape, np.float32), np.zeros(shape, np.bool_)
     # What follows the current decision, for each game and seat.
     reward, value, advantage = (np.zeros((shape[1], players), np.float32) for _ in range(3))
@@ -146,9 +146,9 @@ def advantages(rollout: Rollout, players: int, *, discount: float, gae_lambda: f
 
         games = np.flatnonzero(rollout.present[step])
         here = (games, rollout.seats[step, games])
-        values = rollout.values[step, games]
+        estimates = values[step, games]
         known[step, games] = follows[here]
-        error = reward[here] + discount * value[here] - values
+        error = reward[here] + discount * value[here] - estimates
         result[step, games] = np.where(follows[here], error + discount * gae_lambda * advantage[here], 0)
-        reward[here], value[here], advantage[here], follows[here] = 0, values, result[step, games], True
+        reward[here], value[here], advantage[here], follows[here] = 0, estimates, result[step, games], True
     return result, known
