@@ -4,6 +4,7 @@ The view adds names and numpy arrays to the message, but no rules: the server de
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.columns import NO_SEAT, Observations, Situations, Sizes
+from chefshat.history import Entry, ShiftLog, entries
+from chefshat.history import columns as history_columns
 
 Counts: TypeAlias = NDArray[np.uint8]
 
@@ -24,9 +27,10 @@ class SeatInfo:
         seat: number of the seat, from 0.
         game_started: the start of the game (rule set, policy, participants, action space); None until the game has started.
         live_from: number of the next event when the seat was first attached: events with a lower number had happened before.
+        shift_log: the events of the current Shift that the seat has seen.
     """
 
-    __slots__ = ("game_id", "game_started", "live_from", "room_id", "seat")
+    __slots__ = ("game_id", "game_started", "live_from", "room_id", "seat", "shift_log")
 
     def __init__(self, room_id: str, game_id: str, seat: int, live_from: int = 0) -> None:
         self.room_id = room_id
@@ -34,6 +38,7 @@ class SeatInfo:
         self.seat = seat
         self.live_from = live_from
         self.game_started: pb.GameStarted | None = None
+        self.shift_log = ShiftLog()
 
     def __repr__(self) -> str:
         return f"SeatInfo(room_id={self.room_id!r}, game_id={self.game_id!r}, seat={self.seat})"
@@ -50,13 +55,17 @@ class Decision:
         seat_info: the seat.
     """
 
-    __slots__ = ("_attempts_left", "annotations", "request", "seat_info")
+    __slots__ = ("_attempts_left", "_log", "_seen", "annotations", "request", "seat_info")
 
     def __init__(self, request: pb.DecisionRequest, seat_info: SeatInfo, attempts_left: int | None = None) -> None:
         self.request = request
         self.seat_info = seat_info
         self.annotations: pb.Annotations | None = None
         self._attempts_left = attempts_left
+        # The log grows while the agent decides; another one follows it if a Shift begins.
+        self._log = seat_info.shift_log
+        self._seen = len(self._log.events)
+        self._log.asked(request)
 
     def __repr__(self) -> str:
         kind = pb.DecisionKind.Name(self.kind).removeprefix("DECISION_KIND_")
@@ -255,12 +264,44 @@ class Decision:
     @property
     def sizes(self) -> Sizes:
         """The numbers that determine the widths of columns. Raises ValueError before the start of the game has arrived."""
+        return Sizes.of(self._game_started())
+
+    def _game_started(self) -> pb.GameStarted:
         if self.seat_info.game_started is None:
             raise ValueError("the number of cards dealt is unknown: the start of the game has not arrived")
-        return Sizes.of(self.seat_info.game_started)
+        return self.seat_info.game_started
 
-    def situations(self) -> Situations:
+    @property
+    def shift_events(self) -> list[pb.GameEvent]:
+        """The events of the Shift that the seat had seen when it was asked, from `shift_started` on, without those of the room.
+
+        They are the `events` of a `pb.Situation`. See `is_history_complete`.
+        """
+        return self._log.events[: self._seen]
+
+    @property
+    def is_history_complete(self) -> bool:
+        """Whether the history begins with the Shift.
+
+        It does, also after a reconnection or in a new process, because the server sends all events of the game again. It does not
+        after a snapshot in mid-Shift.
+        """
+        return self._log.is_complete
+
+    @property
+    def history(self) -> list[Entry]:
+        """The actions of the Shift, as far as the seat may know them. Raises ValueError before the start of the game has arrived.
+
+        `chefshat.history` explains them. Two own gifts are in the order in which this process gave them; if it does not know the
+        order, they are ascending.
+        """
+        return entries(self._log, self._seen, self.request, self.seat, self._game_started())
+
+    def situations(self, history: int = 0) -> Situations:
         """Returns the decision as a table of one row, as a `VectorEnv`'s batch has it.
+
+        Args:
+            history: width of the column `history`, like that of the `VectorEnv`; 0: there is none.
 
         An observation function that works on `Situations`, such as `chefshat.learn.features.table_of`, takes both, so that a policy
         plays live as it was trained:
@@ -268,7 +309,7 @@ class Decision:
             scores = policy(table_of(decision.situations()))[0]
             action = np.where(decision.mask, scores, -np.inf).argmax()
         """
-        seen, sizes = self.request.observation, self.sizes
+        seen, sizes = self.request.observation, replace(self.sizes, history=history)
         boards = [seen.board_face, seen.board_size, seen.board_jokers]
         columns: dict[str, NDArray[Any]] = {
             "shifts": np.array([seen.shift], np.uint32),
@@ -282,6 +323,8 @@ class Decision:
             sent = np.frombuffer(getattr(seen, "hand" if name == "hands" else name), np.uint8)
             # Nothing given or received is sent as no bytes.
             columns[name] = (sent if len(sent) else np.zeros(sizes.card_kinds, np.uint8))[np.newaxis]
+        if history:
+            columns["history"], columns["history_counts"] = history_columns(self.history, sizes)
         situations = Situations.of(
             1,
             sizes,

@@ -18,6 +18,7 @@ from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError, from_refused
+from chefshat.history import ShiftLog
 from chefshat.limits import MAX_ENTROPY_BYTES, pack, why_not_recorded
 from chefshat.participant import REQUEST_ID, MakeAgent, OnEntered, Participant
 from chefshat.requests import attach
@@ -332,14 +333,19 @@ class PlaySession:
                 seat.substituted = event.sequence >= seat.live_from
             elif what == "returned" and seat.is_seat(event.returned.seat):
                 seat.substituted = False
+            if seat.info is not None:
+                seat.info.shift_log = seat.info.shift_log.add(event)
             if seat.hears_events:
                 seat.agent.on_event(event)
 
     def _snapshot(self, seat: SeatSession, snapshot: pb.Snapshot) -> None:
         seat.last_sequence = max(seat.last_sequence, snapshot.next_sequence - 1)
         self.progress += 1
-        if seat.info is not None and snapshot.HasField("game_started"):
-            seat.info.game_started = snapshot.game_started
+        if seat.info is not None:
+            # The events before it are unknown.
+            seat.info.shift_log = ShiftLog()
+            if snapshot.HasField("game_started"):
+                seat.info.game_started = snapshot.game_started
         seat.agent.on_snapshot(snapshot)
 
     def _decision(self, seat: SeatSession, request: pb.DecisionRequest, asks: list[Ask]) -> None:

@@ -1,7 +1,8 @@
 //! Who did what since a Shift began, as each seat may know it: an information state with perfect
 //! recall. Plays, passes and declarations are public. A gift is an entry of its giver; its card is
-//! seen by the giver, and by the receiver once the exchange is complete. A declined special action
-//! is seen by the seat that declined alone.
+//! seen by the giver, and by the receiver once the exchange is complete: two cards of one giver then
+//! ascending, since they arrive together. A declined special action is seen by the seat that
+//! declined alone.
 
 use std::collections::VecDeque;
 
@@ -139,6 +140,20 @@ impl History {
         }
     }
 
+    /// The gift that a receiver sees in place of this one: of the two cards that one giver gives at
+    /// most, the lower comes first. If the first is not kept any more, no column shows the second.
+    fn received(&self, index: usize) -> ActionId {
+        let gift = self.entries[index];
+        let mut others = self.entries.iter().enumerate().filter(|(other, entry)| {
+            *other != index && entry.seat == gift.seat && matches!(entry.seen, Seen::Gift(_))
+        });
+        match others.next() {
+            Some((first, entry)) if first < index => gift.action.max(entry.action),
+            Some((_, entry)) => gift.action.min(entry.action),
+            None => gift.action,
+        }
+    }
+
     /// Writes the latest entries that a seat may know, the most recent last, after zeros. Returns
     /// the number of all such entries of the Shift.
     pub(super) fn write(
@@ -148,15 +163,21 @@ impl History {
         space: ActionSpace,
         out: &mut Vec<u8>,
     ) -> u32 {
-        let seen = self.entries.iter().filter_map(|entry| {
-            let action = match entry.seen {
-                Seen::Public => Some(entry.action),
-                _ if entry.seat == viewer => Some(entry.action),
-                Seen::Own => return None,
-                Seen::Gift(to) => (to == viewer && self.exchanged).then_some(entry.action),
-            };
-            Some(number(space, entry.seat, action))
-        });
+        let seen = self
+            .entries
+            .iter()
+            .enumerate()
+            .filter_map(|(index, entry)| {
+                let action = match entry.seen {
+                    Seen::Public => Some(entry.action),
+                    _ if entry.seat == viewer => Some(entry.action),
+                    Seen::Own => return None,
+                    Seen::Gift(to) => {
+                        (to == viewer && self.exchanged).then(|| self.received(index))
+                    }
+                };
+                Some(number(space, entry.seat, action))
+            });
         let width = usize::from(width);
         let visible = seen.clone().count();
         let zeros = width.saturating_sub(visible);

@@ -12,6 +12,8 @@ use super::*;
 
 /// Faces of the default deck.
 const FACES: u8 = 11;
+/// Kind of a gift.
+const EXCHANGE: u8 = 2;
 
 /// All columns of the only row, which is of this seat.
 fn seen_by(batch: &Batch, seat: u8) -> String {
@@ -197,6 +199,51 @@ fn a_seat_cannot_tell_hidden_cards_apart() {
     } = &compared;
     let enough = all.get() > 2000 && declined.get() > 800 && forgotten.get() > 400;
     assert!(enough, "{compared:?}");
+}
+
+#[test]
+fn a_receiver_does_not_learn_which_card_was_given_first() {
+    let (mut givers, mut receivers) = (0, 0);
+    for (seed, width) in (0..20).flat_map(|seed| [(seed, 3), (seed, 5), (seed, 30)]) {
+        let setup = || {
+            let setup = VectorSetup::new(rules(), 1, &[None; 4], Seeds::Base(seed)).unwrap();
+            setup.with_history(width).unwrap()
+        };
+        let ((mut first, mut a), (mut second, mut b)) =
+            (VectorGames::new(setup()), VectorGames::new(setup()));
+        while a.kinds != [EXCHANGE] {
+            let actions = some_actions(&a);
+            (a, b) = (
+                first.step(&actions).unwrap(),
+                second.step(&actions).unwrap(),
+            );
+        }
+        let chef = a.seats[0];
+        let gifts = masks(&a)[0];
+        let (low, high) = (gifts.nth(0).unwrap(), gifts.nth(1).unwrap());
+        for gifts in [(low, high), (high, low)] {
+            (a, b) = (
+                first.step(&[gifts.0]).unwrap(),
+                second.step(&[gifts.1]).unwrap(),
+            );
+        }
+        for _ in 0..20 {
+            assert_eq!(a.seats, b.seats);
+            let all = [&a, &b].map(|batch| seen_by(batch, a.seats[0]));
+            if a.seats == [chef] {
+                givers += u32::from(all[0] != all[1]);
+            } else {
+                assert_eq!(all[0], all[1]);
+                receivers += u32::from(!a.observations.received.iter().all(|count| *count == 0));
+            }
+            let actions = some_actions(&a);
+            (a, b) = (
+                first.step(&actions).unwrap(),
+                second.step(&actions).unwrap(),
+            );
+        }
+    }
+    assert!(givers > 20 && receivers > 20, "{givers}, {receivers}");
 }
 
 #[test]

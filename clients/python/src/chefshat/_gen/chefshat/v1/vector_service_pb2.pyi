@@ -847,9 +847,10 @@ class ObservationColumns(_message.Message):
     """u16, as wide as the setup's `history`: the latest actions since the Shift began, as far as the
     seat may know them, the most recent last, after zeros. An entry is 1 + s * (A+1) + a for action a
     of seat s. Turns and declared special actions are public. A gift is action A, a card unknown to
-    the seat, except for its giver and, when the exchange is complete, its receiver. Gifts without a
-    choice come when the exchange is complete. A declined special action is an entry for the seat
-    that declined alone. If a game begins within a Shift, its history begins there.
+    the seat, except for its giver and, when the exchange is complete, its receiver, who sees two
+    cards of one giver ascending. Gifts without a choice come when the exchange is complete. A
+    declined special action is an entry for the seat that declined alone. If a game begins within a
+    Shift, its history begins there.
     """
     history_counts: _builtins.bytes
     """u32: number of these actions since the Shift began, also those beyond the width; empty if there
