@@ -33,8 +33,8 @@ class Games:
     def layouts(self) -> dict[str, dict[str, int]]:
         """For each table the bytes of a row before each column."""
 
-    def step(self, actions: ArrayLike) -> Batch:
-        """Takes one action for each row of the latest batch and returns the next batch.
+    def step(self, actions: ArrayLike, partial: bool = False) -> Batch:
+        """Takes one action for each row of the latest batch and returns the next batch. If `partial`, 65535 leaves a decision open.
 
         Raises TypeError for anything but an array of uint16 or int64, and ValueError if there is not one action for each row, or a
         number that is no action. Then the games are unchanged.

@@ -12,7 +12,7 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Start, VectorGames, VectorSetup};
+use chefshat_simulation::vector::{LEAVE_OPEN, Start, VectorGames, VectorSetup};
 use chefshat_vector::{
     Limits, Request as VectorRequest, batch_to_proto, record_parts, saved_to_proto,
     seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto,
@@ -198,7 +198,8 @@ impl Runner {
                 }
             };
             if let VectorRequest::Actions(actions) = &command {
-                let decisions = u64::try_from(actions.len()).unwrap_or(u64::MAX);
+                let taken = actions.iter().filter(|action| **action != LEAVE_OPEN);
+                let decisions = u64::try_from(taken.count()).unwrap_or(u64::MAX);
                 self.service.metrics().vector_decided(decisions);
             }
             let in_place = executes_in_place(&command, games.setup());

@@ -7,7 +7,9 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, ActionSpace};
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
-use chefshat_simulation::vector::{Batch as Columns, Decisions, VectorGames, VectorSetup};
+use chefshat_simulation::vector::{
+    Batch as Columns, Decisions, LEAVE_OPEN, VectorGames, VectorSetup,
+};
 use chefshat_vector::{
     Limits, Request, RequestError, record_lines, saved_to_proto, seeds_from_setup,
     setup_from_proto, start_from_proto, started_to_proto,
@@ -91,8 +93,10 @@ impl Games {
 
     /// Takes one action for each row of the latest batch and returns the next batch. Raises
     /// `TypeError` for anything but an array of uint16 or int64, and `ValueError` if there is not
-    /// one action for each row, or a number is not an action; then the games are unchanged.
-    fn step(&self, py: Python<'_>, actions: &Bound<'_, PyAny>) -> PyResult<Batch> {
+    /// one action for each row, or a number is not an action; then the games are unchanged. If
+    /// `partial`, 65535 leaves a decision open.
+    #[pyo3(signature = (actions, partial = false))]
+    fn step(&self, py: Python<'_>, actions: &Bound<'_, PyAny>, partial: bool) -> PyResult<Batch> {
         let actions = if let Ok(actions) = actions.cast::<PyArray1<u16>>() {
             let actions = actions.try_readonly()?;
             actions
@@ -111,7 +115,7 @@ impl Games {
                 "actions are an array of uint16 or int64",
             ));
         };
-        self.execute(py, Request::Actions(actions))
+        self.execute(py, Request::Actions(actions), partial)
     }
 
     /// Executes a serialized `VectorReset` and returns the next batch.
@@ -119,13 +123,13 @@ impl Games {
         let message = decode::<v1::VectorReset>("reset", reset)?;
         let request =
             Request::reset(&message, &Limits::DEFAULT).map_err(|error| refused(py, error))?;
-        self.execute(py, request)
+        self.execute(py, request, false)
     }
 
     /// Executes a serialized `VectorRestore` and returns the next batch.
     fn restore(&self, py: Python<'_>, restore: &[u8]) -> PyResult<Batch> {
         let message = decode::<v1::VectorRestore>("restore", restore)?;
-        self.execute(py, Request::Restore(message))
+        self.execute(py, Request::Restore(message), false)
     }
 
     /// Executes a serialized `VectorSave` and returns serialized `VectorStates`.
@@ -163,12 +167,14 @@ impl Games {
 
 impl Games {
     /// Executes a request. Long ones do not hold the interpreter.
-    fn execute(&self, py: Python<'_>, request: Request) -> PyResult<Batch> {
+    fn execute(&self, py: Python<'_>, request: Request, partial: bool) -> PyResult<Batch> {
         let mut state = self.lock()?;
         let games = state.as_mut().ok_or_else(|| ended(py))?;
         if let Request::Actions(actions) = &request {
             let size = games.setup().rules().actions().size();
-            let known = actions.iter().all(|action| action.index() < size);
+            let known =
+                |action: &ActionId| action.index() < size || (partial && *action == LEAVE_OPEN);
+            let known = actions.iter().all(known);
             if actions.len() != games.rows() || !known {
                 return Err(PyValueError::new_err("give one action for each row"));
             }

@@ -14,6 +14,8 @@ from chefshat.batch import Batch
 # have room.
 MAX_MESSAGE_BYTES = 1024 * 1024
 MAX_STATES_BYTES = 900_000
+# In place of an action: leaves the decision open, so that it comes again.
+LEAVE_OPEN = 0xFFFF
 
 
 class Games(Protocol):
@@ -35,6 +37,9 @@ class Games(Protocol):
 
         Raises TypeError or ValueError for actions that are not `checked`. Then the games are unchanged.
         """
+
+    def take(self, actions: NDArray[np.uint16]) -> Batch:
+        """Takes the action of each row, unless it is `LEAVE_OPEN`, and returns the next batch. Actions are not `checked`."""
 
     def reset(self, request: pb.VectorReset) -> Batch:
         """Abandons games, starts new ones and returns the next batch."""

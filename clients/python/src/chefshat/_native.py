@@ -97,6 +97,13 @@ class NativeGames:
         except chefshat_native.Refused as error:
             _raise(error)
 
+    def take(self, actions: NDArray[np.uint16]) -> Batch:
+        """Takes actions, of which `LEAVE_OPEN` takes none, and returns the next batch."""
+        try:
+            return self._batch(self._games.step(actions, True))
+        except chefshat_native.Refused as error:
+            _raise(error)
+
     def reset(self, request: pb.VectorReset) -> Batch:
         """Abandons games, starts new ones and returns the next batch."""
         try:

@@ -97,8 +97,11 @@ class RemoteGames:
 
     def step(self, actions: ArrayLike, batch: Batch) -> Batch:
         """Takes the action of each row of the latest batch and returns the next batch."""
-        column = checked(actions, batch).tobytes()
-        self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=column)))
+        return self.take(checked(actions, batch))
+
+    def take(self, actions: NDArray[np.uint16]) -> Batch:
+        """Takes actions, of which `LEAVE_OPEN` takes none, and returns the next batch."""
+        self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=actions.tobytes())))
         return self._receive_batch()
 
     def reset(self, request: pb.VectorReset) -> Batch:

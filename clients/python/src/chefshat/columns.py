@@ -7,7 +7,7 @@ R is the number of rows, N of seats, F of faces, A of actions (by default N=4, F
 f-1 counts face f, index F the jokers. Arrays of seats are N wide.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, Self, TypeVar, overload
@@ -193,6 +193,13 @@ class Table:
         """Returns the columns as arrays, by name."""
         return {name: getattr(self, name) for name in self.columns_of(self.sizes)}
 
+    @classmethod
+    def concatenated(cls, tables: Sequence[Self]) -> Self:
+        """Returns a table of the rows of one or more tables, in order."""
+        sizes = tables[0].sizes
+        columns = {name: np.concatenate([getattr(table, name) for table in tables]) for name in cls.columns_of(sizes)}
+        return cls.of(sum(map(len, tables)), sizes, columns)
+
     def take(self, rows: NDArray[Any]) -> Self:
         """Returns a table of the rows with these indices (or where this mask is true)."""
         columns = {name: array[rows] for name, array in self.as_dict().items()}
@@ -262,6 +269,13 @@ class Situations(Table):
     def masks(self) -> NDArray[np.bool_]:
         """(R, A): whether each action is legal."""
         return unpack(self.mask_bits, self.sizes.num_actions)
+
+    @classmethod
+    def concatenated(cls, tables: Sequence[Self]) -> Self:
+        """Returns the rows of one or more tables, in order, with observations."""
+        joined = super().concatenated(tables)
+        joined.__dict__["observations"] = Observations.concatenated([table.observations for table in tables])
+        return joined
 
     def take(self, rows: NDArray[Any]) -> Self:
         """Returns the rows with these indices (or where this mask is true), with observations."""

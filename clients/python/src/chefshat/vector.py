@@ -22,6 +22,7 @@ from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
 from chefshat.errors import ChefsHatError
 from chefshat.masks import sample_legal
+from chefshat.opponents import Policies, Policy, PolicyGames, split
 from chefshat.transitions import Memory, RewardFunction, Transitions
 from chefshat.vector_setup import Rules, Seed, VectorOptions, put_seed, vector_setup
 
@@ -31,6 +32,7 @@ __all__ = [
     "Endings",
     "GameRecord",
     "Observations",
+    "Policy",
     "Rules",
     "Seed",
     "ShiftStatistics",
@@ -67,7 +69,7 @@ class VectorEnv:
         sizes: the numbers that determine the widths of columns; some of them are attributes, too.
         games: n, the number of parallel games.
         client_seats: the seats that the client plays, ascending.
-        built_in_agents: names of the built-in agents by seat; empty where the client plays.
+        built_in_agents: names of the built-in agents by seat; empty where the client or a function plays.
         base_seed: the base seed in use; None if the games' seeds were given.
         rules: the rule set, every field set.
         batch: the latest batch.
@@ -97,14 +99,23 @@ class VectorEnv:
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
             options: see `VectorOptions`.
         """
-        self._start(vector_setup(games, options), (address, token, ca), transitions, reward_function)
+        inside, policies = split(options)
+        self._start(vector_setup(games, inside), policies, (address, token, ca), transitions, reward_function)
 
-    def _start(self, setup: pb.VectorSetup, place: _Place, transitions: bool, reward_function: RewardFunction | None) -> None:
+    def _start(
+        self,
+        setup: pb.VectorSetup,
+        policies: Policies | None,
+        place: _Place,
+        transitions: bool,
+        reward_function: RewardFunction | None,
+    ) -> None:
         """Starts the games of a setup."""
         self._setup = setup
+        self._policies = policies
         self._place = place
         self._ended: ChefsHatError | None = None
-        self._games = _begin(setup, *place)
+        self._games = _begin(setup, policies, *place)
         try:
             self._set_attributes(self._games.started, setup.games)
             self.server = self._games.server
@@ -313,7 +324,7 @@ class VectorEnv:
         if self.server is not None and setup.ByteSize() > MAX_MESSAGE_BYTES:
             raise ValueError(f"{len(states)} games are too many to fork on a server at once: fork some of them at a time")
         env = type(self).__new__(type(self))
-        env._start(setup, self._place, self._memory is not None, self._reward_function)
+        env._start(setup, self._policies, self._place, self._memory is not None, self._reward_function)
         return env
 
     def _numbers(self, games: ArrayLike) -> NDArray[np.uint32]:
@@ -357,8 +368,21 @@ class VectorEnv:
         self._games.close()
 
 
-def _begin(setup: pb.VectorSetup, address: str | ServerAddress | None, token: str | None, ca: Path | str | None) -> Games:
+def _begin(
+    setup: pb.VectorSetup,
+    policies: Policies | None,
+    address: str | ServerAddress | None,
+    token: str | None,
+    ca: Path | str | None,
+) -> Games:
     """Begins games in this process or on a server."""
+    if policies is not None:
+        inside = _begin(setup, None, address, token, ca)
+        try:
+            return PolicyGames(inside, policies)
+        except BaseException:
+            inside.close()
+            raise
     if address is None and importlib.util.find_spec("chefshat_native") is not None:
         from chefshat._native import NativeGames
 

@@ -1,11 +1,14 @@
 """The options of a `VectorEnv`, and the first request of its stream. The stream is in `vector`."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypedDict, cast
 
 import numpy as np
 
 from chefshat import pb
+
+if TYPE_CHECKING:
+    from chefshat.opponents import Policy
 
 Rules: TypeAlias = "pb.RuleSet | str | Mapping[str, Any] | None"
 """A rule set: the message, the name of a preset, or the message's fields. Enum values have short names: `opening="golden"`."""
@@ -34,7 +37,10 @@ class VectorOptions(TypedDict, total=False):
 
     Attributes:
         client_seats: the seats played by the client; default: all.
-        opponents: built-in agents of the other seats: one for each, in the order of the seats, or one for all; default: "random".
+        opponents: who plays the other seats: one for each, in the order of the seats, or one for all; default: "random". The name
+            of a built-in agent, or a function from a batch to the action of each row, for instance an earlier self; see `Policy`.
+            Functions decide within the same step: each is asked for all rows of its seats that wait, until only the client's are
+            left. Its seats count for the server's limits as the client's. OPPONENT_FAILED says what it did wrong.
         rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
         episode: "shift" (default) or "game".
         decisions: "all" (default), or "turns": only the first T actions.
@@ -55,7 +61,7 @@ class VectorOptions(TypedDict, total=False):
     """
 
     client_seats: Sequence[int] | None
-    opponents: str | Sequence[str]
+    opponents: "str | Policy | Sequence[str | Policy]"
     rewards: str | None
     episode: str
     decisions: str
@@ -94,7 +100,8 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     setup = pb.VectorSetup(
         games=games,
         client_seats=() if client_seats is None else client_seats,
-        opponents=[opponents] if isinstance(opponents, str) else opponents,
+        # Functions are not part of the setup.
+        opponents=cast("list[str]", [opponents] if isinstance(opponents, str) else opponents),
         episode=choice("episode", options.get("episode", "shift"), pb.EpisodeScope, "EPISODE_SCOPE_"),
         decisions=choice("decisions", decisions, pb.DecisionScope, "DECISION_SCOPE_"),
         other_decisions=options.get("other_decisions") or "",

@@ -49,6 +49,10 @@ use slot::Slot;
 pub use start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};
 
+/// Leaves a decision open, in place of an action: the next batch has it again, unchanged. For a
+/// client that decides for some seats first.
+pub const LEAVE_OPEN: ActionId = ActionId::new(u16::MAX);
+
 /// The games of one client.
 #[derive(Debug)]
 pub struct VectorGames {
@@ -106,6 +110,7 @@ impl VectorGames {
     }
 
     /// Takes one action for each row of the last batch, in order, and returns the next batch.
+    /// [`LEAVE_OPEN`] takes none.
     ///
     /// # Errors
     /// If there is not one action for each row, an action is illegal where that is an error, or
@@ -128,7 +133,9 @@ impl VectorGames {
                 true => Some(game as usize),
                 false => open.binary_search_by_key(&game, |row| row.game).ok(),
             };
-            if let Some(row) = row {
+            if let Some(row) = row
+                && actions[row] != LEAVE_OPEN
+            {
                 slot.answer(actions[row], setup, part);
             }
             slot.advance(setup, part);
@@ -260,7 +267,7 @@ impl VectorGames {
     fn check(&self, actions: &[ActionId]) -> Result<(), StepError> {
         let answers = self.open.iter().zip(actions).enumerate();
         for (row, (open, &action)) in answers {
-            if !open.legal.contains(action) {
+            if action != LEAVE_OPEN && !open.legal.contains(action) {
                 return Err(StepError::Illegal {
                     row,
                     game: open.game,

@@ -5,8 +5,10 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed};
-use chefshat_engine::{ActionId, Decision, DecisionKind, Game, Mask, Script, Seat, Viewer};
-use chefshat_simulation::vector::{Seeds, Start, StepError, VectorGames, VectorSetup};
+use chefshat_engine::{
+    ActionId, Decision, DecisionKind, Game, Mask, RewardScheme, Script, Seat, Viewer,
+};
+use chefshat_simulation::vector::{LEAVE_OPEN, Seeds, Start, StepError, VectorGames, VectorSetup};
 
 use super::*;
 
@@ -271,4 +273,30 @@ fn the_number_of_threads_changes_nothing() {
         }
     }
     assert!(expected.totals.games > 0 || expected.totals.shifts > 300);
+}
+
+#[test]
+fn decisions_left_open_come_again_unchanged() {
+    let setup = all_client(4).with_rewards(Some(RewardScheme::Validity));
+    let (mut games, mut batch) = VectorGames::new(setup.clone());
+    let (mut others, mut expected) = VectorGames::new(setup);
+    for _ in 0..300 {
+        assert_eq!(batch.observations, expected.observations);
+        assert_eq!(
+            (&batch.masks, &batch.rewards),
+            (&expected.masks, &expected.rewards)
+        );
+        let actions = some_actions(&expected);
+        expected = others.step(&actions).unwrap();
+        // The games with even numbers first.
+        let first = |(row, action): (usize, &ActionId)| [*action, LEAVE_OPEN][row % 2];
+        let half: Vec<ActionId> = actions.iter().enumerate().map(first).collect();
+        let between = games.step(&half).unwrap();
+        assert_eq!(between.rows, 4);
+        let second = |(row, action): (usize, &ActionId)| [LEAVE_OPEN, *action][row % 2];
+        let half: Vec<ActionId> = actions.iter().enumerate().map(second).collect();
+        batch = games.step(&half).unwrap();
+    }
+    assert_eq!(batch.totals, expected.totals);
+    assert!(expected.totals.shifts > 0);
 }

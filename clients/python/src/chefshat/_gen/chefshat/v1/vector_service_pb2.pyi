@@ -453,7 +453,9 @@ class VectorActions(_message.Message):
 
     ACTIONS_FIELD_NUMBER: _builtins.int
     actions: _builtins.bytes
-    """u16: the action of each row of the batch, in the same order."""
+    """u16: the action of each row of the batch, in the same order. 65535 leaves the decision open: the
+    next batch has it again, unchanged.
+    """
     def __init__(
         self,
         *,
