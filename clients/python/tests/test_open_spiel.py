@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 import chefshat
+from chefshat import history
 
 pyspiel = pytest.importorskip("pyspiel")
 pytest.importorskip("chefshat_native")
+
+RULES = {"preset": "paper", "target_shifts": 2}
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +29,7 @@ def test_a_game_is_that_of_a_vector_env(game: Any) -> None:
     state = game.new_initial_state()
     assert state.is_chance_node()
     state.apply_action(7)
-    rules = {"preset": "paper", "target_shifts": 2}
-    with chefshat.VectorEnv(seed=7, rules=rules, episode="game", total_games=1) as env:
+    with chefshat.VectorEnv(seed=7, rules=RULES, episode="game", total_games=1) as env:
         batch = env.batch
         while not batch.done:
             assert state.current_player() == batch.seats[0]
@@ -54,3 +56,64 @@ def test_clones_are_independent_and_observations_are_those_of_the_player(game: A
     assert state.current_player() == player
     assert state.observation_tensor(player) == before
     assert len(clone.history()) == len(state.history()) + 1
+
+
+def test_information_states_have_perfect_recall(game: Any) -> None:
+    chance = np.random.default_rng(2)
+    legal_of: dict[str, list[int]] = {}
+    tensor_of: dict[str, bytes] = {}
+    gifts = 0
+    for deal in (1, 2):
+        state = game.new_initial_state()
+        state.apply_action(deal)
+        taken: list[list[str]] = [[] for _ in range(4)]
+        with chefshat.VectorEnv(seed=deal, rules=RULES, total_games=1, history=512) as env:
+            while not state.is_terminal():
+                player, legal = state.current_player(), state.legal_actions()
+                text = state.information_state_string(player)
+                # What the player did since the game began; a seat without a choice also gives.
+                own = [entry for line in text.splitlines()[1:] for entry in line.split("; ")[2].split(", ") if entry]
+                own = [entry[2:] for entry in own if entry.startswith(str(player))]
+                if any(action.startswith("give") for action in taken[player]):
+                    gifts += 1
+                else:
+                    own = [action for action in own if not action.startswith("give")]
+                assert own == taken[player]
+                # The last line has all actions of the Shift, as the column has them.
+                done = history.actions(env.batch)[0]
+                entries = [entry.split(" ", 1)[1] for entry in text.splitlines()[-1].split("; ")[2].split(", ") if entry]
+                assert entries == [env.action_texts[action] if action < env.num_actions else "give ?" for action in done[done >= 0]]
+                assert legal_of.setdefault(text, legal) == legal
+                tensor_of[text] = np.asarray(state.information_state_tensor(player), np.float32).tobytes()
+                action = int(chance.choice(legal))
+                taken[player].append(state.action_to_string(player, action))
+                state.apply_action(action)
+                env.step([action])
+    assert len(legal_of) > 200
+    assert gifts > 20
+    assert len(set(tensor_of.values())) == len(tensor_of)
+
+
+def test_an_information_state_shows_a_gift_to_giver_and_receiver_alone(game: Any) -> None:
+    state = game.new_initial_state()
+    state.apply_action(0)
+    while not state.action_to_string(state.legal_actions()[0]).startswith("give"):
+        state.apply_action(state.legal_actions()[-1])
+    worlds = [state.clone(), state.clone()]
+    for world, gift in zip(worlds, state.legal_actions()[:2], strict=True):
+        world.apply_action(gift)
+    same_for: dict[str, bool] = {}
+    while len(same_for) < 4:
+        first, second = worlds
+        player = first.current_player()
+        assert second.current_player() == player
+        seen = first.position.env().batch
+        if seen.kinds[0] == chefshat.pb.DECISION_KIND_TURN:
+            texts = [world.information_state_string(player) for world in worlds]
+            tensors = [world.information_state_tensor(player) for world in worlds]
+            assert (texts[0] == texts[1]) == (tensors[0] == tensors[1])
+            same_for[chefshat.pb.Role.Name(seen.observations.roles[0, player])] = texts[0] == texts[1]
+        action = max(set(first.legal_actions()) & set(second.legal_actions()))
+        for world in worlds:
+            world.apply_action(action)
+    assert same_for == {"ROLE_CHEF": False, "ROLE_SOUS_CHEF": True, "ROLE_WAITER": True, "ROLE_DISHWASHER": False}

@@ -15,7 +15,7 @@ The vocabulary of `tokens`, for N seats and A actions:
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +40,14 @@ def actions(situations: Situations) -> NDArray[np.int32]:
 
 def tokens(situations: Situations) -> NDArray[np.int32]:
     """Returns (R, 2K): the seat and the action of each entry as tokens, the most recent last, after padding."""
-    sizes = situations.sizes
-    seats, done = _parts(situations)
-    relative = (seats - situations.seats[:, np.newaxis].astype(np.int32)) % sizes.players
-    pairs = np.stack([1 + relative, 1 + sizes.players + done], axis=2)
-    return np.where((seats == NONE)[:, :, np.newaxis], PADDING, pairs).reshape(len(situations), 2 * sizes.history)
+    viewers = situations.seats[:, np.newaxis].astype(np.int32)
+    return tokens_of(*_parts(situations), viewers, situations.sizes).reshape(len(situations), 2 * situations.sizes.history)
+
+
+def tokens_of(seats: NDArray[np.int32], actions: NDArray[np.int32], viewers: NDArray[np.int32], sizes: Sizes) -> NDArray[np.int32]:
+    """Returns (..., 2): the tokens of entries as these seats see them."""
+    pairs = np.stack([1 + (seats - viewers) % sizes.players, 1 + sizes.players + actions], axis=-1)
+    return np.where((seats == NONE)[..., np.newaxis], PADDING, pairs).astype(np.int32)
 
 
 def vocabulary_size(sizes: Sizes) -> int:
@@ -57,7 +60,12 @@ def _parts(situations: Situations) -> tuple[NDArray[np.int32], NDArray[np.int32]
     sizes = situations.sizes
     if not sizes.history:
         raise ValueError("there is no history: create the VectorEnv with history=K, the number of actions to see")
-    entries = situations.observations.history.astype(np.int32) - 1
+    return parts_of(situations.observations.history, sizes)
+
+
+def parts_of(numbers: NDArray[np.integer[Any]], sizes: Sizes) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Returns the seats and actions of entries that are numbered as in the column."""
+    entries = numbers.astype(np.int32) - 1
     width = sizes.num_actions + 1
     return np.where(entries < 0, NONE, entries // width), np.where(entries < 0, NONE, entries % width)
 
