@@ -1,19 +1,24 @@
 """The history of a live game is that of a vector environment: the same seeded games, played both ways."""
 
+import asyncio
 import sys
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from proxy import Proxy
 
 import chefshat
+import chefshat.aio
 from chefshat import Client, Decision, SeatInfo, VectorEnv, history, pb
 from chefshat.columns import Situations
 
 SEED = bytes(range(32))
 WIDTH = 24
+AGAINST_GREEDY: dict[str, Any] = {"target_shifts": 6}
 RULE_SETS: list[dict[str, Any]] = [
     {"target_shifts": 8},
     {"players": 6, "target_shifts": 9},
@@ -22,11 +27,16 @@ RULE_SETS: list[dict[str, Any]] = [
 ]
 
 
+@cache
+def weights(actions: int) -> NDArray[np.float32]:
+    """Returns the scores."""
+    return np.random.default_rng(5).standard_normal((2 * WIDTH, actions), np.float32)
+
+
 def policy(situations: Situations) -> NDArray[np.intp]:
     """Chooses a legal action by fixed scores of the tokens. Declares special actions in every other Shift."""
     tokens = history.tokens(situations)
-    weights = np.random.default_rng(5).standard_normal((tokens.shape[1], situations.sizes.num_actions), np.float32)
-    best = np.where(situations.masks, np.sin(tokens) @ weights, -np.inf).argmax(axis=1)
+    best = np.where(situations.masks, np.sin(tokens) @ weights(situations.sizes.num_actions), -np.inf).argmax(axis=1)
     special = situations.sizes.num_actions - 1 - situations.observations.shifts % 2
     chosen: NDArray[np.intp] = np.where(situations.kinds == pb.DECISION_KIND_SPECIAL_ACTION, special, best).astype(np.intp)
     return chosen
@@ -98,20 +108,27 @@ def test_the_same_policy_sees_the_same_history_live(real_address: str, rules: di
     assert kinds.count(pb.DECISION_KIND_SPECIAL_ACTION) > 0
 
 
-@pytest.mark.server
-def test_a_new_process_sees_the_same_history(real_address: str) -> None:
+@pytest.fixture
+def expected() -> list[tuple[Any, ...]]:
+    """Returns what seat 0 sees of a game against built-in agents, in columns."""
     pytest.importorskip("chefshat_native")
-    rules: dict[str, Any] = {"target_shifts": 6}
-    expected = played_in_columns(rules, SEED, 4, client_seats=[0], opponents="greedy")[0]
-    # Before any decision of the exchange, and in some pizzas.
-    stops = [row for row, (kind, *_) in enumerate(expected) if kind != pb.DECISION_KIND_TURN or row % 7 == 3]
+    return played_in_columns(AGAINST_GREEDY, SEED, 4, client_seats=[0], opponents="greedy")[0]
+
+
+def ticket_of(client: Client) -> str:
+    """Creates a room with the same game and joins it; returns the ticket of seat 0."""
+    rules, policy = pb.RuleSet(**AGAINST_GREEDY), pb.RoomPolicy(pace_ms=0)
+    room = client.create_room("live", rules=rules, seats=[None, *["greedy"] * 3], game_seed=SEED, policy=policy)
+    return client.join_room(room.join_code, "live", seat=0).ticket
+
+
+@pytest.mark.server
+def test_a_new_process_sees_the_same_history(real_address: str, expected: list[tuple[Any, ...]]) -> None:
+    # Before every decision of an exchange, and in some pizzas.
+    stops = [row for row, (kind, *_) in enumerate(expected) if kind != pb.DECISION_KIND_TURN or row % 9 == 3]
     seen: list[tuple[Any, ...]] = []
     with Client(real_address) as client:
-        policy_of_room = pb.RoomPolicy(pace_ms=0)
-        room = client.create_room(
-            "live", rules=pb.RuleSet(**rules), seats=[None, *["greedy"] * 3], game_seed=SEED, policy=policy_of_room
-        )
-        ticket = client.join_room(room.join_code, "live", seat=0).ticket
+        ticket = ticket_of(client)
         for stop in stops:
             live = Live(stop - len(seen))
             with pytest.raises(Stopped):
@@ -121,6 +138,27 @@ def test_a_new_process_sees_the_same_history(real_address: str) -> None:
         client.play(live, ticket)
     assert seen + live.seen == expected
     assert len(stops) > 5
+
+
+@pytest.mark.server
+def test_a_history_outlives_connections(real_address: str, expected: list[tuple[Any, ...]]) -> None:
+    class Cutting(Live):
+        def decide(self, decision: Decision) -> int:
+            if len(self.seen) % 17 == 5:
+                proxy.cut()
+            return super().decide(decision)
+
+    async def play() -> int:
+        async with chefshat.aio.Client(proxy.address) as client:
+            return (await client.play(live, ticket)).reconnects
+
+    live = Cutting()
+    with Client(real_address) as client:
+        ticket = ticket_of(client)
+    with Proxy(real_address) as proxy:
+        reconnects = asyncio.run(play())
+    assert live.seen == expected
+    assert reconnects > 2
 
 
 def test_a_history_that_begins_in_mid_shift_says_so() -> None:
