@@ -1,9 +1,11 @@
-"""The engine of Chef's Hat: vector environments in the process of the client.
+"""The engine of Chef's Hat: vector environments and search in the process of the client.
 
-`chefshat.VectorEnv` is the documented way to it. Setups, resets and records are serialized messages of the protocol.
+`chefshat.VectorEnv` and `chefshat.search` are the documented ways to it. Setups, resets, records and situations are serialized
+messages of the protocol.
 """
 
-from typing import NoReturn
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,6 +91,57 @@ class Batch:
 
     def records(self) -> list[tuple[int, int, list[bytes]]]:
         """Returns the records of games that have ended: game, index and serialized `RecordLine`s of each."""
+
+class Position:
+    """What a seat knows at its decision, and all deals that are consistent with it."""
+
+    @staticmethod
+    def of_state(state: bytes, max_steps: int) -> Position:
+        """The decision that a saved game waits for, from the knowledge of its seat alone."""
+
+    @staticmethod
+    def of_situation(situation: bytes, max_steps: int) -> Position:
+        """The decision that a serialized `Situation` describes."""
+
+    @property
+    def seat(self) -> int:
+        """The seat that decides."""
+
+    @property
+    def rules(self) -> bytes:
+        """The serialized `RuleSet`."""
+
+    @property
+    def deals(self) -> float:
+        """The number of possible deals."""
+
+    @property
+    def legal_actions(self) -> NDArray[np.uint16]:
+        """The legal actions, ascending."""
+
+    def sample(self, deals: int, seed: int) -> NDArray[np.uint8]:
+        """Draws deals: the cards that each seat then holds, one after the other."""
+
+    def starts(self, deals: int, seed: int) -> list[bytes]:
+        """Draws the same deals as serialized `ListedStart`s."""
+
+    def expected_hands(self, deals: int, seed: int) -> NDArray[np.float64]:
+        """The cards that each seat holds on average over these deals, one seat after the other."""
+
+    def evaluate(
+        self,
+        actions: Sequence[int],
+        policy: str | bytes,
+        *,
+        rollouts: int,
+        time_ms: int,
+        halving: bool,
+        threads: int,
+        seed: int,
+    ) -> dict[str, NDArray[Any]]:
+        """Estimates what actions are worth. `policy`: an agent's name, or the bytes of a network file. 0: no limit."""
+
+    def __reduce__(self) -> NoReturn: ...
 
 def action_texts(faces: int) -> list[str]:
     """Returns the texts of all actions of a deck with this number of faces, 4..=15."""

@@ -47,6 +47,10 @@ def test_readme(number: int, address: str, tmp_path: Path, request: pytest.Fixtu
         pytest.skip("the records of the fake server cannot be replayed")
     if "env.save" in README[number] and "fake" in request.fixturenames:
         pytest.skip("the fake server saves no games")
+    if "chefshat import search" in README[number]:
+        pytest.importorskip("chefshat_native")
+        if "fake" in request.fixturenames:
+            pytest.skip("the decisions of the fake server follow no rules")
     assert run_python("-c", README[number].replace(PRINTED_ADDRESS, address), folder=tmp_path) != ""
 
 

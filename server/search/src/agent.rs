@@ -13,8 +13,8 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use crate::{
-    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, Sampler, ShiftHistory,
-    evaluate,
+    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
+    ShiftHistory, evaluate,
 };
 
 /// Steps of counting deals that the agent spends on a decision at most.
@@ -252,7 +252,7 @@ impl Following for Player {
         let others = legal.iter().filter(|action| *action != prior);
         let actions: Vec<ActionId> = std::iter::once(prior).chain(others).collect();
         let method = Method {
-            policy: self.plays.rollouts,
+            policy: RolloutPolicy::Kind(self.plays.rollouts),
             allocation: Allocation::Halving,
         };
         let budget = self.plays.budget;
@@ -264,7 +264,7 @@ impl Following for Player {
         let estimates = evaluate(
             &sampler,
             &actions,
-            method,
+            &method,
             seed,
             self.pool.as_deref(),
             progress,

@@ -4,13 +4,12 @@
 
 use std::ops::RangeInclusive;
 
-use chefshat_agents::AgentKind;
 use chefshat_engine::ActionId;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::rollout::{Worth, rollout};
-use crate::{Chance, Sampler};
+use crate::{Chance, RolloutPolicy, Sampler};
 
 /// Deals that are played before the first look whether to stop, and most of them between two looks.
 /// In between it is an eighth of those played so far. Never depends on the number of threads.
@@ -117,10 +116,10 @@ pub enum Allocation {
 }
 
 /// How an evaluation works.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+#[derive(Clone, Debug)]
 pub struct Method {
     /// The agents of the rollouts, on all seats.
-    pub policy: AgentKind,
+    pub policy: RolloutPolicy,
     /// How rollouts are shared among the actions.
     pub allocation: Allocation,
 }
@@ -135,7 +134,7 @@ pub struct Method {
 pub fn evaluate(
     sampler: &Sampler,
     actions: &[ActionId],
-    method: Method,
+    method: &Method,
     seed: [u8; 32],
     pool: Option<&ThreadPool>,
     progress: impl Fn(u64) -> f64,
@@ -152,7 +151,7 @@ pub fn evaluate(
         while worlds == 0 || progress(rollouts) < part {
             let tried: Vec<ActionId> = active.iter().map(|&index| actions[index]).collect();
             let batch = worlds..worlds + (worlds / 8).clamp(*BATCH.start(), *BATCH.end());
-            let in_world = |world| evaluate_in(sampler, &tried, method.policy, seed, world);
+            let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);
             let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
                 all.iter_mut()
                     .zip(&more)
@@ -199,7 +198,7 @@ fn halve(active: &mut Vec<usize>, estimates: &[Estimate]) {
 fn evaluate_in(
     sampler: &Sampler,
     actions: &[ActionId],
-    policy: AgentKind,
+    policy: &RolloutPolicy,
     seed: [u8; 32],
     world: u64,
 ) -> Vec<Estimate> {

@@ -228,23 +228,52 @@ impl Knowledge {
     /// # Errors
     /// If the deal does not lead to what the seat sees.
     pub fn game(&self, world: &World, later: Seed) -> Result<Game, KnowledgeError> {
-        self.replay(world, later)
-            .filter(|game| game.observe(Viewer::Seat(self.seat)) == self.observation)
+        self.replay(world, later, |_| {})
             .ok_or(KnowledgeError::Inconsistent)
     }
 
-    fn replay(&self, world: &World, later: Seed) -> Option<Game> {
+    /// The start of the Shift if this is the deal, and the actions of all seats from there to the
+    /// open decision.
+    ///
+    /// # Errors
+    /// As [`Knowledge::game`].
+    pub fn start(&self, world: &World) -> Result<(Script, Vec<ActionId>), KnowledgeError> {
+        let mut actions = Vec::new();
+        self.replay(world, Seed([0; 32]), |action| actions.push(action))
+            .and_then(|_| Some((self.script(world)?, actions)))
+            .ok_or(KnowledgeError::Inconsistent)
+    }
+
+    /// The game if this is the deal, and if it leads to what the seat sees.
+    fn replay(&self, world: &World, later: Seed, on_action: impl FnMut(ActionId)) -> Option<Game> {
+        self.played(world, later, on_action).filter(|game| {
+            let seen = game.observe(Viewer::Seat(self.seat));
+            without_golden_gifts(seen) == without_golden_gifts(self.observation)
+        })
+    }
+
+    fn script(&self, world: &World) -> Option<Script> {
         let mut scores = BySeat::filled(self.rules.players(), 0);
         for seat in scores.seats() {
             scores[seat] = u32::try_from(*self.observation.points.get(seat)?).ok()?;
         }
-        let script = Script {
+        Some(Script {
             shift: self.observation.shift,
             hands: world.dealt,
             last_order: self.last_order,
             scores,
             drawn: world.drawn,
-        };
+        })
+    }
+
+    /// Plays the deal up to the open decision.
+    fn played(
+        &self,
+        world: &World,
+        later: Seed,
+        mut on_action: impl FnMut(ActionId),
+    ) -> Option<Game> {
+        let script = self.script(world)?;
         let mut game = Game::scripted(self.rules, later, &script, |_| {}).ok()?;
         let space = self.rules.actions();
         let mut gifts = self.choices(world);
@@ -272,6 +301,7 @@ impl Knowledge {
                 },
             };
             game.apply(action, |_| {}).ok()?;
+            on_action(action);
         }
         None
     }
@@ -306,6 +336,17 @@ impl Knowledge {
     pub(crate) fn draws_starter(&self) -> bool {
         self.rules.opening() == Opening::AnyTopFace
     }
+}
+
+/// An observation that does not tell the Golden card from others given and received: that of a
+/// message does not, but the events of the exchange do.
+fn without_golden_gifts(mut seen: Observation) -> Observation {
+    for cards in [&mut seen.gave, &mut seen.received] {
+        let counts = cards.count_array(seen.faces);
+        let counts = &counts[..=usize::from(seen.faces)];
+        *cards = Cards::from_counts(seen.faces, counts, false).expect("the same cards");
+    }
+    seen
 }
 
 /// Takes the first of the cards to give.

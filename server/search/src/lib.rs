@@ -15,4 +15,5 @@ pub use agent::{Budget, CountedMonteCarlo, Decisions, MonteCarlo, MonteCarloErro
 pub use evaluate::{Allocation, Estimate, Method, evaluate, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
+pub use rollout::RolloutPolicy;
 pub use sampler::{Chance, Sampler};

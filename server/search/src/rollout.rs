@@ -1,7 +1,34 @@
 //! Plays a possible game on, to the end of its Shift, and says what that was worth.
 
-use chefshat_agents::{AgentKind, BuiltInAgent};
+use std::sync::Arc;
+
+use chefshat_agents::{AgentKind, BuiltInAgent, Network};
 use chefshat_engine::{ActionId, Event, Game, MAX_SEATS, Seat, Viewer};
+
+/// The agents that play all seats in rollouts.
+#[derive(Clone, Debug)]
+pub enum RolloutPolicy {
+    /// Agents of a kind.
+    Kind(AgentKind),
+    /// Agents that play by a network, which fits the rules.
+    Network(Arc<Network>),
+}
+
+impl RolloutPolicy {
+    /// The agent of this name: `random`, `greedy` or `trained`.
+    pub fn from_name(name: &str) -> Option<RolloutPolicy> {
+        AgentKind::from_name(name)
+            .filter(|kind| *kind != AgentKind::RandomUnmasked)
+            .map(RolloutPolicy::Kind)
+    }
+
+    fn agent(&self, seed: [u8; 32]) -> BuiltInAgent {
+        match self {
+            RolloutPolicy::Kind(kind) => BuiltInAgent::new(*kind, seed),
+            RolloutPolicy::Network(network) => BuiltInAgent::network(Arc::clone(network)),
+        }
+    }
+}
 
 /// What a Shift was worth to a seat.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
@@ -11,7 +38,7 @@ pub(crate) struct Worth {
     pub(crate) place: u8,
 }
 
-/// Applies an action to a game that ends with its Shift, then lets agents of a kind play all seats
+/// Applies an action to a game that ends with its Shift, then lets agents play all seats
 /// until the place of `seat` is known. `seed` determines their random choices.
 ///
 /// # Panics
@@ -20,13 +47,13 @@ pub(crate) fn rollout(
     mut game: Game,
     action: ActionId,
     seat: Seat,
-    policy: AgentKind,
+    policy: &RolloutPolicy,
     seed: [u8; 32],
 ) -> Worth {
     let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
         let mut seed = seed;
         seed[0] ^= index as u8;
-        BuiltInAgent::new(policy, seed)
+        policy.agent(seed)
     });
     let mut place = None;
     let mut action = action;

@@ -12,12 +12,11 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::{
-    FieldProblem, decision_kind, event_from_proto, observation_from_proto, rules_from_proto,
-    seat_from_number, seat_number,
+    FieldProblem, decision_kind, rules_from_proto, seat_number, situation_from_proto,
 };
 use chefshat_search::{
-    Allocation, Estimate, Knowledge, KnowledgeError, Method, Sampler, ShiftHistory, evaluate,
-    likely_hands,
+    Allocation, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler, ShiftHistory,
+    evaluate, likely_hands,
 };
 use rayon::{ThreadPool, ThreadPoolBuildError};
 use tokio::sync::mpsc;
@@ -204,7 +203,7 @@ fn evaluated(
     let of_hands = |deals: u64| spent(deals, DEALS_FOR_HANDS, plan.time / 2);
     let hands = likely_hands(&sampler, plan.seed, of_hands);
     let progress = |rollouts: u64| spent(rollouts, plan.rollouts, plan.time);
-    let found = evaluate(&sampler, &actions, plan.method, plan.seed, None, progress);
+    let found = evaluate(&sampler, &actions, &plan.method, plan.seed, None, progress);
     Ok(v1::EvaluateResponse {
         seat: seat_number(seat),
         rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
@@ -228,8 +227,8 @@ fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
 /// The plan of a request.
 fn plan(message: &v1::EvaluateRequest) -> Result<Plan, Status> {
     let policy = match message.agent.as_str() {
-        "" => Some(AgentKind::Greedy),
-        name => AgentKind::from_name(name).filter(|kind| *kind != AgentKind::RandomUnmasked),
+        "" => Some(RolloutPolicy::Kind(AgentKind::Greedy)),
+        name => RolloutPolicy::from_name(name),
     };
     let policy = policy.ok_or_else(|| refused("agent", "choose random, greedy or trained"))?;
     if message.rollouts > MAX_ANALYSIS_ROLLOUTS {
@@ -265,22 +264,10 @@ fn situation_knowledge(situation: &v1::Situation) -> Result<Knowledge, Status> {
     let rules: RuleSet =
         rules_from_proto(situation.rules.as_ref().unwrap_or(&v1::RuleSet::default()))
             .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
-    let problem = |problem: FieldProblem| field("ANALYSIS_REFUSED", &problem);
-    let seat = seat_from_number(situation.seat, rules.players())
-        .ok_or_else(|| refused("seat", "the game has no such seat"))?;
-    let decision = situation.decision.as_ref();
-    let decision = decision.ok_or_else(|| refused("decision", "not set"))?;
-    let observation = observation_from_proto(decision, seat, &rules).map_err(problem)?;
-    let mut history = ShiftHistory::new(seat);
-    for event in situation
-        .events
-        .iter()
-        .filter_map(|event| event.kind.as_ref())
-    {
-        if let Some(event) = event_from_proto(event, &rules).map_err(problem)? {
-            history.on_event(&event);
-        }
-    }
+    let (observation, events) = situation_from_proto(situation, &rules)
+        .map_err(|problem| field("ANALYSIS_REFUSED", &problem))?;
+    let mut history = ShiftHistory::new(observation.seat.ok_or_else(internal)?);
+    events.iter().for_each(|event| history.on_event(event));
     Knowledge::new(rules, &observation, &history)
         .map_err(|error| refused("situation", error.to_string()))
 }

@@ -80,6 +80,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-engine",
             "chefshat-proto",
             "chefshat-agents",
+            "chefshat-search",
             "chefshat-simulation",
             "chefshat-record",
             "chefshat-vector",

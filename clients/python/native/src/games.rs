@@ -254,7 +254,7 @@ fn records(games: &VectorGames, columns: &mut Columns) -> Vec<Record> {
     played.iter().map(record).collect()
 }
 
-fn decode<M: Message + Default>(name: &str, bytes: &[u8]) -> PyResult<M> {
+pub(crate) fn decode<M: Message + Default>(name: &str, bytes: &[u8]) -> PyResult<M> {
     M::decode(bytes).map_err(|error| {
         let words = format!("the {name} is not a message: {error}");
         PyValueError::new_err(words)
@@ -262,7 +262,7 @@ fn decode<M: Message + Default>(name: &str, bytes: &[u8]) -> PyResult<M> {
 }
 
 /// Runs work; a panic becomes an error, so that it does not end the interpreter.
-fn caught<T>(work: impl FnOnce() -> T) -> PyResult<T> {
+pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> PyResult<T> {
     // The state of the work is dropped, so it is never seen half done.
     catch_unwind(AssertUnwindSafe(work)).map_err(|_| panicked())
 }
@@ -292,7 +292,7 @@ fn no_records_here() -> RequestError {
     RequestError::field("BRANCH_REFUSED", &FieldProblem::new("branch", words))
 }
 
-fn refused(py: Python<'_>, error: RequestError) -> PyErr {
+pub(crate) fn refused(py: Python<'_>, error: RequestError) -> PyErr {
     let metadata = PyDict::new(py);
     for (key, value) in error.metadata {
         if let Err(error) = metadata.set_item(key, value) {

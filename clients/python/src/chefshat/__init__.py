@@ -5,7 +5,7 @@ create and find rooms, watch them and fetch records. The messages of the protoco
 server says what is legal.
 
 To learn, `make` an environment: `VectorEnv` steps many games at once in columns, `envs` has the interfaces of Gymnasium and
-PettingZoo, `replay` learns from recorded games.
+PettingZoo, `replay` learns from recorded games. `search` looks ahead from what a seat knows.
 
 Names are imported on first use, so that `import chefshat` is fast, and environments in this process do not load gRPC.
 """
@@ -13,7 +13,7 @@ Names are imported on first use, so that `import chefshat` is fast, and environm
 # Not from `typing`, whose import takes as long as all the rest: `chefshat.pth` imports this package whenever Python starts.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from chefshat import aio, errors, pb, replay, vector
+    from chefshat import aio, errors, pb, replay, search, vector
     from chefshat.address import ServerAddress
     from chefshat.agents import Agent, RandomAgent
     from chefshat.backoff import Backoff
@@ -52,6 +52,7 @@ __all__ = [
     "play",
     "replay",
     "sample_legal",
+    "search",
     "vector",
 ]
 

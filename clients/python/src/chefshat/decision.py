@@ -337,6 +337,16 @@ class Decision:
         situations.__dict__["observations"] = Observations.of(1, sizes, columns)
         return situations
 
+    def situation(self) -> pb.Situation:
+        """Returns all that the seat knows, as `AnalysisService.Evaluate` and `chefshat.search` take it.
+
+        Raises ValueError before the start of the game, and if the start of the Shift is not known (`is_history_complete`).
+        """
+        if not self.is_history_complete:
+            raise ValueError("what the seat knows is incomplete: the start of the Shift has not arrived")
+        rules = self._game_started().rules
+        return pb.Situation(rules=rules, seat=self.seat, decision=self.request, events=self.shift_events)
+
     def classic_vector(self) -> NDArray[np.float32]:
         """Computes the 228 numbers of the 2020 paper (F + H + T in general), each 0..=1.
 

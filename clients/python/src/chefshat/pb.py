@@ -5,6 +5,7 @@ The .proto files document the fields; editors show them from the typed stubs. Th
 """
 
 # ruff: noqa: F403
+from chefshat._gen.chefshat.v1.analysis_service_pb2 import *
 from chefshat._gen.chefshat.v1.decision_pb2 import *
 from chefshat._gen.chefshat.v1.event_pb2 import *
 from chefshat._gen.chefshat.v1.play_service_pb2 import *

@@ -8,6 +8,7 @@ mod observation;
 mod played;
 mod rewards;
 mod rules;
+mod situation;
 mod start;
 
 pub use events::{By, event_from_proto, event_kind, final_table, special_to_proto};
@@ -25,4 +26,5 @@ pub use rules::{
     FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,
     rules_from_proto, rules_to_proto,
 };
+pub use situation::situation_from_proto;
 pub use start::{script_from_proto, script_to_proto};

@@ -3,14 +3,15 @@
 use chefshat_agents::{AgentKind, AgentMaker as _, BuiltInAgent};
 use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
 use chefshat_search::{
-    Allocation, Budget, Estimate, Method, MonteCarlo, Sampler, evaluate, likely_hands,
+    Allocation, Budget, Estimate, Method, MonteCarlo, RolloutPolicy, Sampler, evaluate,
+    likely_hands,
 };
 
 use crate::scenario::{Moment, Scenario};
 
 const MAX_STEPS: u64 = 10_000_000;
 const METHOD: Method = Method {
-    policy: AgentKind::Greedy,
+    policy: RolloutPolicy::Kind(AgentKind::Greedy),
     allocation: Allocation::Uniform,
 };
 
@@ -54,7 +55,7 @@ fn a_winning_play_is_worth_the_first_place() {
     let wins = scenario.moments[moment].action;
     let pass = scenario.rules.actions().pass();
     let sampler = sampler(&scenario, moment);
-    let found = evaluate(&sampler, &[wins, pass], METHOD, [1; 32], None, spend(400));
+    let found = evaluate(&sampler, &[wins, pass], &METHOD, [1; 32], None, spend(400));
     assert_eq!((found[0].points(), found[0].standard_error()), (5.0, 0.0));
     assert_eq!(found[0].place(), 1.0);
     assert!(
@@ -76,7 +77,7 @@ fn the_largest_points_have_finite_estimates() {
     let wins = scenario.moments[2].action;
     let pass = scenario.rules.actions().pass();
     let sampler = sampler(&scenario, 2);
-    let found = evaluate(&sampler, &[pass, wins], METHOD, [1; 32], None, spend(400));
+    let found = evaluate(&sampler, &[pass, wins], &METHOD, [1; 32], None, spend(400));
     let most = f64::from(u32::MAX);
     assert_eq!((found[1].points(), found[1].gain()), (most, most));
     assert!(found[1].gain_error() < 1e-6 * most, "{found:?}");
@@ -92,7 +93,7 @@ fn every_action_is_tried_even_if_the_budget_is_spent() {
             allocation,
             ..METHOD
         };
-        let found = evaluate(&sampler, &legal, method, [1; 32], None, |_| 1.0);
+        let found = evaluate(&sampler, &legal, &method, [1; 32], None, |_| 1.0);
         assert!(
             found
                 .iter()
@@ -120,7 +121,14 @@ fn the_result_does_not_depend_on_threads() {
             allocation,
             ..METHOD
         };
-        evaluate(&sampler, &legal, method, [5; 32], pool.as_ref(), spend(300))
+        evaluate(
+            &sampler,
+            &legal,
+            &method,
+            [5; 32],
+            pool.as_ref(),
+            spend(300),
+        )
     };
     let count = |estimates: &[Estimate]| estimates.iter().map(|found| found.rollouts).sum::<u64>();
     for allocation in [Allocation::Uniform, Allocation::Halving] {

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use chefshat_engine::{DecisionKind, Opening, PassScope, RuleSet, RuleSetSpec};
-use chefshat_search::{Chance, KnowledgeError, Sampler};
+use chefshat_engine::{Cards, DecisionKind, Opening, PassScope, RuleSet, RuleSetSpec};
+use chefshat_search::{Chance, Knowledge, KnowledgeError, Sampler};
 
 use crate::enumeration::{Outcome, enumerate};
 use crate::scenario::Scenario;
@@ -203,6 +203,34 @@ fn without_exchange() {
 }
 
 /// Two games that differ only in cards hidden from a seat give it the same samples.
+#[test]
+fn an_observation_need_not_tell_the_golden_card_from_other_gifts() {
+    // Messages of decisions do not; the events of the exchange do.
+    let rules = rules(|spec| spec.faces = 6);
+    let mut tested = 0;
+    for number in 0..40 {
+        let scenario = Scenario::random(rules, number, Some(&[2, 0, 3, 1]));
+        for (index, moment) in scenario.moments.iter().enumerate() {
+            let mut seen = moment.observation;
+            for gift in [&mut seen.gave, &mut seen.received] {
+                let counts: Vec<u8> = gift.counts(rules.faces()).collect();
+                *gift = Cards::from_counts(rules.faces(), &counts, false).expect("cards");
+            }
+            if seen == moment.observation {
+                continue;
+            }
+            let described = Knowledge::new(rules, &seen, &moment.history).expect("a decision");
+            let described = Sampler::new(described, MAX_STEPS).expect("a deal");
+            let known = Sampler::new(scenario.knowledge(index), MAX_STEPS).expect("a deal");
+            assert_eq!(described.ways(), known.ways());
+            let world = |sampler: &Sampler| sampler.world(&mut Chance::new([1; 32]));
+            assert_eq!(world(&described), world(&known));
+            tested += 1;
+        }
+    }
+    assert!(tested > 20, "{tested}");
+}
+
 #[test]
 fn samples_depend_on_what_the_seat_knows_alone() {
     let rules = rules(|spec| spec.faces = 5);

@@ -90,4 +90,12 @@ pub enum StateError {
     /// The game of the state is over.
     #[error("the game of the state is over: fork games that are running")]
     Over,
+    /// The game of the state waits for no decision of the client.
+    #[error("the game waits for no decision: save it when it has a row in the batch")]
+    NoDecision,
+    /// The history does not reach back to the start of the Shift.
+    #[error(
+        "the state does not have all actions of the Shift: give the games a history that is wide enough, for instance of 512 actions"
+    )]
+    HistoryTooShort,
 }

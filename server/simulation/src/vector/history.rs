@@ -34,6 +34,16 @@ pub(super) struct Entry {
     pub(super) seen: Seen,
 }
 
+/// An entry as a seat may know it.
+#[derive(Copy, Clone, PartialEq, Debug)]
+pub(super) struct Known {
+    pub(super) seat: Seat,
+    /// `None` for a gift of an unknown card.
+    pub(super) action: Option<ActionId>,
+    /// Who received the card, if it is a gift.
+    pub(super) receiver: Option<Seat>,
+}
+
 /// The latest actions of a Shift.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct History {
@@ -154,6 +164,36 @@ impl History {
         }
     }
 
+    /// The kept entries that a seat may know.
+    fn known(&self, viewer: Seat) -> impl Iterator<Item = Known> + Clone {
+        let entries = self.entries.iter().enumerate();
+        entries.filter_map(move |(index, entry)| {
+            let own = entry.seat == viewer;
+            let (action, receiver) = match entry.seen {
+                Seen::Public => (Some(entry.action), None),
+                Seen::Own if own => (Some(entry.action), None),
+                Seen::Own => return None,
+                Seen::Gift(to) if own => (Some(entry.action), Some(to)),
+                Seen::Gift(to) => {
+                    let known = to == viewer && self.exchanged;
+                    (known.then(|| self.received(index)), Some(to))
+                }
+            };
+            Some(Known {
+                seat: entry.seat,
+                action,
+                receiver,
+            })
+        })
+    }
+
+    /// The entries of the Shift that a seat may know, gifts only once the exchange is complete.
+    /// `None` if some of them are not kept any more.
+    pub(super) fn complete(&self, viewer: Seat) -> Option<Vec<Known>> {
+        let due = |known: &Known| self.exchanged || known.receiver.is_none();
+        (self.dropped == 0).then(|| self.known(viewer).filter(due).collect())
+    }
+
     /// Writes the latest entries that a seat may know, the most recent last, after zeros. Returns
     /// the number of all such entries of the Shift.
     pub(super) fn write(
@@ -164,20 +204,8 @@ impl History {
         out: &mut Vec<u8>,
     ) -> u32 {
         let seen = self
-            .entries
-            .iter()
-            .enumerate()
-            .filter_map(|(index, entry)| {
-                let action = match entry.seen {
-                    Seen::Public => Some(entry.action),
-                    _ if entry.seat == viewer => Some(entry.action),
-                    Seen::Own => return None,
-                    Seen::Gift(to) => {
-                        (to == viewer && self.exchanged).then(|| self.received(index))
-                    }
-                };
-                Some(number(space, entry.seat, action))
-            });
+            .known(viewer)
+            .map(|known| number(space, known.seat, known.action));
         let width = usize::from(width);
         let visible = seen.clone().count();
         let zeros = width.saturating_sub(visible);

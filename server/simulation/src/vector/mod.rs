@@ -1,7 +1,7 @@
 //! Vector environments: many games of one client, stepped together. A step takes one action for
 //! each open decision of the client, advances all games with built-in agents, and returns the next
 //! open decisions as columns. `setup` has the options, `slot` advances one game, `blocks` all of
-//! them, `columns` is the output, `saved` has complete states of games.
+//! them, `columns` is the output, `saved` has complete states of games, `seen` what a seat knows there.
 //!
 //! A state is everything that determines how a game continues. It can be kept as a value or as
 //! bytes, restored here or elsewhere, and forked:
@@ -29,6 +29,7 @@ mod part;
 mod running;
 mod sampling;
 mod saved;
+mod seen;
 mod setup;
 mod slot;
 mod start;
@@ -44,6 +45,7 @@ pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
 pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
 use part::{OpenRow, Part};
 pub use saved::SavedGame;
+pub use seen::SeenShift;
 pub use setup::{Episode, VectorSetup};
 use slot::Slot;
 pub use start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};

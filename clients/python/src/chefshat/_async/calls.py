@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Self
 
 from chefshat import pb, requests
+from chefshat._gen.chefshat.v1.analysis_service_pb2_grpc import AnalysisServiceStub
 from chefshat._gen.chefshat.v1.play_service_pb2_grpc import PlayServiceStub
 from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
@@ -70,6 +71,7 @@ class AsyncCalls(ABC):
         self._spectators = SpectatorServiceStub(self._channel)
         self._table = TableServiceStub(self._channel)
         self._tournaments = TournamentServiceStub(self._channel)
+        self._analysis = AnalysisServiceStub(self._channel)
 
     async def __aenter__(self) -> Self:
         return self
@@ -165,6 +167,22 @@ class AsyncCalls(ABC):
             async for response in call:
                 for line in response.lines:
                     yield line
+        except grpc.RpcError as error:
+            raise from_rpc_error(error) from error
+        finally:
+            call.cancel()
+
+    async def evaluate(self, request: pb.EvaluateRequest) -> AsyncIterator[pb.EvaluateResponse]:
+        """Iterates over estimates of the actions of a decision, each from more rollouts than the one before.
+
+        Args:
+            request: the decision, of a recorded game (`moment`) or as its seat sees it (`situation`: see `Decision.situation`), and
+                what the analysis may cost.
+        """
+        call = self._analysis.Evaluate(request)
+        try:
+            async for response in call:
+                yield response
         except grpc.RpcError as error:
             raise from_rpc_error(error) from error
         finally:

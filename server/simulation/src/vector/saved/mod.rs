@@ -45,6 +45,11 @@ impl SavedGame {
         self.running.as_ref().map_or(0, |running| running.kept)
     }
 
+    /// The game; `None` if it is over.
+    pub(super) fn running(&self) -> Option<&RunningGame> {
+        self.running.as_ref()
+    }
+
     /// The game as it is restored.
     pub(super) fn into_running(self) -> Option<RunningGame> {
         self.running

@@ -1,0 +1,321 @@
+//! Search from what one seat knows. A state has the cards of all seats; what its seat may not know is
+//! dropped when a [`Position`] is created, and `chefshat_search` gets the rest.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use chefshat_agents::Network;
+use chefshat_engine::{ActionId, Event, Observation, RuleSet, Seat};
+use chefshat_proto::v1;
+use chefshat_record::convert::{
+    FieldProblem, rules_from_proto, rules_to_proto, script_to_proto, situation_from_proto,
+};
+use chefshat_search::{
+    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
+    ShiftHistory, evaluate, likely_hands,
+};
+use chefshat_simulation::vector::SavedGame;
+use chefshat_vector::RequestError;
+use numpy::PyArray1;
+use prost::Message as _;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::games::{caught, decode, refused};
+use crate::threads::pool;
+
+/// Time between two looks whether the user interrupts the program.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
+
+/// What a seat knows at its decision, and all deals that are consistent with it.
+#[pyclass(module = "chefshat_native", frozen)]
+#[derive(Debug)]
+pub(crate) struct Position {
+    sampler: Sampler,
+}
+
+#[pymethods]
+impl Position {
+    /// The decision that a saved game waits for, from the knowledge of its seat alone.
+    #[staticmethod]
+    fn of_state(py: Python<'_>, state: &[u8], max_steps: u64) -> PyResult<Self> {
+        Position::new(py, max_steps, || {
+            let problem = |error| RequestError::from(error);
+            let seen = SavedGame::from_bytes(state).map_err(problem)?;
+            let seen = seen.seen().map_err(problem)?;
+            Ok((seen.rules, seen.observation, seen.events))
+        })
+    }
+
+    /// The decision that a serialized `Situation` describes.
+    #[staticmethod]
+    fn of_situation(py: Python<'_>, situation: &[u8], max_steps: u64) -> PyResult<Self> {
+        let message = decode::<v1::Situation>("situation", situation)?;
+        Position::new(py, max_steps, || {
+            let rules = rules_from_proto(&message.rules.clone().unwrap_or_default())
+                .map_err(|problem| RequestError::field("RULE_SET_REFUSED", &problem))?;
+            let (observation, events) = situation_from_proto(&message, &rules)
+                .map_err(|problem| RequestError::field("ANALYSIS_REFUSED", &problem))?;
+            Ok((rules, observation, events))
+        })
+    }
+
+    /// The seat that decides.
+    #[getter]
+    fn seat(&self) -> usize {
+        self.seat_index().index()
+    }
+
+    /// The serialized `RuleSet`.
+    #[getter]
+    fn rules<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &rules_to_proto(self.rule_set()).encode_to_vec())
+    }
+
+    /// The number of possible deals.
+    #[getter]
+    fn deals(&self) -> f64 {
+        self.sampler.ways()
+    }
+
+    /// The legal actions, ascending.
+    #[getter]
+    fn legal_actions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u16>> {
+        let legal = self.sampler.legal_actions();
+        PyArray1::from_iter(py, legal.iter().map(ActionId::index))
+    }
+
+    /// Draws deals: the cards that each seat then holds, one after the other.
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        deals: u64,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let faces = self.rule_set().faces();
+        let hands = py.detach(|| {
+            caught(|| {
+                let games = (0..deals).map(|deal| self.sampler.game(&mut stream(seed, deal)));
+                games
+                    .flat_map(|game| {
+                        let hands = game.hands().values().copied().collect::<Vec<_>>();
+                        hands.into_iter().flat_map(move |hand| hand.counts(faces))
+                    })
+                    .collect::<Vec<u8>>()
+            })
+        })?;
+        Ok(PyArray1::from_vec(py, hands))
+    }
+
+    /// Draws the same deals as serialized `ListedStart`s: the start of the Shift, and the actions
+    /// from there to the decision.
+    fn starts(&self, py: Python<'_>, deals: u64, seed: u64) -> PyResult<Vec<Vec<u8>>> {
+        let knowledge = self.sampler.knowledge();
+        let start = |deal| {
+            let world = self.sampler.world(&mut stream(seed, deal));
+            let (script, actions) = knowledge
+                .start(&world)
+                .expect("a sampled deal leads to what the seat sees");
+            v1::ListedStart {
+                hands: Some(script_to_proto(&script, self.rule_set().faces())),
+                actions: (actions.iter())
+                    .flat_map(|action| action.index().to_le_bytes())
+                    .collect(),
+            }
+            .encode_to_vec()
+        };
+        py.detach(|| caught(|| (0..deals).map(start).collect()))
+    }
+
+    /// The cards that each seat holds on average over these deals, one seat after the other.
+    fn expected_hands<'py>(
+        &self,
+        py: Python<'py>,
+        deals: u64,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let progress = |done: u64| done as f64 / deals as f64;
+        let hands = py.detach(|| caught(|| likely_hands(&self.sampler, bytes(seed), progress)))?;
+        Ok(PyArray1::from_vec(py, hands.concat()))
+    }
+
+    /// Estimates what actions are worth. `policy`: the name of a built-in agent, or the bytes of a
+    /// network file. `rollouts` and `time_ms`: 0 for no limit; one of them has to be set. The other
+    /// agents' random choices and the deals follow from the seed.
+    #[pyo3(signature = (actions, policy, *, rollouts, time_ms, halving, threads, seed))]
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        actions: Vec<u16>,
+        policy: Policy,
+        rollouts: u64,
+        time_ms: u64,
+        halving: bool,
+        threads: usize,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let start = Instant::now();
+        let method = Method {
+            policy: self.policy(policy).map_err(|error| refused(py, error))?,
+            allocation: match halving {
+                true => Allocation::Halving,
+                false => Allocation::Uniform,
+            },
+        };
+        let actions: Vec<ActionId> = actions.into_iter().map(ActionId::new).collect();
+        let legal = self.sampler.legal_actions();
+        if actions.is_empty() || !actions.iter().all(|action| legal.contains(*action)) {
+            let words = "give at least one action, and only legal ones";
+            return Err(refused(py, field("actions", words)));
+        }
+        let pool = pool(threads);
+        let interrupts = Interrupts::new();
+        let progress = |done: u64| {
+            let share = |spent: f64, all: u64| if all == 0 { 0.0 } else { spent / all as f64 };
+            let elapsed = 1000.0 * start.elapsed().as_secs_f64();
+            match interrupts.seen() {
+                true => 1.0,
+                false => share(done as f64, rollouts).max(share(elapsed, time_ms)),
+            }
+        };
+        let found = py.detach(|| {
+            caught(|| {
+                let (sampler, pool) = (&self.sampler, pool.as_deref());
+                evaluate(sampler, &actions, &method, bytes(seed), pool, progress)
+            })
+        })?;
+        interrupts.result()?;
+        estimates(py, &found)
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(pyo3::exceptions::PyTypeError::new_err(
+            "a position cannot be pickled or copied: create it from its state or situation",
+        ))
+    }
+}
+
+/// The agents of rollouts.
+#[derive(FromPyObject)]
+enum Policy {
+    Name(String),
+    File(Vec<u8>),
+}
+
+impl Position {
+    fn new(
+        py: Python<'_>,
+        max_steps: u64,
+        read: impl FnOnce() -> Result<(RuleSet, Observation, Vec<Event>), RequestError> + Send,
+    ) -> PyResult<Self> {
+        let sampler = py.detach(|| {
+            caught(|| {
+                let (rules, observation, events) = read()?;
+                let seat = observation.seat.unwrap_or(Seat::new(0));
+                let mut history = ShiftHistory::new(seat);
+                events.iter().for_each(|event| history.on_event(event));
+                Knowledge::new(rules, &observation, &history)
+                    .and_then(|knowledge| Sampler::new(knowledge, max_steps))
+                    .map_err(unknown)
+            })
+        })?;
+        let sampler = sampler.map_err(|error| refused(py, error))?;
+        Ok(Position { sampler })
+    }
+
+    fn rule_set(&self) -> &RuleSet {
+        self.sampler.knowledge().rules()
+    }
+
+    fn seat_index(&self) -> Seat {
+        self.sampler.knowledge().seat()
+    }
+
+    fn policy(&self, policy: Policy) -> Result<RolloutPolicy, RequestError> {
+        match policy {
+            Policy::Name(name) => RolloutPolicy::from_name(&name).ok_or_else(|| {
+                let words = format!(
+                    "there is no agent {name:?}: choose random, greedy or trained, or the path of a network file"
+                );
+                field("agent", words)
+            }),
+            Policy::File(bytes) => {
+                let network = Network::from_bytes(&bytes);
+                let network = network.map_err(|error| field("agent", error.to_string()))?;
+                if !network.fits(self.rule_set()) {
+                    let words = "the network was trained for other rules";
+                    return Err(field("agent", words));
+                }
+                Ok(RolloutPolicy::Network(Arc::new(network)))
+            }
+        }
+    }
+}
+
+/// Interrupts of the program, which Python notices only if it is asked.
+struct Interrupts {
+    looked: std::sync::Mutex<(Instant, PyResult<()>)>,
+}
+
+impl Interrupts {
+    fn new() -> Self {
+        Interrupts {
+            looked: std::sync::Mutex::new((Instant::now(), Ok(()))),
+        }
+    }
+
+    /// Whether there was one.
+    fn seen(&self) -> bool {
+        let Ok(mut looked) = self.looked.lock() else {
+            return true;
+        };
+        if looked.1.is_ok() && looked.0.elapsed() > SIGNAL_INTERVAL {
+            *looked = (Instant::now(), Python::attach(|py| py.check_signals()));
+        }
+        looked.1.is_err()
+    }
+
+    fn result(self) -> PyResult<()> {
+        self.looked.into_inner().map_or(Ok(()), |looked| looked.1)
+    }
+}
+
+/// The columns of estimates by name.
+fn estimates<'py>(py: Python<'py>, found: &[Estimate]) -> PyResult<Bound<'py, PyDict>> {
+    let columns = PyDict::new(py);
+    let actions = found.iter().map(|estimate| estimate.action.index());
+    columns.set_item("actions", PyArray1::from_iter(py, actions))?;
+    let rollouts = found.iter().map(|estimate| estimate.rollouts);
+    columns.set_item("rollouts", PyArray1::from_iter(py, rollouts))?;
+    let numbers: [(&str, fn(&Estimate) -> f64); 5] = [
+        ("points", Estimate::points),
+        ("standard_errors", Estimate::standard_error),
+        ("gains", Estimate::gain),
+        ("gain_errors", Estimate::gain_error),
+        ("places", Estimate::place),
+    ];
+    for (name, number) in numbers {
+        columns.set_item(name, PyArray1::from_iter(py, found.iter().map(number)))?;
+    }
+    Ok(columns)
+}
+
+fn unknown(error: KnowledgeError) -> RequestError {
+    field("position", error.to_string())
+}
+
+fn field(name: &'static str, words: impl Into<String>) -> RequestError {
+    RequestError::field("ANALYSIS_REFUSED", &FieldProblem::new(name, words))
+}
+
+/// The random numbers of a deal.
+fn stream(seed: u64, deal: u64) -> Chance {
+    Chance::stream(bytes(seed), deal)
+}
+
+fn bytes(seed: u64) -> [u8; 32] {
+    let mut bytes = [0; 32];
+    bytes[..8].copy_from_slice(&seed.to_le_bytes());
+    bytes
+}

@@ -1,0 +1,262 @@
+"""Search from what a seat knows: deals, estimates, and agents that play by them."""
+
+import importlib.util
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import chefshat
+from chefshat import ChefsHatError, VectorEnv, history, pb, search
+from chefshat.search import Estimates, Position
+
+pytest.importorskip("chefshat_native")
+
+SAMPLES = Path(__file__).resolve().parents[1] / "samples" / "search"
+NETWORK = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network"
+# Wide enough for the Shifts of these tests.
+HISTORY = 1024
+
+
+def sample_module(name: str) -> ModuleType:
+    """Loads a sample as a module."""
+    spec = importlib.util.spec_from_file_location(name, SAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def positions(shifts: int, **options: Any) -> Iterator[tuple[VectorEnv, Position]]:
+    """Plays random actions and returns every decision of some Shifts."""
+    with VectorEnv(history=HISTORY, seed=3, **options) as env:
+        env.sample(seed=4)
+        while env.batch.totals.shifts < shifts:
+            yield env, search.position(env)
+            env.step(env.sample())
+
+
+def same(one: Estimates, other: Estimates) -> bool:
+    """Whether all numbers are equal."""
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in Estimates.__dataclass_fields__)
+
+
+@pytest.mark.parametrize(
+    ("shifts", "options"),
+    [
+        (4, {}),
+        # Both jokers are often in one hand, and sometimes declared.
+        (30, {"rules": {"players": 2, "faces": 6}}),
+        (12, {"rules": {"players": 3, "faces": 7, "opening": "any_top_face", "opening_pass": True, "pass_scope": "turn"}}),
+        (2, {"rules": {"players": 5, "faces": 8}, "client_seats": [1, 3]}),
+    ],
+)
+def test_deals_are_consistent_with_every_decision(shifts: int, options: dict[str, Any]) -> None:
+    declared = 0
+    for env, position in positions(shifts, **options):
+        batch = env.batch
+        seen = batch.observations
+        declare = env.num_actions - 1
+        declared += (history.actions(batch)[0] == declare).any()
+        assert (position.seat, position.deals >= 1) == (batch.seats[0], True)
+        assert position.legal_actions.tolist() == np.flatnonzero(batch.masks[0]).tolist()
+        hands = position.sample(5, seed=int(batch.step))
+        assert hands.shape == (5, env.players, env.sizes.card_kinds)
+        assert (hands[:, position.seat] == seen.hands[0]).all()
+        assert (hands.sum(axis=2) == seen.cards_left[0]).all()
+        deck = np.array([*range(1, env.faces + 1), env.jokers])
+        assert (hands.sum(axis=1) + seen.played[0] <= deck).all()
+        expected = position.expected_hands(5, seed=int(batch.step))
+        np.testing.assert_allclose(expected, hands.mean(axis=0))
+    assert declared or shifts < 30
+
+
+def test_turns_alone() -> None:
+    for env, position in positions(3, decisions="turns", client_seats=[1]):
+        assert (position.sample(2).sum(axis=2) == env.batch.observations.cards_left[0]).all()
+
+
+def test_starts_are_the_deals_drawn() -> None:
+    checked = 0
+    for env, position in positions(3):
+        if env.batch.step % 7:
+            continue
+        hands = position.sample(3, seed=5)
+        with VectorEnv(games=6, starts=position.starts(3, seed=5), rules=position.rules, history=HISTORY, seed=1) as worlds:
+            assert (worlds.batch.seats == position.seat).all()
+            assert (worlds.batch.mask_bits == env.batch.mask_bits[0]).all()
+            # The order of gifts is not among what a seat has to remember.
+            seen = worlds.batch.observations.as_dict()
+            del seen["history"]
+            for name, column in seen.items():
+                assert (column == getattr(env.batch.observations, name)[0]).all(), name
+            # The hands of the others show when they decide.
+            if len(position.legal_actions) > 1 and env.batch.kinds[0] == pb.DECISION_KIND_TURN:
+                worlds.step(np.repeat(position.legal_actions[-1], 6))
+                batch = worlds.batch
+                assert (batch.observations.hands == hands[batch.games % 3, batch.seats]).all()
+                checked += 1
+    assert checked > 5
+
+
+def test_hidden_cards_change_nothing() -> None:
+    # Two games that look the same to the seat, and differ in the cards of the others.
+    compared = 0
+    for env, position in positions(4):
+        if env.batch.step % 5 or len(position.legal_actions) == 1:
+            continue
+        drawn = position.sample(2, seed=9)
+        if (drawn[0] == drawn[1]).all():
+            continue
+        starts = position.starts(2, seed=9)
+        with VectorEnv(games=2, starts=starts, rules=position.rules, history=HISTORY, seed=[bytes(32), bytes([1]) * 32]) as worlds:
+            states = worlds.save()
+            both = [search.position(worlds, row) for row in range(2)]
+        assert states[0] != states[1]
+        for other in (*both, *map(search.position, states)):
+            assert other.deals == position.deals
+            assert (other.sample(20, seed=1) == position.sample(20, seed=1)).all()
+            assert (other.expected_hands(20) == position.expected_hands(20)).all()
+            assert same(other.evaluate(60, seed=2), position.evaluate(60, seed=2))
+        compared += 1
+    assert compared > 20
+
+
+def test_estimates() -> None:
+    position = next(position for _, position in positions(2) if len(position.legal_actions) > 3)
+    legal = position.legal_actions
+    found = position.evaluate(400, seed=1)
+    assert found.actions.tolist() == legal.tolist()
+    assert (found.rollouts >= 400 // len(legal)).all()
+    assert ((found.points >= 0) & (found.points <= 5) & (found.places >= 1) & (found.places <= 4)).all()
+    assert (found.gains[0], found.gain_errors[0]) == (0, 0)
+    np.testing.assert_allclose(found.gains, found.points - found.points[0], atol=1e-12)
+    assert found.best == legal[found.points.argmax()]
+    # A function of the seed on any number of threads.
+    assert same(found, position.evaluate(400, seed=1, threads=1))
+    assert not same(found, position.evaluate(400, seed=2))
+    # Gains refer to the first action; the worse ones are dropped.
+    halved = position.evaluate(400, actions=legal[::-1].tolist(), halving=True, agent="random")
+    assert (halved.actions.tolist(), halved.gains[0]) == (legal[::-1].tolist(), 0)
+    assert halved.rollouts.min() < halved.rollouts.max()
+    assert halved.rollouts[halved.actions == halved.best] == halved.rollouts.max()
+    assert (position.evaluate(time_ms=1).rollouts >= 4).all()
+
+
+def test_networks_play_the_rollouts() -> None:
+    position = next(position for _, position in positions(2) if len(position.legal_actions) > 3)
+    file = NETWORK / "table-actions.safetensors"
+    found = position.evaluate(40, agent=file, seed=1)
+    assert same(found, position.evaluate(40, agent=str(file), seed=1))
+    with pytest.raises(ChefsHatError, match="ANALYSIS_REFUSED"):
+        position.evaluate(40, agent=Path(__file__))
+
+
+def test_environments_of_others() -> None:
+    pytest.importorskip("gymnasium")
+    pytest.importorskip("pettingzoo")
+    env = chefshat.make(opponents="greedy", history=HISTORY)
+    _, info = env.reset(seed=1)
+    assert search.position(env).legal_actions.tolist() == np.flatnonzero(info["action_mask"]).tolist()
+    table = chefshat.make("pettingzoo", history=HISTORY)
+    table.reset(seed=1)
+    assert f"player_{search.position(table).seat}" == table.agent_selection
+    env.close()
+    table.close()
+
+
+def test_what_cannot_be_searched() -> None:
+    def refused(reason: str, words: str, env: VectorEnv) -> None:
+        with pytest.raises(ChefsHatError, match=words) as error:
+            search.position(env)
+        assert error.value.reason == reason
+
+    with VectorEnv(seed=1) as env:
+        refused("STATES_REFUSED", "history", env)
+        with pytest.raises(ValueError, match="there is no row 1"):
+            search.position(env, 1)
+    with VectorEnv(seed=1, history=4) as env:
+        search.position(env)
+        for _ in range(20):
+            env.step(env.sample(seed=1))
+        refused("STATES_REFUSED", "history", env)
+    with VectorEnv(seed=1, history=4, rules={"players": 6}) as env, pytest.raises(ChefsHatError, match="more than 10 steps"):
+        search.position(env, max_steps=10)
+    with VectorEnv(seed=1, history=4) as env:
+        position = search.position(env)
+        for wrong in ({"rollouts": 0}, {"time_ms": -1}, {"rollouts": 1, "seed": -1}):
+            with pytest.raises(ValueError, match=r"budget|seed"):
+                position.evaluate(**wrong)  # type: ignore[arg-type]
+        illegal = next(action for action in range(env.num_actions) if action not in position.legal_actions)
+        for agent, actions in (("clever", None), ("greedy", []), ("greedy", [illegal])):
+            with pytest.raises(ChefsHatError, match="ANALYSIS_REFUSED"):
+                position.evaluate(10, agent=agent, actions=actions)
+        with pytest.raises(ValueError, match="deals"):
+            position.sample(0)
+    with pytest.raises(ChefsHatError, match="STATES_REFUSED"):
+        search.position(b"not a state")
+
+
+def test_without_the_native_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "chefshat_native", None)
+    with pytest.raises(ChefsHatError, match=r"Client\.evaluate") as error:
+        search.position(b"")
+    assert error.value.reason == "NATIVE_MISSING"
+
+
+class Searcher(chefshat.Agent):
+    """Compares what it may know with the situation that it searches, and some estimates with the server's."""
+
+    def __init__(self, client: chefshat.Client) -> None:
+        self.client = client
+        self.decisions = self.compared = 0
+
+    def decide(self, request: chefshat.Decision) -> int:
+        """Takes the best action."""
+        position = search.position(request)
+        assert position.legal_actions.tolist() == request.legal_actions.tolist()
+        hands = position.sample(3)
+        assert (hands[:, request.seat] == request.hand).all()
+        assert (hands.sum(axis=2) == request.cards_left).all()
+        self.decisions += 1
+        estimates = position.evaluate(20, seed=self.decisions)
+        if self.decisions % 10 == 0:
+            asked = pb.EvaluateRequest(situation=request.situation(), rollouts=20, seed=self.decisions, time_ms=10_000)
+            *_, answer = self.client.evaluate(asked)
+            assert [estimate.points for estimate in answer.actions] == estimates.points.tolist()
+            assert [estimate.rollouts for estimate in answer.actions] == estimates.rollouts.tolist()
+            self.compared += 1
+        return estimates.best
+
+
+@pytest.mark.server
+def test_live_decisions(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("search", rules=pb.RuleSet(target_shifts=4), seats=[None, "greedy", "greedy", "random"])
+        agent = Searcher(client)
+        client.play(agent, client.join_room(room.join_code, "Searcher").ticket).raise_for_error()
+    assert agent.decisions > 20
+    assert agent.compared > 1
+
+
+def test_a_decision_without_the_start_of_its_shift() -> None:
+    decision = chefshat.Decision(pb.DecisionRequest(), chefshat.SeatInfo("room", "game", 0))
+    with pytest.raises(ValueError, match="has not arrived"):
+        search.position(decision)
+
+
+def test_the_search_agent_beats_greedy() -> None:
+    # Chance is 2.5 of 10.
+    places = sample_module("search_agent").play(games=10, rollouts=1000)
+    assert len(places) == 10
+    assert places.count(1) >= 7
+
+
+def test_own_rollouts(capsys: pytest.CaptureFixture[str]) -> None:
+    sample_module("own_rollouts").main(games=2, deals=4)
+    assert "points a Shift" in capsys.readouterr().out
