@@ -100,6 +100,24 @@ impl Outcome {
     }
 }
 
+/// How a search of a built-in agent in a room ended. Unless it was searched, the agent plays as it
+/// would without a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SearchOutcome {
+    /// Searched.
+    Searched,
+    /// Too many searches waited or ran.
+    Busy,
+    /// The possible deals are too many to count.
+    Impossible,
+    /// It panicked.
+    Failed,
+}
+
+impl SearchOutcome {
+    const LABELS: [&str; 4] = ["searched", "busy", "impossible", "failed"];
+}
+
 /// What a stream is for.
 #[derive(Debug, Clone, Copy)]
 pub enum StreamKind {
@@ -129,6 +147,7 @@ pub struct Metrics {
     streams: [Gauge; 5],
     connections: Gauge,
     decisions: [Counter; 7],
+    searches: [Counter; 4],
     invalid_answers: Counter,
     thinking: Histogram,
     answers: Histogram,
@@ -170,6 +189,13 @@ impl Default for Metrics {
                 "Decisions of rooms",
                 "outcome",
                 Outcome::LABELS,
+            ),
+            searches: labelled(
+                all,
+                "searches",
+                "Searches of built-in agents in rooms",
+                "outcome",
+                SearchOutcome::LABELS,
             ),
             invalid_answers: plain(all, "invalid_answers", "Illegal actions that were sent"),
             thinking: timed(
@@ -280,6 +306,11 @@ impl Metrics {
         if outcome == Outcome::Answered {
             self.thinking.observe(decided.time_us);
         }
+    }
+
+    /// Counts a search of a built-in agent.
+    pub fn searched(&self, outcome: SearchOutcome) {
+        self.searches[outcome as usize].inc();
     }
 
     /// Counts an illegal action.

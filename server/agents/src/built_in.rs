@@ -38,7 +38,7 @@ impl AgentKind {
     ];
 
     /// The name in messages and commands.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
             Self::RandomUnmasked => "random_unmasked",

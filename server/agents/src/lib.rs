@@ -1,8 +1,9 @@
-//! The built-in agents (random, greedy, trained, replay), network files, and playing one game
+//! The built-in agents (random, greedy, trained, replay), their names, network files, and playing one game
 //! offline. Batches of games are in `chefshat-simulation`.
 
 mod built_in;
 mod greedy;
+mod named;
 mod network;
 mod participant;
 mod play;
@@ -10,6 +11,7 @@ mod recorded;
 mod seeds;
 
 pub use built_in::{AgentKind, AgentMaker, BuiltInAgent, Following};
+pub use named::{AgentNameError, Budget, MonteCarlo, MonteCarloError, NamedAgent};
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkBatch, NetworkError, NetworkInfo, NetworkInput, NetworkOutput,
     table_features,

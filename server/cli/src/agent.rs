@@ -6,15 +6,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::kind::KindArg;
-use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent, RecordedPlayer};
+use chefshat_agents::{AgentNameError, BuiltInAgent, MonteCarlo, NamedAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
-use chefshat_engine::RuleSet;
 use chefshat_record::jsonl;
-use chefshat_search::MonteCarlo;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
-use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
+use super::remote::{MAX_PACE_MS, RemoteAgent, seed_for};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
 
@@ -74,17 +72,16 @@ pub(super) struct AgentCommand {
 /// The agent as named on the command line.
 #[derive(Debug, Clone, Copy)]
 enum AgentArg {
-    Kind(AgentKind),
+    Named(NamedAgent),
     Replay,
-    MonteCarlo(MonteCarlo),
 }
 
 impl AgentArg {
     fn name(self) -> &'static str {
         match self {
-            Self::Kind(kind) => kind.name(),
+            Self::Named(NamedAgent::Kind(kind)) => kind.name(),
+            Self::Named(NamedAgent::MonteCarlo(_)) => MonteCarlo::NAME,
             Self::Replay => BuiltInAgent::REPLAY,
-            Self::MonteCarlo(_) => MonteCarlo::NAME,
         }
     }
 }
@@ -121,20 +118,8 @@ impl AgentCommand {
             Duration::from_millis(self.pace_ms),
         );
         match (self.agent, &self.record, self.seat) {
-            (AgentArg::Kind(kind), None, None) => {
-                Ok(RemoteAgent::new(BuiltInAgent::new(kind, seed), pace))
-            }
-            (AgentArg::MonteCarlo(plays), None, None) => {
-                let pool = rayon::ThreadPoolBuilder::new().build()?;
-                let maker = OnAllCores {
-                    plays,
-                    pool: Arc::new(pool),
-                };
-                Ok(RemoteAgent::made_by(Arc::new(maker), seed, pace))
-            }
-            (AgentArg::Kind(_) | AgentArg::MonteCarlo(_), ..) => {
-                Err("--record and --seat are for the agent replay".into())
-            }
+            (AgentArg::Named(agent), None, None) => Ok(RemoteAgent::named(agent, seed, pace)),
+            (AgentArg::Named(_), ..) => Err("--record and --seat are for the agent replay".into()),
             (AgentArg::Replay, Some(record), Some(seat)) => {
                 let agent = BuiltInAgent::replay(player_of(record, seat)?);
                 Ok(RemoteAgent::new(agent, pace))
@@ -182,26 +167,15 @@ fn agent_arg(name: &str) -> Result<AgentArg, String> {
     if name == BuiltInAgent::REPLAY {
         return Ok(AgentArg::Replay);
     }
-    if name.split(':').next() == Some(MonteCarlo::NAME) {
-        let plays = name.parse::<MonteCarlo>();
-        return (plays.map(AgentArg::MonteCarlo)).map_err(|error| error.to_string());
-    }
-    let others = [MonteCarlo::NAME, BuiltInAgent::REPLAY].join(", ");
-    let kind = agent_kind(name).map_err(|known| format!("{known}, {others}"))?;
-    Ok(AgentArg::Kind(kind))
-}
-
-/// Makes agents that search on the threads of a pool.
-#[derive(Debug)]
-struct OnAllCores {
-    plays: MonteCarlo,
-    pool: Arc<rayon::ThreadPool>,
-}
-
-impl AgentMaker for OnAllCores {
-    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
-        (self.plays).agent_on(rules, seed, Some(Arc::clone(&self.pool)))
-    }
+    name.parse()
+        .map(AgentArg::Named)
+        .map_err(|error| match error {
+            AgentNameError::Unknown(_) => {
+                let known = NamedAgent::NAMES.join(", ");
+                format!("use one of {known}, {}", BuiltInAgent::REPLAY)
+            }
+            AgentNameError::MonteCarlo(error) => error.to_string(),
+        })
 }
 
 /// Loads the player of a seat of a record.

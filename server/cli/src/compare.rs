@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use chefshat_agents::{AgentKind, Network};
-use chefshat_search::{CountedMonteCarlo, MonteCarlo};
+use chefshat_agents::{AgentNameError, NamedAgent, Network};
+use chefshat_search::{MARGIN, Searchers};
 use chefshat_simulation::{
     Comparison, Contender, Duplicate, DuplicateError, Figure, RulesForm, SeatPlan,
 };
@@ -92,7 +92,7 @@ struct Entrant {
     label: String,
     contender: Contender,
     /// Of an agent that searches.
-    search: Option<CountedMonteCarlo>,
+    search: Option<Searchers>,
 }
 
 impl Compare {
@@ -144,33 +144,32 @@ impl Compare {
 impl Entrant {
     /// Reads a built-in agent, or else a network file.
     fn of(given: &str) -> Result<Entrant, CommandError> {
-        if let Some(kind) = AgentKind::from_name(given) {
-            return Ok(Entrant {
-                given: given.to_owned(),
-                label: given.to_owned(),
-                contender: Contender::Kind(kind),
-                search: None,
-            });
-        }
-        if given.split(':').next() == Some(MonteCarlo::NAME) {
-            let plays: MonteCarlo = given.parse().map_err(|error| format!("{error}"))?;
-            let search = CountedMonteCarlo {
-                plays,
-                decisions: Arc::default(),
-            };
-            return Ok(Entrant {
-                given: given.to_owned(),
-                label: plays.to_string(),
-                contender: Contender::Made(Arc::new(search.clone())),
-                search: Some(search),
-            });
+        match given.parse() {
+            Ok(NamedAgent::Kind(kind)) => {
+                return Ok(Entrant {
+                    given: given.to_owned(),
+                    label: given.to_owned(),
+                    contender: Contender::Kind(kind),
+                    search: None,
+                });
+            }
+            Ok(NamedAgent::MonteCarlo(plays)) => {
+                let search = Searchers::new(plays);
+                return Ok(Entrant {
+                    given: given.to_owned(),
+                    label: plays.to_string(),
+                    contender: Contender::Made(Arc::new(search.clone())),
+                    search: Some(search),
+                });
+            }
+            Err(AgentNameError::MonteCarlo(error)) => return Err(error.to_string().into()),
+            Err(AgentNameError::Unknown(_)) => {}
         }
         let path = Path::new(given);
         if !path.exists() {
-            let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+            let known = NamedAgent::NAMES.join(", ");
             return Err(format!(
-                "{given}: neither a built-in agent ({known}, {}) nor a file that exists",
-                MonteCarlo::NAME
+                "{given}: neither a built-in agent ({known}) nor a file that exists"
             )
             .into());
         }
@@ -331,7 +330,7 @@ impl Played<'_> {
 }
 
 /// How an agent that searches took its decisions, in words.
-fn searched(search: &CountedMonteCarlo) -> String {
+fn searched(search: &Searchers) -> String {
     let decisions = &search.decisions;
     let others = decisions.too_many_deals() + decisions.history_unknown();
     format!(
@@ -362,7 +361,7 @@ fn entrant_json(entrant: &Entrant) -> Value {
         return json!({
             "agent": search.plays.to_string(),
             "prior": search.plays.prior.name(),
-            "margin": search.plays.margin,
+            "margin": MARGIN,
             "decisions": {
                 "searched": search.decisions.searched(),
                 "too_many_deals": search.decisions.too_many_deals(),

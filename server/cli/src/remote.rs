@@ -1,13 +1,15 @@
 //! A built-in agent as a remote client: converts a decision request to the engine's observation, so
 //! that the agent decides as it would inside the server.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent};
+use chefshat_agents::{AgentKind, AgentMaker, AgentNameError, BuiltInAgent, NamedAgent};
 use chefshat_client::{ActionId, Agent, nth_legal, v1};
 use chefshat_engine::{Mask, RuleSet};
 use chefshat_record::convert::{event_from_proto, rules_from_proto, seat_from_number};
+use chefshat_search::Searchers;
+use rayon::ThreadPool;
 use sha2::{Digest as _, Sha256};
 use tracing::warn;
 
@@ -37,6 +39,21 @@ impl RemoteAgent {
             pace,
             seat: None,
             rules: None,
+        }
+    }
+
+    /// Plays as a built-in agent. One that searches does so on the threads of a pool for all of this
+    /// process.
+    pub(super) fn named(named: NamedAgent, seed: [u8; 32], pace: Duration) -> Self {
+        match named {
+            NamedAgent::Kind(kind) => Self::new(BuiltInAgent::new(kind, seed), pace),
+            NamedAgent::MonteCarlo(plays) => {
+                let searchers = Searchers {
+                    pool: search_pool(),
+                    ..Searchers::new(plays)
+                };
+                Self::made_by(Arc::new(searchers), seed, pace)
+            }
         }
     }
 
@@ -126,6 +143,13 @@ impl Agent for RemoteAgent {
     }
 }
 
+/// The threads of searches, one for each core; `None` if the operating system starts none.
+fn search_pool() -> Option<Arc<ThreadPool>> {
+    static POOL: OnceLock<Option<Arc<ThreadPool>>> = OnceLock::new();
+    let start = || rayon::ThreadPoolBuilder::new().build().ok().map(Arc::new);
+    POOL.get_or_init(start).clone()
+}
+
 /// Derives a seed for one purpose from the user's number: SHA-256(purpose ‖ number, 8 bytes
 /// little-endian); random without a number.
 pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
@@ -140,20 +164,20 @@ pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
 }
 
 /// Parses the name of a built-in agent.
-pub(super) fn agent_kind(name: &str) -> Result<AgentKind, String> {
-    AgentKind::from_name(name).ok_or_else(|| {
-        let known = AgentKind::ALL.map(AgentKind::name).join(", ");
-        format!("use one of {known}")
+pub(super) fn named_agent(name: &str) -> Result<NamedAgent, String> {
+    name.parse().map_err(|error| match error {
+        AgentNameError::Unknown(_) => format!("use one of {}", NamedAgent::NAMES.join(", ")),
+        AgentNameError::MonteCarlo(error) => error.to_string(),
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use chefshat_agents::MonteCarlo;
     use chefshat_agents::RecordedPlayer;
     use chefshat_engine::RecordedDecision;
     use chefshat_engine::{DecisionKind, Game, RuleSetSpec, Seat, Seed, Stop, Viewer};
     use chefshat_record::convert::{By, event_kind, rules_to_proto};
-    use chefshat_search::MonteCarlo;
 
     use crate::remote::*;
     use chefshat_record::convert::observation_to_proto;
@@ -230,8 +254,9 @@ mod tests {
         };
         let rules = rules.validate().expect("a rule set");
         let seat = Seat::new(1);
-        let mut inside = plays.agent(&rules, [3; 32]);
-        let mut remote = RemoteAgent::made_by(Arc::new(plays), [3; 32], Duration::ZERO);
+        let searchers = Searchers::new(plays);
+        let mut inside = searchers.agent(&rules, [3; 32]);
+        let mut remote = RemoteAgent::made_by(Arc::new(searchers), [3; 32], Duration::ZERO);
         remote.on_attached(&v1::Attached {
             seat: 1,
             ..v1::Attached::default()

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable};
 use clap::Args;
@@ -27,9 +27,10 @@ Examples:
   chefshat simulate --games 2000 --seed 7
   chefshat simulate --games 500 --agents greedy,random_unmasked,random --players 3 --reward validity
   chefshat simulate --games 50 --records simulated/
+  chefshat simulate --games 20 --agents monte_carlo:64,trained,trained,trained
   chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
 
-The same seed gives the same output, on any number of threads.";
+The same seed gives the same output, on any number of threads, unless monte_carlo has a budget in milliseconds.";
 
 /// Play many games offline on all cores and print statistics.
 #[derive(Debug, Args)]
@@ -41,9 +42,10 @@ pub(super) struct Simulate {
     /// Seed of all random choices.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// The agents by seat, separated by commas. Default: greedy on seat 0, random on the others.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agents())]
-    agents: Vec<AgentKind>,
+    /// The agents by seat, separated by commas; monte_carlo takes a budget for each decision:
+    /// monte_carlo:50ms or monte_carlo:400 (rollouts). Default: greedy on seat 0, random on the others.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = str::parse::<NamedAgent>)]
+    agents: Vec<NamedAgent>,
     /// Reward turns by this scheme and print each seat's mean reward.
     #[arg(long, value_name = "SCHEME", value_parser = schemes())]
     reward: Option<RewardScheme>,
@@ -61,11 +63,6 @@ pub(super) struct Simulate {
     json: bool,
     #[command(flatten)]
     rules: RulesArgs,
-}
-
-fn agents() -> impl TypedValueParser<Value = AgentKind> {
-    PossibleValuesParser::new(AgentKind::ALL.map(AgentKind::name))
-        .map(|name| AgentKind::from_name(&name).expect("the possible values are the names"))
 }
 
 fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
@@ -101,8 +98,8 @@ impl Simulate {
         let rules = self.rules.rules()?;
         let players = rules.players();
         let agents = if self.agents.is_empty() {
-            let mut agents = vec![AgentKind::Random; players];
-            agents[0] = AgentKind::Greedy;
+            let mut agents = vec![NamedAgent::from(AgentKind::Random); players];
+            agents[0] = AgentKind::Greedy.into();
             agents
         } else {
             self.agents.clone()

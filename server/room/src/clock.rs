@@ -37,6 +37,9 @@ impl Core {
             return Some(open.released);
         }
         let seat = open.decision.seat;
+        if self.awaits_search() {
+            return None;
+        }
         Some(if self.is_automatic(seat) {
             open.released + self.wait_of(open)
         } else {
@@ -108,7 +111,8 @@ impl Core {
                 budget -= 1;
                 continue;
             }
-            if !self.is_automatic(open.decision.seat) || open.released + self.wait_of(open) > now {
+            let waits = !self.is_automatic(open.decision.seat) || self.awaits_search();
+            if waits || open.released + self.wait_of(open) > now {
                 return;
             }
             budget = budget.saturating_sub(self.cost_of_open());
@@ -391,13 +395,14 @@ impl Core {
         let seed = self.header.seed.agent_seed(seat.index());
         self.seats[seat.index()]
             .agent
-            .get_or_insert_with(|| Box::new(BuiltInAgent::new(substitute, seed)));
+            .get_or_insert_with(|| Box::new(BuiltInAgent::new(substitute.without_search(), seed)));
     }
 
     fn decide_automatically(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let seat = open.decision.seat;
         let attempts = open.attempts;
+        let found = open.search.found();
         let observation = self.observe(Viewer::Seat(seat));
         let observation = observation.expect("a decision is open");
         let legal = self.legal_actions();
@@ -406,7 +411,7 @@ impl Core {
             .agent
             .as_mut()
             .expect("an automatic seat has its agent");
-        let action = agent.decide(&observation, &legal);
+        let action = found.unwrap_or_else(|| agent.decide(&observation, &legal));
         let bank_left = state.bank_left;
         if legal.contains(action) {
             let source = if state.substituted {

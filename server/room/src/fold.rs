@@ -10,6 +10,7 @@ use super::{
 };
 use crate::journal::{Change, Decided, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
+use crate::search::Search;
 use crate::table::{PhysicalTable, RoomGame, micros};
 
 impl Core {
@@ -278,6 +279,7 @@ impl Core {
                     recheck_at: Duration::ZERO,
                     paused_since: None,
                     attempts: 0,
+                    search: Search::NotStarted,
                 }
             });
     }

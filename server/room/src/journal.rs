@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::{AgentKind, RecordedPlayer};
+use chefshat_agents::{NamedAgent, RecordedPlayer};
 use chefshat_engine::SeedPlan;
 pub use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, RuleSet, Script, Seat};
@@ -24,7 +24,7 @@ pub enum Fill {
         reserved_for: Option<ParticipantKind>,
     },
     /// A built-in agent.
-    BuiltIn(AgentKind),
+    BuiltIn(NamedAgent),
     /// A built-in agent that imitates a recorded player.
     Replay(RecordedSeat),
     /// A player of this kind who sits at the physical table with real cards. Nobody connects.

@@ -17,6 +17,7 @@ pub mod log;
 mod physical;
 pub mod policy;
 mod revive;
+mod search;
 mod table;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
@@ -26,7 +27,7 @@ mod tests;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::BuiltInAgent;
+use chefshat_agents::{BuiltInAgent, NamedAgent};
 use chefshat_engine::{
     ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
@@ -42,9 +43,11 @@ pub use limits::{
     MAX_REPORTS, MAX_SEATINGS, RECALL_TIME,
 };
 pub use revive::BadJournal;
+pub use search::SearchRequest;
 pub use table::{Made, PhysicalTable};
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
+use search::Search;
 
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
@@ -114,6 +117,8 @@ struct SeatState {
     recalled: bool,
     connection_events: u32,
     expressions: u32,
+    /// The built-in agent of the seat or its substitute. Of one that searches: what it plays without
+    /// a search.
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
     ever_substituted: bool,
@@ -154,6 +159,8 @@ pub struct OpenDecision {
     paused_since: Option<Duration>,
     /// Invalid attempts so far.
     attempts: u32,
+    /// The search for it, if an agent that searches takes it.
+    search: Search,
 }
 
 impl OpenDecision {
@@ -169,6 +176,7 @@ impl OpenDecision {
         self.announced = false;
         self.start = None;
         self.recheck_at = Duration::ZERO;
+        self.search = Search::NotStarted;
     }
 }
 
@@ -180,8 +188,10 @@ impl Core {
             .iter()
             .enumerate()
             .map(|(index, fill)| {
-                let built_in =
-                    |kind| Box::new(BuiltInAgent::new(kind, header.seed.agent_seed(index)));
+                let built_in = |agent: NamedAgent| {
+                    let seed = header.seed.agent_seed(index);
+                    Box::new(BuiltInAgent::new(agent.without_search(), seed))
+                };
                 SeatState {
                     fill: *fill,
                     participant: None,
@@ -194,7 +204,7 @@ impl Core {
                     connection_events: 0,
                     expressions: 0,
                     agent: match fill {
-                        Fill::BuiltIn(kind) => Some(built_in(*kind)),
+                        Fill::BuiltIn(agent) => Some(built_in(*agent)),
                         Fill::Replay(_) => header
                             .recorded
                             .get(&index)
@@ -347,7 +357,7 @@ impl Core {
             return name.clone();
         }
         match fill {
-            Fill::BuiltIn(kind) => kind.name().to_owned(),
+            Fill::BuiltIn(agent) => agent.name(),
             // Named after the agent, which is what the reader of a record wants to know.
             Fill::Replay(player) => {
                 let game = player.game.to_string();

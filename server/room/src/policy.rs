@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use chefshat_agents::{AgentKind, ParticipantKind};
+use chefshat_agents::{AgentKind, NamedAgent, ParticipantKind};
 use chefshat_engine::RewardScheme;
 
 /// When a game is aborted because participants are lost.
@@ -72,7 +72,7 @@ pub struct Policy {
     /// Timeouts in a row after which a seat is substituted.
     pub max_timeouts: u32,
     /// The agent that plays for a substituted seat.
-    pub substitute: AgentKind,
+    pub substitute: NamedAgent,
     /// When the game is aborted instead of substituting a seat.
     pub abort: AbortPolicy,
     /// The scheme of the rewards that seats receive.
@@ -131,7 +131,7 @@ impl Default for Policy {
             bank: Duration::from_secs(60),
             max_invalid_attempts: Some(10),
             max_timeouts: 3,
-            substitute: AgentKind::Random,
+            substitute: NamedAgent::Kind(AgentKind::Random),
             abort: AbortPolicy::AllLost,
             reward_scheme: None,
             pace: None,

@@ -1,16 +1,13 @@
 //! The agent `monte_carlo`: starts from what a policy would do and deviates where rollouts in
 //! possible deals show that another action gains points.
 
-use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use chefshat_agents::{AgentKind, AgentMaker, BuiltInAgent, Following};
+use chefshat_agents::{AgentMaker, Budget, BuiltInAgent, Following, MonteCarlo, NamedAgent};
 use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
 use rayon::ThreadPool;
-use thiserror::Error;
 
 use crate::{
     Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
@@ -19,151 +16,51 @@ use crate::{
 
 /// Steps of counting deals that the agent spends on a decision at most.
 const MAX_STEPS: u64 = 200_000;
-/// The most rollouts of a decision.
-const MAX_ROLLOUTS: u64 = 1_000_000;
-/// The most milliseconds of a decision.
-const MAX_MS: u64 = 60_000;
-
+/// How many standard errors the gain of an action must exceed 0 for `monte_carlo` to take it.
+pub const MARGIN: f64 = 3.0;
 /// Fewest deals that can show a gain: a few are often equal by chance, and their standard error 0.
 const MIN_DEALS: u64 = 16;
 
-/// What a decision may cost. Every legal action is tried in 4 deals at least, even if that costs
-/// more.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
-pub enum Budget {
-    /// About this many rollouts: the same seed plays the same game.
-    Rollouts(u64),
-    /// About this much time, counting the possible deals included.
-    Time(Duration),
-}
-
-/// How the agent `monte_carlo` plays. As text: `monte_carlo`, then optionally `:` and the budget of a
-/// decision (`50ms` or a number of rollouts), then optionally `:` and the agent of the rollouts.
-#[derive(Copy, Clone, PartialEq, Debug)]
-pub struct MonteCarlo {
-    /// What a decision may cost.
-    pub budget: Budget,
-    /// The agents of the rollouts.
-    pub rollouts: AgentKind,
-    /// The agent whose action is taken unless another gains points.
-    pub prior: AgentKind,
-    /// How many standard errors the gain must exceed 0.
-    pub margin: f64,
-}
-
-impl MonteCarlo {
-    /// The name in messages and commands.
-    pub const NAME: &str = "monte_carlo";
-}
-
-impl Default for MonteCarlo {
-    fn default() -> MonteCarlo {
-        MonteCarlo {
-            budget: Budget::Time(Duration::from_millis(50)),
-            rollouts: AgentKind::Trained,
-            prior: AgentKind::Trained,
-            margin: 3.0,
-        }
+/// Creates the agent of a name for a seat of a game under these rules. One that searches does so on
+/// the caller's thread. `seed` determines its random choices.
+pub fn named_agent(named: NamedAgent, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
+    match named {
+        NamedAgent::Kind(kind) => BuiltInAgent::new(kind, seed),
+        NamedAgent::MonteCarlo(plays) => Searchers::new(plays).agent(rules, seed),
     }
 }
 
-/// Why a text names no agent that searches.
-#[derive(Clone, Eq, PartialEq, Debug, Error)]
-#[error(
-    "{0}: write monte_carlo, monte_carlo:50ms, monte_carlo:64 (rollouts) or monte_carlo:50ms:greedy (the agent of the rollouts: random, greedy or trained)"
-)]
-pub struct MonteCarloError(String);
-
-impl FromStr for MonteCarlo {
-    type Err = MonteCarloError;
-
-    fn from_str(text: &str) -> Result<MonteCarlo, MonteCarloError> {
-        let mut agent = MonteCarlo::default();
-        let mut parts = text.split(':');
-        let named = parts.next() == Some(MonteCarlo::NAME);
-        let budget = parts.next().map(|budget| match budget.strip_suffix("ms") {
-            Some(ms) => (ms.parse().ok())
-                .filter(|ms| (1..=MAX_MS).contains(ms))
-                .map(|ms| Budget::Time(Duration::from_millis(ms))),
-            None => (budget.parse().ok())
-                .filter(|rollouts| (1..=MAX_ROLLOUTS).contains(rollouts))
-                .map(Budget::Rollouts),
-        });
-        let policy = parts.next().map(|policy| {
-            AgentKind::from_name(policy).filter(|kind| *kind != AgentKind::RandomUnmasked)
-        });
-        if let (true, Some(budget), Some(policy), None) = (
-            named,
-            budget.unwrap_or(Some(agent.budget)),
-            policy.unwrap_or(Some(agent.rollouts)),
-            parts.next(),
-        ) {
-            (agent.budget, agent.rollouts) = (budget, policy);
-            return Ok(agent);
-        }
-        Err(MonteCarloError(text.to_owned()))
-    }
-}
-
-impl fmt::Display for MonteCarlo {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.budget {
-            Budget::Rollouts(rollouts) => write!(f, "{}:{rollouts}", MonteCarlo::NAME)?,
-            Budget::Time(time) => write!(f, "{}:{}ms", MonteCarlo::NAME, time.as_millis())?,
-        }
-        write!(f, ":{}", self.rollouts.name())
-    }
-}
-
-impl AgentMaker for MonteCarlo {
-    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
-        self.agent_on(rules, seed, None)
-    }
-}
-
-impl MonteCarlo {
-    /// The agent for a seat of a game under these rules, on the threads of a pool or on the caller's
-    /// alone. `seed` determines its random choices.
-    pub fn agent_on(
-        self,
-        rules: &RuleSet,
-        seed: [u8; 32],
-        pool: Option<Arc<ThreadPool>>,
-    ) -> BuiltInAgent {
-        self.counted(rules, seed, pool, Arc::default())
-    }
-
-    fn counted(
-        self,
-        rules: &RuleSet,
-        seed: [u8; 32],
-        pool: Option<Arc<ThreadPool>>,
-        decisions: Arc<Decisions>,
-    ) -> BuiltInAgent {
-        BuiltInAgent::following(Box::new(Player {
-            plays: self,
-            rules: *rules,
-            prior: BuiltInAgent::new(self.prior, seed),
-            chance: Chance::stream(seed, 1),
-            history: None,
-            pool,
-            decisions,
-        }))
-    }
-}
-
-/// Agents that count how they take their decisions.
+/// Creates agents that search, and counts how they take their decisions.
 #[derive(Clone, Debug)]
-pub struct CountedMonteCarlo {
+pub struct Searchers {
     /// How they play.
     pub plays: MonteCarlo,
+    /// The threads on which they search; `None`: the caller's alone.
+    pub pool: Option<Arc<ThreadPool>>,
     /// The decisions of all of them.
     pub decisions: Arc<Decisions>,
 }
 
-impl AgentMaker for CountedMonteCarlo {
+impl Searchers {
+    /// Agents that search on their caller's thread.
+    pub fn new(plays: MonteCarlo) -> Searchers {
+        Searchers {
+            plays,
+            pool: None,
+            decisions: Arc::default(),
+        }
+    }
+}
+
+impl AgentMaker for Searchers {
     fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
-        (self.plays).counted(rules, seed, None, Arc::clone(&self.decisions))
+        BuiltInAgent::following(Box::new(Player {
+            plays: self.clone(),
+            rules: *rules,
+            prior: BuiltInAgent::new(self.plays.prior, seed),
+            chance: Chance::stream(seed, 1),
+            history: None,
+        }))
     }
 }
 
@@ -192,8 +89,8 @@ impl Decisions {
         self.history_unknown.load(Ordering::Relaxed)
     }
 
-    fn count(&self, sampler: Result<&Sampler, &KnowledgeError>) {
-        let number = match sampler {
+    fn count(&self, found: Result<(), &KnowledgeError>) {
+        let number = match found {
             Ok(_) => &self.searched,
             Err(KnowledgeError::TooManySteps(_)) => &self.too_many_deals,
             Err(_) => &self.history_unknown,
@@ -215,16 +112,61 @@ fn surely_better(estimates: &[Estimate], margin: f64) -> Option<ActionId> {
         .map(|(_, action)| action)
 }
 
+/// A decision of a seat, and what the seat saw of the Shift.
+#[derive(Clone, Debug)]
+pub struct Choice<'a> {
+    /// The rules.
+    pub rules: RuleSet,
+    /// What the seat sees.
+    pub observation: &'a Observation,
+    /// The legal actions.
+    pub legal: &'a Mask,
+    /// The events of the Shift.
+    pub history: &'a ShiftHistory,
+    /// The action of the prior.
+    pub prior: ActionId,
+}
+
+impl Choice<'_> {
+    /// Searches as `monte_carlo` does. `stopped` ends the search early.
+    ///
+    /// # Errors
+    /// Nothing can be searched: there are too many possible deals to count, or the history of the
+    /// Shift is not known from its start.
+    pub fn search(
+        &self,
+        plays: MonteCarlo,
+        seed: [u8; 32],
+        pool: Option<&ThreadPool>,
+        stopped: impl Fn() -> bool,
+    ) -> Result<ActionId, KnowledgeError> {
+        let start = Instant::now();
+        let knowledge = Knowledge::new(self.rules, self.observation, self.history)?;
+        let sampler = Sampler::new(knowledge, MAX_STEPS)?;
+        let others = self.legal.iter().filter(|action| *action != self.prior);
+        let actions: Vec<ActionId> = std::iter::once(self.prior).chain(others).collect();
+        let method = Method {
+            policy: RolloutPolicy::Kind(plays.rollouts),
+            allocation: Allocation::Halving,
+        };
+        let progress = |rollouts: u64| match plays.budget {
+            _ if stopped() => 1.0,
+            Budget::Rollouts(all) => rollouts as f64 / all as f64,
+            Budget::Time(time) => start.elapsed().as_secs_f64() / time.as_secs_f64(),
+        };
+        let estimates = evaluate(&sampler, &actions, &method, seed, pool, progress);
+        Ok(surely_better(&estimates, MARGIN).unwrap_or(self.prior))
+    }
+}
+
 /// The agent of one seat.
 #[derive(Clone, Debug)]
 struct Player {
-    plays: MonteCarlo,
+    plays: Searchers,
     rules: RuleSet,
     prior: BuiltInAgent,
     chance: Chance,
     history: Option<ShiftHistory>,
-    pool: Option<Arc<ThreadPool>>,
-    decisions: Arc<Decisions>,
 }
 
 impl Following for Player {
@@ -239,37 +181,13 @@ impl Following for Player {
     }
 
     fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId {
-        let start = Instant::now();
         let prior = self.prior.decide(observation, legal);
         if legal.len() <= 1 {
             return prior;
         }
-        let sampler = self.sampler(observation);
-        self.decisions.count(sampler.as_ref());
-        let Ok(sampler) = sampler else {
-            return prior;
-        };
-        let others = legal.iter().filter(|action| *action != prior);
-        let actions: Vec<ActionId> = std::iter::once(prior).chain(others).collect();
-        let method = Method {
-            policy: RolloutPolicy::Kind(self.plays.rollouts),
-            allocation: Allocation::Halving,
-        };
-        let budget = self.plays.budget;
-        let progress = |rollouts: u64| match budget {
-            Budget::Rollouts(all) => rollouts as f64 / all as f64,
-            Budget::Time(time) => start.elapsed().as_secs_f64() / time.as_secs_f64(),
-        };
-        let seed = self.chance.seed();
-        let estimates = evaluate(
-            &sampler,
-            &actions,
-            &method,
-            seed,
-            self.pool.as_deref(),
-            progress,
-        );
-        surely_better(&estimates, self.plays.margin).unwrap_or(prior)
+        let found = self.search(observation, legal, prior);
+        self.plays.decisions.count(found.as_ref().map(|_| ()));
+        found.unwrap_or(prior)
     }
 
     fn boxed_clone(&self) -> Box<dyn Following> {
@@ -278,12 +196,21 @@ impl Following for Player {
 }
 
 impl Player {
-    /// The deals that are possible. An error if there are too many to count, or the history of the
-    /// Shift is not known from its start.
-    fn sampler(&self, observation: &Observation) -> Result<Sampler, KnowledgeError> {
-        let history = self.history.as_ref().ok_or(KnowledgeError::History)?;
-        let knowledge = Knowledge::new(self.rules, observation, history)?;
-        Sampler::new(knowledge, MAX_STEPS)
+    fn search(
+        &mut self,
+        observation: &Observation,
+        legal: &Mask,
+        prior: ActionId,
+    ) -> Result<ActionId, KnowledgeError> {
+        let choice = Choice {
+            rules: self.rules,
+            observation,
+            legal,
+            history: self.history.as_ref().ok_or(KnowledgeError::History)?,
+            prior,
+        };
+        let Searchers { plays, pool, .. } = &self.plays;
+        choice.search(*plays, self.chance.seed(), pool.as_deref(), || false)
     }
 }
 

@@ -13,7 +13,8 @@ use thiserror::Error;
 use crate::BatchTable;
 use crate::fold::fold_in_order;
 use chefshat_agents::is_wrong_action;
-use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed, play_agents};
+use chefshat_agents::{BuiltInAgent, Listener, NamedAgent, agent_seed, game_seed, play_agents};
+use chefshat_search::named_agent;
 
 /// Games played by one thread at a time. Part of the result: it decides how rewards and scores are
 /// grouped for summing.
@@ -23,7 +24,7 @@ const CHUNK: u64 = 32;
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct Batch {
     rules: RuleSet,
-    agents: BySeat<AgentKind>,
+    agents: BySeat<NamedAgent>,
     games: u64,
     seed: u64,
     scheme: Option<RewardScheme>,
@@ -54,15 +55,16 @@ impl Batch {
     /// If there is not one agent for each seat, or `games` is 0.
     pub fn new(
         rules: RuleSet,
-        agents: &[AgentKind],
+        agents: &[impl Into<NamedAgent> + Copy],
         games: u64,
         seed: u64,
     ) -> Result<Batch, BatchError> {
         let players = rules.players();
-        let agents = BySeat::from_slice(agents)
+        let named: Vec<NamedAgent> = agents.iter().map(|&agent| agent.into()).collect();
+        let agents = BySeat::from_slice(&named)
             .filter(|agents| agents.len() == players)
             .ok_or(BatchError::Agents {
-                given: agents.len(),
+                given: named.len(),
                 players,
             })?;
         if games == 0 {
@@ -100,7 +102,7 @@ impl Batch {
     }
 
     /// The agents by seat.
-    pub fn agents(&self) -> &BySeat<AgentKind> {
+    pub fn agents(&self) -> &BySeat<NamedAgent> {
         &self.agents
     }
 
@@ -135,8 +137,8 @@ impl Batch {
         // An array, because agents with their generators are not `Copy`.
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
-            let kind = self.agents.get(seat).copied().unwrap_or_default();
-            BuiltInAgent::new(kind, agent_seed(seed, seat))
+            let agent = self.agents.get(seat).copied().unwrap_or_default();
+            named_agent(agent, &self.rules, agent_seed(seed, seat))
         });
         let attempts = self.max_invalid_attempts;
         play_agents(self.rules, seed, attempts, &mut agents, listener)

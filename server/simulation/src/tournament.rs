@@ -9,7 +9,8 @@ use thiserror::Error;
 
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::seating_agent_seed;
-use chefshat_agents::{AgentKind, BuiltInAgent, Listener, game_seed, play_agents};
+use chefshat_agents::{BuiltInAgent, Listener, NamedAgent, game_seed, play_agents};
+use chefshat_search::named_agent;
 use chefshat_tournament::{Change, Ended, Game, SeatStatistics};
 use chefshat_tournament::{State, Tournament};
 
@@ -48,13 +49,14 @@ pub fn play_offline(
             seats,
         });
     }
-    let kinds = tournament.participants().iter().enumerate();
-    let kinds = kinds.map(|(who, entrant)| entrant.built_in.ok_or(OfflineProblem::NotBuiltIn(who)));
-    let kinds: Vec<AgentKind> = kinds.collect::<Result<_, _>>()?;
+    let agents = tournament.participants().iter().enumerate();
+    let agents =
+        agents.map(|(who, entrant)| entrant.built_in.ok_or(OfflineProblem::NotBuiltIn(who)));
+    let agents: Vec<NamedAgent> = agents.collect::<Result<_, _>>()?;
     while tournament.state() == State::Playing {
         // Built-in agents never wait, so time stands still.
         let Some(change) = tournament.next(0) else {
-            play_called(tournament, &kinds, rules, seed, &progress);
+            play_called(tournament, &agents, rules, seed, &progress);
             continue;
         };
         tournament.fold(&change);
@@ -65,7 +67,7 @@ pub fn play_offline(
 /// Plays all games that have been called.
 fn play_called(
     tournament: &mut Tournament,
-    kinds: &[AgentKind],
+    agents: &[NamedAgent],
     rules: RuleSet,
     seed: u64,
     progress: &(impl Fn() + Sync),
@@ -78,7 +80,7 @@ fn play_called(
     let changes: Vec<Change> = called
         .into_par_iter()
         .map(|index| {
-            let ended = play_game(&tournament.games()[index], index, kinds, rules, seed);
+            let ended = play_game(&tournament.games()[index], index, agents, rules, seed);
             progress();
             tournament
                 .ended(index, ended)
@@ -88,12 +90,16 @@ fn play_called(
     changes.iter().for_each(|change| tournament.fold(change));
 }
 
-fn play_game(game: &Game, index: usize, kinds: &[AgentKind], rules: RuleSet, seed: u64) -> Ended {
+fn play_game(game: &Game, index: usize, named: &[NamedAgent], rules: RuleSet, seed: u64) -> Ended {
     let deal = game.deal.map_or(index as u64, u64::from);
     let dealt_by = game_seed(seed, deal);
     let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|seat| {
-        let kind = game.seats.get(seat).map(|&who| kinds[who]);
-        BuiltInAgent::new(kind.unwrap_or_default(), agent_seed(dealt_by, index, seat))
+        let kind = game.seats.get(seat).map(|&who| named[who]);
+        named_agent(
+            kind.unwrap_or_default(),
+            &rules,
+            agent_seed(dealt_by, index, seat),
+        )
     });
     let mut listener = Witness {
         recorder: MetricsRecorder::new(rules, None),

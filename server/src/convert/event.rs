@@ -46,7 +46,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         }),
         RoomEvent::Substituted(seat) => Kind::Substituted(v1::Substituted {
             seat: seat_number(*seat),
-            built_in_agent: core.header().policy.substitute.name().into(),
+            built_in_agent: core.header().policy.substitute.name(),
         }),
         RoomEvent::GameStarted => {
             let mut started = game_started(core);

@@ -1,7 +1,8 @@
 //! Translation between rooms and the protocol: policies, seats, decisions, the log.
 //! `chefshat-record` translates rule sets and the engine's events, which records share;
-//! `chefshat-vector` vector environments and the names of built-in agents.
+//! `chefshat-vector` vector environments.
 
+mod agent;
 mod decision;
 mod event;
 mod kind;
@@ -18,6 +19,7 @@ mod summary;
 mod table;
 mod tournament;
 
+pub use agent::check_real_cards;
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};

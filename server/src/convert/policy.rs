@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
-use chefshat_vector::agent_from_proto;
 
+use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy, Visibility};
@@ -89,7 +89,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
         bank_ms: Some(millis(policy.bank)),
         max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
         max_timeouts: Some(policy.max_timeouts),
-        substitute: policy.substitute.name().into(),
+        substitute: policy.substitute.name(),
         abort: match policy.abort {
             AbortPolicy::AllLost => v1::AbortPolicy::AllLost,
             AbortPolicy::AnyLost => v1::AbortPolicy::AnyLost,

@@ -7,6 +7,7 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
+use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
 use super::name::checked_name;
 use super::policy::policy_of;
@@ -14,7 +15,6 @@ use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Core, State};
-use chefshat_vector::agent_from_proto;
 
 /// The participants of a new room's seats. An empty list leaves all seats open.
 ///
@@ -100,7 +100,7 @@ fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
         name: String::new(),
         filled_by: Some(match fill {
             Fill::Open { reserved_for } => FilledBy::ReservedFor(kind_to_proto(*reserved_for)),
-            Fill::BuiltIn(kind) => FilledBy::BuiltInAgent(kind.name().into()),
+            Fill::BuiltIn(kind) => FilledBy::BuiltInAgent(kind.name()),
             Fill::Replay(player) => FilledBy::Replay(player_to_proto(*player)),
             Fill::AtTable(kind) => FilledBy::AtTable(kind_to_proto(Some(*kind))),
         }),
@@ -204,8 +204,8 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
             let standing = core.standing(seat);
             let (reserved_for, built_in) = match standing.fill {
                 Fill::Open { reserved_for } => (reserved_for, None),
-                Fill::BuiltIn(kind) => (None, Some(kind.name())),
-                Fill::Replay(_) => (None, Some(BuiltInAgent::REPLAY)),
+                Fill::BuiltIn(agent) => (None, Some(agent.name())),
+                Fill::Replay(_) => (None, Some(BuiltInAgent::REPLAY.to_owned())),
                 Fill::AtTable(_) => (None, None),
             };
             let participant = standing.participant;
@@ -216,11 +216,11 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 kind: kind_to_proto(
                     participant
                         .map(|participant| participant.kind)
-                        .or(built_in.map(|_| ParticipantKind::Agent)),
+                        .or(built_in.as_ref().map(|_| ParticipantKind::Agent)),
                 ),
                 reserved_for: kind_to_proto(reserved_for),
-                built_in_agent: built_in.unwrap_or_default().to_owned(),
                 connected: standing.connected || built_in.is_some() || at_table,
+                built_in_agent: built_in.unwrap_or_default(),
                 substituted: standing.substituted,
                 replay: match standing.fill {
                     Fill::Replay(player) => Some(player_to_proto(player)),

@@ -1,6 +1,6 @@
 //! Settings of tournaments, checked, and tournaments as messages.
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
@@ -9,12 +9,12 @@ use chefshat_tournament::{
     Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
 };
 
+use super::agent::{agent_from_proto, check_real_cards};
 use super::kind::{kind_from_proto, kind_to_proto};
 use super::number;
 use super::policy::{policy_from_proto, policy_to_proto};
 use chefshat_room::ids::Id;
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_vector::agent_from_proto;
 
 /// Defaults of fields that a request leaves unset.
 const DEFAULT_PARTICIPANTS: u32 = 64;
@@ -34,7 +34,7 @@ pub struct TournamentPlan {
     /// Kinds that may join; empty: all.
     pub kinds: Vec<ParticipantKind>,
     /// The built-in agents that take part.
-    pub built_in: Vec<AgentKind>,
+    pub built_in: Vec<NamedAgent>,
     /// The seed of all deals, if the owner sets it.
     pub deal_seed: Option<[u8; 32]>,
 }
@@ -54,7 +54,7 @@ pub fn tournament_plan(
     let standard = |value: u32, standard: u32| if value == 0 { standard } else { value };
     let count = |value: u32| usize::try_from(value).unwrap_or(usize::MAX);
     let no_show_ms = standard(message.no_show_time_ms, DEFAULT_NO_SHOW_MS);
-    let built_in: Vec<AgentKind> = (message.built_in_agents.iter())
+    let built_in: Vec<NamedAgent> = (message.built_in_agents.iter())
         .map(|name| {
             agent_from_proto("built_in_agents", name)?
                 .ok_or_else(|| FieldProblem::new("built_in_agents", "a built-in agent has no name"))
@@ -70,7 +70,12 @@ pub fn tournament_plan(
     }
     let physical_tables = count(message.physical_tables);
     let deal_seed = seed("deal_seed", &message.deal_seed)?;
+    let filler = agent_from_proto("filler", &message.filler)?.unwrap_or(AgentKind::Random.into());
+    let policy = policy(message, deals, no_show_ms)?;
     if physical_tables > 0 {
+        check_real_cards("filler", filler)?;
+        check_real_cards("policy.substitute", policy.substitute)?;
+        (built_in.iter()).try_for_each(|agent| check_real_cards("built_in_agents", *agent))?;
         Referee::check_rules(&rules).map_err(|problem| FieldProblem::new("rules", problem))?;
         if deal_seed.is_some() {
             let problem = "leave it unset: at a physical table the server deals nothing";
@@ -93,9 +98,9 @@ pub fn tournament_plan(
             max_parallel: count(standard(message.max_parallel_games, DEFAULT_PARALLEL)),
             physical_tables,
             draw_seed: seed("draw_seed", &message.draw_seed)?.unwrap_or(draw_seed),
-            filler: agent_from_proto("filler", &message.filler)?.unwrap_or(AgentKind::Random),
+            filler,
         },
-        policy: policy(message, deals, no_show_ms)?,
+        policy,
         kinds: (message.kinds.iter())
             .map(|kind| {
                 kind_from_proto("kinds", *kind)?
@@ -205,9 +210,7 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
             .map(|kind| kind_to_proto(Some(*kind)))
             .collect(),
         max_participants: number(core.max_participants),
-        built_in_agents: (plan.built_in.iter())
-            .map(|kind| kind.name().to_owned())
-            .collect(),
+        built_in_agents: (plan.built_in.iter()).map(|kind| kind.name()).collect(),
         start_when_joined: core.start_when_joined.map_or(0, number),
         no_show_time_ms: u32::try_from(core.no_show_ms).unwrap_or(u32::MAX),
         max_calls: core.max_calls,
@@ -255,8 +258,7 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
             participant: number(index),
             name: entrant.name.clone(),
             kind: kind_to_proto(Some(entrant.kind)),
-            built_in_agent: (entrant.built_in)
-                .map_or_else(String::new, |kind| kind.name().to_owned()),
+            built_in_agent: (entrant.built_in).map_or_else(String::new, |kind| kind.name()),
             filler: entrant.filler,
             stateless: entrant.stateless,
             max_games: number(entrant.max_games),

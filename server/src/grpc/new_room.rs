@@ -70,6 +70,9 @@ pub(super) async fn new_room(
     let refused = |problem: FieldProblem| field("SEATS_REFUSED", &problem);
     let fills = convert::fills_from_proto(&request.seats, &beginning.rules).map_err(refused)?;
     check_table(&request, &fills, &beginning.rules)?;
+    if request.physical {
+        check_agents(&policy, &fills)?;
+    }
     Ok(NewRoom {
         name,
         recorded: recorded_players((recorded, caller), &fills).await?,
@@ -122,6 +125,19 @@ fn check_table(
         None => {}
     }
     Referee::check_rules(rules).or_else(|problem| refused("RULE_SET_REFUSED", "rules", problem))
+}
+
+/// Checks that the built-in agents of a room with real cards can play there.
+fn check_agents(policy: &Policy, fills: &[Fill]) -> Result<(), Status> {
+    convert::check_real_cards("substitute", policy.substitute)
+        .map_err(|problem| field("POLICY_REFUSED", &problem))?;
+    for fill in fills {
+        if let Fill::BuiltIn(agent) = fill {
+            convert::check_real_cards("seats", *agent)
+                .map_err(|problem| field("SEATS_REFUSED", &problem))?;
+        }
+    }
+    Ok(())
 }
 
 /// A policy that promises no more than the server's store supports.

@@ -3,22 +3,18 @@
 //! their own, which give way to all others, a slice at a time, the games of each caller in turns
 //! with those of others, and no faster than a rate that bounds what they write to the disk.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
-use tokio::sync::oneshot;
-use tracing::error;
+use rayon::ThreadPoolBuildError;
 
+use super::threads::Threads;
 use super::{Held, Key, Places, Rate, Shares};
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
 pub(super) const MAX_GAMES: usize = 32;
 /// 1/N of the cores play them.
 const CORES: usize = 4;
-/// How much the threads give way to others: as much as the system allows.
-const NICENESS: i32 = 19;
 /// Longest time for which decisions may be made faster than the rate.
 pub(super) const BURST: Duration = Duration::from_secs(60);
 
@@ -28,7 +24,7 @@ pub struct Background {
     games: Arc<Places>,
     slices: Arc<Places>,
     rate: Arc<Rate>,
-    pool: ThreadPool,
+    threads: Threads,
 }
 
 /// The right to play one slice of a game.
@@ -44,17 +40,9 @@ impl Background {
     ///
     /// # Errors
     /// The operating system cannot start the threads.
-    pub fn new(
-        shares: Shares,
-        decisions_per_second: u64,
-    ) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(shares: Shares, decisions_per_second: u64) -> Result<Self, ThreadPoolBuildError> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = (cores / CORES).max(1);
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|index| format!("background-{index}"))
-            .start_handler(|_| give_way())
-            .build()?;
         // A caller alone may use all threads: those of others come next.
         let everything = Shares {
             local: 100,
@@ -67,7 +55,7 @@ impl Background {
                 decisions_per_second,
                 decisions_per_second.saturating_mul(BURST.as_secs()),
             )),
-            pool,
+            threads: Threads::new("background", threads)?,
         })
     }
 
@@ -119,22 +107,6 @@ impl Background {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
-        let (sender, done) = oneshot::channel();
-        self.pool.spawn(move || {
-            let result = catch_unwind(AssertUnwindSafe(work));
-            if result.is_err() {
-                error!("work in the background panicked");
-            }
-            // If nobody waits any more, the result is dropped here.
-            let _ = sender.send(result.ok());
-        });
-        done.await.ok().flatten()
-    }
-}
-
-/// Lets the calling thread give way to all others.
-fn give_way() {
-    if let Err(error) = rustix::process::nice(NICENESS) {
-        error!(%error, "a thread in the background does not give way to others");
+        self.threads.run(work).await
     }
 }

@@ -1,6 +1,6 @@
 //! What one caller may take of the server, so that its load neither refuses nor delays others: who
 //! is charged ([`Key`]), places that are shared fairly ([`Places`]), rates ([`Rate`]), and the
-//! games of built-in agents, which are played in the background ([`Background`]).
+//! games and searches of built-in agents, on threads of their own ([`Background`], [`Searches`]).
 
 mod background;
 mod calls;
@@ -11,6 +11,8 @@ mod log_pace;
 mod page;
 mod places;
 mod rate;
+mod searches;
+mod threads;
 
 use std::time::Duration;
 
@@ -23,6 +25,7 @@ pub use key::{Key, Shares};
 pub use log_pace::LogPace;
 pub use places::{Held, Places};
 pub use rate::Rate;
+pub use searches::Searches;
 
 /// Why something is refused although the caller may do it: it or others use too much of it now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

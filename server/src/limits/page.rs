@@ -4,12 +4,12 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Duration;
 
-use super::{background, calls, frames};
+use super::{background, calls, frames, searches};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
-    MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_TOURNAMENTS,
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
-    VECTOR_SETUP_TIMEOUT,
+    MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_SEARCH_BUDGET,
+    MAX_SEARCH_ROLLOUTS, MAX_TOURNAMENTS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
+    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
 use crate::room::MAX_SPECTATORS;
@@ -127,6 +127,17 @@ fn of_all() -> String {
                 "{}, for {} at most each; those without a thread wait",
                 number(MAX_ANALYSES),
                 seconds(MAX_ANALYSIS_TIME)
+            ),
+            "",
+        ),
+        (
+            "searches of built-in agents in rooms at a time",
+            format!(
+                "{}, for {} or {} rollouts at most each; those that wait for a thread longer than {} are given up",
+                number(searches::MAX_SEARCHES),
+                seconds(MAX_SEARCH_BUDGET),
+                number(MAX_SEARCH_ROLLOUTS),
+                seconds(searches::MAX_SEARCH_WAIT)
             ),
             "",
         ),

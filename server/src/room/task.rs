@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 
-use chefshat_engine::Seat;
+use chefshat_engine::{ActionId, Seat};
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind, SeatedParticipant};
@@ -36,7 +36,7 @@ use super::table_view::TableView;
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert::{self, Deck};
-use crate::limits::{Background, Held, Key, Places, Shares, Turn};
+use crate::limits::{Background, Held, Key, Places, Searches, Shares, Turn};
 use crate::metrics::Metrics;
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
@@ -72,6 +72,8 @@ pub struct TaskContext {
     pub watcher: Arc<dyn RoomWatcher>,
     /// Plays the games of built-in agents.
     pub background: Arc<Background>,
+    /// Searches for built-in agents.
+    pub searches: Arc<Searches>,
     /// Who created the room.
     pub owner: Key,
     /// How much of each limit one caller may use.
@@ -194,12 +196,17 @@ pub(super) struct Room {
     context: TaskContext,
 }
 
+/// The seat and number of a decision, and what a search found for it.
+type Found = (Seat, u64, Option<ActionId>);
+
 /// What the task of a room does next.
 enum Next {
     /// Reads this number of messages; 0: nobody has a handle any more.
     Messages(usize),
     /// Plays a slice of a game of built-in agents.
     Turn(Turn),
+    /// Takes the result of a search.
+    Searched(Found),
     /// Does what is due.
     Timer,
 }
@@ -213,6 +220,8 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
     tokio::pin!(timer);
     // The next slice of a game that nobody plays.
     let mut turn: Option<BoxFuture<'static, Turn>> = None;
+    // The search for the open decision.
+    let mut search: Option<BoxFuture<'static, Found>> = None;
     while room.commit_and_publish().await {
         if room.suspended && room.over_since.is_none() {
             room.subscribers().for_each(Subscriber::stop);
@@ -228,6 +237,9 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
                     .boxed(),
             );
         }
+        if let Some(started) = room.start_search() {
+            search = Some(started);
+        }
         room.set_timer(timer.as_mut(), turn.is_some());
         room.answers_in_place = room.core.awaits_participants_only();
         let armed = room.timer_at.is_some();
@@ -241,6 +253,9 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
             }
             if let Some(Poll::Ready(granted)) = turn.as_mut().map(|turn| turn.poll_unpin(context)) {
                 return Poll::Ready((resting.take(), Next::Turn(granted)));
+            }
+            if let Some(Poll::Ready(found)) = search.as_mut().map(|it| it.poll_unpin(context)) {
+                return Poll::Ready((resting.take(), Next::Searched(found)));
             }
             let fired = armed && timer.as_mut().poll(context).is_ready();
             if fired {
@@ -265,11 +280,16 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
             continue;
         }
         room.now = room.clock.now();
+        if let Next::Searched((seat, decision, found)) = next {
+            search = None;
+            room.core.searched(seat, decision, found);
+        }
         for message in messages.drain(..) {
             room.receive(message);
         }
         // A busy mailbox must not delay deadlines.
-        let due = matches!(next, Next::Timer) || room.timer_at.is_some_and(|at| at <= room.now);
+        let due = matches!(next, Next::Timer | Next::Searched(_))
+            || room.timer_at.is_some_and(|at| at <= room.now);
         if due && !room.fire() {
             break;
         }
@@ -320,6 +340,16 @@ impl Room {
     fn plays_in_background(&self) -> bool {
         let is_due = |deadline| deadline <= self.now;
         self.core.is_unattended() && self.core.deadline().is_some_and(is_due)
+    }
+
+    /// Starts the search for the open decision, if it needs one.
+    fn start_search(&mut self) -> Option<BoxFuture<'static, Found>> {
+        let request = self.core.start_search()?;
+        let (seat, decision) = (request.seat, request.decision);
+        let searches = Arc::clone(&self.context.searches);
+        let (owner, rules) = (self.context.owner, self.core.header().rules);
+        let found = searches.search(owner, rules, request);
+        Some(found.map(move |found| (seat, decision, found)).boxed())
     }
 
     /// Plays a slice of a game that nobody plays, and returns the number of decisions.

@@ -22,7 +22,8 @@ use super::{
     SpectateRequest, TaskContext, spawn_room,
 };
 use crate::clock::RoomClock;
-use crate::limits::{Background, Key, Shares};
+use crate::limits::{Background, Key, Searches, Shares};
+use crate::metrics::Metrics;
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
@@ -80,6 +81,8 @@ async fn room_with(
         .expect("a memory store");
     let background = Background::new(Shares::default(), 1_000_000).expect("threads");
     let background = Arc::new(background);
+    let metrics: Arc<Metrics> = Arc::default();
+    let searches = Searches::new(Shares::default(), Arc::clone(&metrics)).expect("threads");
     spawn_room(
         Core::new(header),
         RoomClock::of_age(Duration::ZERO),
@@ -97,9 +100,10 @@ async fn room_with(
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
             tracker: TaskTracker::new(),
-            metrics: Arc::default(),
+            metrics,
             watcher: Arc::new(NullWatcher),
             background,
+            searches: Arc::new(searches),
             owner: Key::Local,
             shares: Shares::default(),
         },

@@ -21,7 +21,7 @@ use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::config::ServerConfig;
-use crate::limits::{Background, Held, Key, Places, Refused, Shares};
+use crate::limits::{Background, Held, Key, Places, Refused, Searches, Shares};
 use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
@@ -114,7 +114,7 @@ impl Rooms {
     /// Creates an empty set.
     ///
     /// # Errors
-    /// The operating system cannot start the threads for games of built-in agents.
+    /// The operating system cannot start the threads for games of built-in agents or their searches.
     pub fn new(
         config: &ServerConfig,
         store: Arc<dyn Store>,
@@ -126,6 +126,7 @@ impl Rooms {
         }
         let background = Background::new(config.shares, config.built_in_decisions_per_second)?;
         let background = Arc::new(background);
+        let searches = Arc::new(Searches::new(config.shares, Arc::clone(&metrics))?);
         Ok(Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
             closed: Mutex::default(),
@@ -147,6 +148,7 @@ impl Rooms {
                 metrics,
                 watcher: Arc::new(Watcher(Weak::clone(rooms))),
                 background,
+                searches,
                 owner: Key::Resumed,
                 shares: config.shares,
             },

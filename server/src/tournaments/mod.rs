@@ -351,8 +351,8 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
         let several = plan.built_in.iter().filter(|other| *other == kind).count() > 1;
         entrants.push(Entrant {
             name: match several {
-                true => format!("{} {}", kind.name(), before + 1),
-                false => kind.name().to_owned(),
+                true => format!("{kind} {}", before + 1),
+                false => kind.name(),
             },
             kind: ParticipantKind::Agent,
             built_in: Some(*kind),

@@ -171,8 +171,8 @@ impl Plan {
         let first = chance.index(players);
         let second = (first + 1 + chance.index(players - 1)) % players;
         let built_in = [
-            Fill::BuiltIn(AgentKind::Greedy),
-            Fill::BuiltIn(AgentKind::Random),
+            Fill::BuiltIn(AgentKind::Greedy.into()),
+            Fill::BuiltIn(AgentKind::Random.into()),
         ];
         let fills: Vec<Fill> = (0..players)
             .map(|_| match chance.below(4) {
@@ -205,7 +205,7 @@ impl Plan {
                 bank: ms(chance.below(3) * 500),
                 max_invalid_attempts: chance.pick(&[Some(1), Some(3), None]),
                 max_timeouts: chance.pick(&[1, 2, 3]),
-                substitute: chance.pick(&[AgentKind::Greedy, AgentKind::Random]),
+                substitute: chance.pick(&[AgentKind::Greedy, AgentKind::Random]).into(),
                 abort: chance.pick(&[
                     AbortPolicy::Never,
                     AbortPolicy::Never,

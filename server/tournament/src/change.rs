@@ -1,7 +1,7 @@
 //! The changes of a tournament and the values in them. `state` applies them; `calls` decides when
 //! they follow.
 
-use chefshat_agents::{AgentKind, ParticipantKind};
+use chefshat_agents::{NamedAgent, ParticipantKind};
 use chefshat_engine::SeatStatistics;
 
 /// A participant, or a candidate for joining.
@@ -12,7 +12,7 @@ pub struct Entrant {
     /// The kind.
     pub kind: ParticipantKind,
     /// The built-in agent that plays. It is always present and plays any number of games at a time.
-    pub built_in: Option<AgentKind>,
+    pub built_in: Option<NamedAgent>,
     /// Whether it only fills tables up.
     pub filler: bool,
     /// Whether it declared that it remembers nothing between games.

@@ -21,10 +21,10 @@
 //!     max_parallel: 64,
 //!     physical_tables: 0,
 //!     draw_seed: [7; 32],
-//!     filler: AgentKind::Random,
+//!     filler: AgentKind::Random.into(),
 //! })?;
 //! for name in ["Ada", "Bo", "Cem", "Dia", "Eve"] {
-//!     let kind = Some(AgentKind::Greedy);
+//!     let kind = Some(AgentKind::Greedy.into());
 //!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1, at_table: false })?;
 //!     tournament.fold(&joined);
 //! }

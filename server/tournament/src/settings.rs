@@ -3,7 +3,7 @@
 
 use thiserror::Error;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::NamedAgent;
 
 /// Maximum number of games of a tournament, which bounds its memory.
 pub const MAX_GAMES: usize = 100_000;
@@ -121,7 +121,7 @@ pub struct Settings {
     /// Seed of all random choices: seats, tables, tie breaks. No deal depends on it.
     pub draw_seed: [u8; 32],
     /// The built-in agent that fills tables up.
-    pub filler: AgentKind,
+    pub filler: NamedAgent,
 }
 
 /// An invalid setting.

@@ -25,7 +25,7 @@ pub fn settings(format: Format) -> Settings {
         max_parallel: 64,
         physical_tables: 0,
         draw_seed: [7; 32],
-        filler: AgentKind::Random,
+        filler: AgentKind::Random.into(),
     }
 }
 
@@ -50,7 +50,7 @@ pub fn joined(
     let mut tournament = Tournament::new(settings).unwrap();
     for (number, built_in) in agents.into_iter().enumerate() {
         let joined = tournament.join(Entrant {
-            built_in,
+            built_in: built_in.map(Into::into),
             ..entrant(&format!("agent {number}"))
         });
         tournament.fold(&joined.unwrap());

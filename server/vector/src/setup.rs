@@ -2,7 +2,7 @@
 
 use std::num::{NonZeroU32, NonZeroU64};
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{ActionId, RuleSet, RuleSetSpec, Seed, Stop};
 use chefshat_proto::v1::{self, vector_setup};
 use chefshat_record::convert::{
@@ -254,6 +254,10 @@ pub fn agent_from_proto(
 ) -> Result<Option<AgentKind>, FieldProblem> {
     if name.is_empty() {
         return Ok(None);
+    }
+    if let Ok(NamedAgent::MonteCarlo(_)) = name.parse() {
+        let words = "monte_carlo searches at every decision, which is too slow for batches of games; play it in rooms, by `chefshat simulate` or by `chefshat compare`";
+        return Err(FieldProblem::new(field, words));
     }
     AgentKind::from_name(name).map(Some).ok_or_else(|| {
         let known = AgentKind::ALL.map(AgentKind::name).join(", ");

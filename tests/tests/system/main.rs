@@ -23,6 +23,7 @@ mod played;
 mod records;
 mod restarts;
 mod rooms;
+mod searches;
 mod spectators;
 mod stops;
 mod stranger;

@@ -28,7 +28,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     (
         "chefshat-simulation",
-        &["chefshat-engine", "chefshat-agents", "chefshat-tournament"],
+        &[
+            "chefshat-engine",
+            "chefshat-agents",
+            "chefshat-search",
+            "chefshat-tournament",
+        ],
     ),
     (
         "chefshat-record",

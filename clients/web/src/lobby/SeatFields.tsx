@@ -6,7 +6,7 @@ import { SelectField, TextField } from "../parts/Field";
 import { SeatNumber } from "../parts/SeatNumber";
 import css from "./FormPage.module.css";
 import type { FormProps } from "./NewRoom";
-import { isAtTable, MAX_NAME, type SeatChoice, withCards, withPlayers } from "./room-form";
+import { isAtTable, MAX_NAME, SEARCHING, type SeatChoice, withCards, withPlayers } from "./room-form";
 
 /** Possible numbers of players. */
 const PLAYERS = ["2", "3", "4", "5", "6"] as const;
@@ -21,7 +21,7 @@ export function SeatFields({ form, faults, change, agents }: FormProps & { agent
     "anybody",
     "agent",
     "robot",
-    ...agents.map((agent): SeatChoice => `built-in ${agent}`),
+    ...agents.map((agent): SeatChoice => `built-in ${agent}`).filter((choice) => !real || choice !== SEARCHING),
   ];
   const options = choices.map((value) => ({ value, label: choiceWord(value, real) }));
   const players = PLAYERS.find((count) => Number(count) === form.seats.length) ?? "4";

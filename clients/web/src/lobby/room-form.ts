@@ -53,13 +53,16 @@ export function withPlayers(form: RoomForm, players: number): RoomForm {
   return { ...form, seats, points: seats.length === form.seats.length ? form.points : "" };
 }
 
+/** The built-in agent that does not play with real cards. */
+export const SEARCHING: SeatChoice = "built-in monte_carlo";
+
 /**
  * Changes whether the cards are real: then everybody but built-in agents sits at the table at first,
  * else nobody.
  */
 export function withCards(form: RoomForm, cards: RoomForm["cards"]): RoomForm {
   const seats = form.seats.map((choice): SeatChoice => {
-    if (cards === "real") return choice.startsWith("built-in ") ? choice : "at-table human";
+    if (cards === "real") return choice.startsWith("built-in ") && choice !== SEARCHING ? choice : "at-table human";
     return choice === "at-table robot" ? "robot" : isAtTable(choice) ? "human" : choice;
   });
   return { ...form, cards, seats };

@@ -1,7 +1,7 @@
 //! The built-in agents: greedy's choices in a table of positions, uniformity of the random ones,
 //! and dependence on observation and generator alone.
 
-use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_agents::{AgentKind, BuiltInAgent, MonteCarlo, NamedAgent};
 use chefshat_engine::{
     ActionId, ActionSpace, BySeat, Decision, DecisionKind, Game, Mask, Observation, Role,
     RuleSetSpec, Seat, Seed, Viewer,
@@ -186,6 +186,36 @@ fn names_round_trip() {
         assert_eq!(AgentKind::from_name(kind.name()), Some(kind));
     }
     assert_eq!(AgentKind::from_name("Greedy"), None);
+}
+
+#[test]
+fn agents_that_search_are_named_with_their_budget() {
+    let check = |text: &str, expected: Option<&str>| {
+        let named = text.parse::<NamedAgent>().map(NamedAgent::name);
+        assert_eq!(named.ok().as_deref(), expected, "{text}");
+    };
+    for name in NamedAgent::NAMES {
+        let expected = match name {
+            MonteCarlo::NAME => "monte_carlo:50ms",
+            kind => kind,
+        };
+        check(name, Some(expected));
+    }
+    check("monte_carlo:20ms", Some("monte_carlo:20ms"));
+    check("monte_carlo:300:trained", Some("monte_carlo:300"));
+    check("monte_carlo:300:random", Some("monte_carlo:300:random"));
+    for wrong in [
+        "",
+        "greedy:50ms",
+        "monte_carlo:",
+        "monte_carlo:0",
+        "monte_carlo:0ms",
+        "monte_carlo:61000ms",
+        "monte_carlo:5:random_unmasked",
+        "monte_carlo:5:greedy:",
+    ] {
+        check(wrong, None);
+    }
 }
 
 #[test]

@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::Spectator;
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_record::jsonl;
 use clap::Args;
 
-use super::remote::{MAX_PACE_MS, agent_kind};
+use super::remote::{MAX_PACE_MS, named_agent};
 use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
 use crate::narration::{Narrator, abort_reason, clean, heading, legend, row};
@@ -41,8 +41,8 @@ pub(super) struct Demo {
     seed: Option<u64>,
     /// The agents, seat by seat: random, random_unmasked, greedy, trained. Default: greedy and
     /// random in turn.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind)]
-    agents: Vec<AgentKind>,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent)]
+    agents: Vec<NamedAgent>,
     /// Milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
     pace_ms: u64,
@@ -98,7 +98,7 @@ impl Demo {
     }
 
     /// Agents and rules: as many seats as agents are given, unless the flags set the number.
-    fn agents_and_rules(&self) -> Result<(Vec<AgentKind>, v1::RuleSet), CommandError> {
+    fn agents_and_rules(&self) -> Result<(Vec<NamedAgent>, v1::RuleSet), CommandError> {
         let mut message = self.rules.message();
         if !self.agents.is_empty() && message.players.is_none() {
             let named = self.agents.len();
@@ -114,7 +114,11 @@ impl Demo {
         let rules = rules_of(&message)?;
         let players = rules.players();
         if self.agents.is_empty() {
-            let agents = STANDARD_AGENTS.iter().copied().cycle().take(players);
+            let agents = STANDARD_AGENTS
+                .map(NamedAgent::from)
+                .into_iter()
+                .cycle()
+                .take(players);
             return Ok((agents.collect(), message));
         }
         if self.agents.len() != players {
@@ -147,7 +151,7 @@ impl Demo {
 
     /// Shows each event as it arrives, until the game ends.
     async fn watch(&self, out: &mut impl Write, table: &Table) -> Result<Ending, CommandError> {
-        let labels = table.agents.kinds.iter().map(|kind| kind.name().to_owned());
+        let labels = table.agents.kinds.iter().map(|kind| kind.name());
         let mut narrator = Narrator::default().with_labels(labels);
         let mut spectator: Spectator = table.client.spectate(table.room.room_id.as_str(), 1);
         let mut end = Ending::Aborted("the server gave no reason");
@@ -185,7 +189,7 @@ fn result(
     end: &v1::GameEnded,
     room: &v1::Room,
     names: &[String],
-    kinds: &[AgentKind],
+    kinds: &[NamedAgent],
     checked: &verify::Checked,
     record: &Path,
 ) -> serde_json::Value {

@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use tokio::task::JoinHandle;
 
@@ -25,7 +25,7 @@ pub(super) struct Table {
 
 /// The agents of a room; the index of each list is the seat.
 pub(super) struct Agents {
-    pub(super) kinds: Vec<AgentKind>,
+    pub(super) kinds: Vec<NamedAgent>,
     pub(super) names: Vec<String>,
     pub(super) players: Vec<Player>,
 }
@@ -34,7 +34,7 @@ impl Table {
     /// Creates the room, seats the agents in order and starts them.
     pub(super) async fn set(
         address: SocketAddr,
-        kinds: Vec<AgentKind>,
+        kinds: Vec<NamedAgent>,
         rules: v1::RuleSet,
         seed: Option<u64>,
         pace: Duration,
@@ -68,7 +68,7 @@ impl Table {
             .enumerate()
             .map(|(seat, ((own, ticket), kind))| {
                 let seed = seed_for(&format!("chefshat demo agent {seat}"), seed);
-                let agent = RemoteAgent::new(BuiltInAgent::new(*kind, seed), pace);
+                let agent = RemoteAgent::named(*kind, seed, pace);
                 tokio::spawn(async move { own.play(ticket, agent).await })
             })
             .collect();
@@ -99,16 +99,25 @@ pub(super) fn game_seed(seed: u64) -> [u8; 32] {
 }
 
 /// Unique names for the agents; the first letter shows the kind of agent.
-fn names(kinds: &[AgentKind]) -> Vec<String> {
-    let mut used = [0; AgentKind::ALL.len()];
+fn names(kinds: &[NamedAgent]) -> Vec<String> {
+    let mut used = [0; NamedAgent::NAMES.len()];
     kinds
         .iter()
         .map(|kind| {
             let (number, names) = match kind {
-                AgentKind::Greedy => (0, ["Greta", "Gustav", "Gina", "Georg", "Gloria", "Gil"]),
-                AgentKind::Random => (1, ["Rosa", "Rolf", "Rita", "Remi", "Ruth", "Ravi"]),
-                AgentKind::RandomUnmasked => (2, ["Uma", "Udo", "Ulla", "Ugo", "Ursa", "Ulf"]),
-                AgentKind::Trained => (3, ["Tara", "Timo", "Thea", "Theo", "Tilda", "Tom"]),
+                NamedAgent::Kind(AgentKind::Greedy) => {
+                    (0, ["Greta", "Gustav", "Gina", "Georg", "Gloria", "Gil"])
+                }
+                NamedAgent::Kind(AgentKind::Random) => {
+                    (1, ["Rosa", "Rolf", "Rita", "Remi", "Ruth", "Ravi"])
+                }
+                NamedAgent::Kind(AgentKind::RandomUnmasked) => {
+                    (2, ["Uma", "Udo", "Ulla", "Ugo", "Ursa", "Ulf"])
+                }
+                NamedAgent::Kind(AgentKind::Trained) => {
+                    (3, ["Tara", "Timo", "Thea", "Theo", "Tilda", "Tom"])
+                }
+                NamedAgent::MonteCarlo(_) => (4, ["Mona", "Max", "Mia", "Moritz", "Maya", "Milo"]),
             };
             let name = names[used[number] % names.len()];
             used[number] += 1;

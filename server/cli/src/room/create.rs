@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentNameError, NamedAgent};
 use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
 use chefshat_engine::RuleSet;
 use chefshat_record::convert::kind_from_name;
@@ -237,12 +237,16 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
     if let Some(kind) = reserved {
         return Ok(FilledBy::ReservedFor(kind.into()));
     }
-    AgentKind::from_name(word)
-        .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
-        .ok_or_else(|| {
-            let known = AgentKind::ALL.map(AgentKind::name).join(", ");
-            format!("use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot")
-        })
+    match word.parse::<NamedAgent>() {
+        Ok(agent) => Ok(FilledBy::BuiltInAgent(agent.name())),
+        Err(AgentNameError::Unknown(_)) => {
+            let known = NamedAgent::NAMES.join(", ");
+            Err(format!(
+                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot"
+            ))
+        }
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {

@@ -3,9 +3,8 @@
 
 use std::path::Path;
 
-use chefshat_agents::{AgentKind, Listener};
-use chefshat_engine::PlayedDecision;
-use chefshat_engine::{ActionId, Decision};
+use chefshat_agents::Listener;
+use chefshat_engine::{ActionId, BySeat, Decision, PlayedDecision};
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
 use chefshat_simulation::Batch;
@@ -26,10 +25,11 @@ pub(super) fn write(batch: &Batch, index: u64, folder: &Path) -> Result<(), Reco
         ..Notes::default()
     };
     batch.play_game(index, &mut notes);
+    let names: Vec<String> = batch.agents().values().map(|agent| agent.name()).collect();
     let played = Played {
         by: "simulate",
         rules: batch.rules(),
-        agents: &batch.agents().map(|agent| Some(AgentKind::name(agent))),
+        agents: &BySeat::from_fn(names.len(), |seat| Some(names[seat.index()].as_str())),
         seed: batch.game_seed(index),
         scheme: batch.scheme(),
         policy: &simulation_policy(

@@ -151,7 +151,7 @@ fn results(text: &mut String, batch: &Batch, table: &BatchTable) {
     let rows = table.seats.iter().map(|(seat, sums)| {
         vec![
             seat.to_string(),
-            batch.agents()[seat].name().to_owned(),
+            batch.agents()[seat].name(),
             grouped(sums.games_won),
             format!("{:.1}", 100.0 * table.per_game(sums.games_won)),
             grouped(sums.shifts_won),
@@ -181,7 +181,7 @@ fn actions(text: &mut String, batch: &Batch, table: &BatchTable) {
     let rows = table.seats.iter().map(|(seat, sums)| {
         let mut row = vec![
             seat.to_string(),
-            batch.agents()[seat].name().to_owned(),
+            batch.agents()[seat].name(),
             grouped(sums.valid),
             grouped(sums.wrong),
             format!("{:.2}", table.per_shift(sums.plays)),

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::kind::KindArg;
+use chefshat_agents::NamedAgent;
 use chefshat_client::{Error, v1};
 use clap::Args;
 
 use super::super::connect::ServerArg;
 use super::super::policy_args::PolicyArgs;
-use super::super::remote::agent_kind;
+use super::super::remote::named_agent;
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
@@ -236,7 +237,7 @@ pub(super) fn built_in(words: &str) -> Result<BuiltIn, String> {
 }
 
 fn agent_name(name: &str) -> Result<String, String> {
-    agent_kind(name).map(|kind| kind.name().to_owned())
+    named_agent(name).map(NamedAgent::name)
 }
 
 fn seed(digits: &str) -> Result<[u8; 32], String> {

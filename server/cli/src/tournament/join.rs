@@ -5,14 +5,14 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use crate::kind::KindArg;
-use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_agents::NamedAgent;
 use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
 use super::super::connect::{JoinArgs, Pass, ServerArg};
 use super::super::numbers::counted;
-use super::super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
+use super::super::remote::{MAX_PACE_MS, RemoteAgent, named_agent, seed_for};
 use super::super::{CommandError, say};
 use super::tables::{NO_GAME_COUNTED, place_in_words};
 use super::words::state;
@@ -26,8 +26,8 @@ use super::words::state;
 )]
 pub(super) struct Join {
     /// The agent: random, random_unmasked, greedy or trained.
-    #[arg(long, value_parser = agent_kind, value_name = "KIND")]
-    agent: AgentKind,
+    #[arg(long, value_parser = named_agent, value_name = "KIND")]
+    agent: NamedAgent,
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
@@ -72,9 +72,8 @@ impl Join {
         let make = |_: &v1::Attached| {
             let seed = seed_for(&format!("chefshat tournament join {games}"), self.seed);
             games += 1;
-            let agent = BuiltInAgent::new(self.agent, seed);
             Teller {
-                agent: RemoteAgent::new(agent, Duration::from_millis(self.pace_ms)),
+                agent: RemoteAgent::named(self.agent, seed, Duration::from_millis(self.pace_ms)),
                 json: self.json,
             }
         };
@@ -97,11 +96,11 @@ impl Join {
         client: &Client,
         code: String,
     ) -> Result<(String, Place), CommandError> {
-        let name = self.name.as_deref().unwrap_or(self.agent.name());
+        let name = self.name.clone().unwrap_or_else(|| self.agent.name());
         let joined = client
             .join_tournament(v1::JoinTournamentRequest {
                 join_code: code,
-                name: name.to_owned(),
+                name: name.clone(),
                 kind: v1::ParticipantKind::from(self.kind_of).into(),
                 max_games: self.games,
                 // Each game has its own agent.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_simulation::RulesForm;
@@ -127,7 +127,7 @@ impl Simulate {
             max_parallel: MAX_PARALLEL,
             physical_tables: 0,
             draw_seed: self.draw_seed(),
-            filler: AgentKind::Random,
+            filler: AgentKind::Random.into(),
         };
         let mut tournament = Tournament::new(settings).map_err(refused)?;
         for entrant in entrants {
@@ -140,23 +140,23 @@ impl Simulate {
     /// The participants: `greedy 1`, `greedy 2`, …, or `greedy` if there is only one.
     fn entrants(&self) -> Result<Vec<Entrant>, CommandError> {
         let kinds = |some: &BuiltIn| {
-            let kind =
-                AgentKind::from_name(&some.name).expect("the name was read as one of theirs");
-            std::iter::repeat_n(kind, some.count)
+            let agent: NamedAgent =
+                (some.name.parse()).expect("the name was read as one of theirs");
+            std::iter::repeat_n(agent, some.count)
         };
-        let listed: Vec<AgentKind> = self.agents.iter().flat_map(kinds).collect();
+        let listed: Vec<NamedAgent> = self.agents.iter().flat_map(kinds).collect();
         let count = self
             .participants
             .map_or(listed.len(), |count| count as usize);
         if count > MAX_PARTICIPANTS {
             return Err(format!("--agents: {count} of at most {MAX_PARTICIPANTS}").into());
         }
-        let kinds: Vec<AgentKind> = listed.into_iter().cycle().take(count).collect();
+        let kinds: Vec<NamedAgent> = listed.into_iter().cycle().take(count).collect();
         let of_kind =
-            |kinds: &[AgentKind], kind| kinds.iter().filter(|&&other| other == kind).count();
+            |kinds: &[NamedAgent], kind| kinds.iter().filter(|&&other| other == kind).count();
         let entrants = kinds.iter().enumerate().map(|(index, &kind)| Entrant {
             name: match of_kind(&kinds, kind) {
-                1 => kind.name().to_owned(),
+                1 => kind.name(),
                 _ => format!("{} {}", kind.name(), of_kind(&kinds[..=index], kind)),
             },
             kind: ParticipantKind::Agent,

@@ -24,7 +24,7 @@ pub struct Played<'a> {
     /// The rule set.
     pub rules: &'a RuleSet,
     /// The built-in agent of each seat; `None` for a client's.
-    pub agents: &'a BySeat<Option<&'static str>>,
+    pub agents: &'a BySeat<Option<&'a str>>,
     /// Its seed.
     pub seed: Seed,
     /// The scheme of rewards.

@@ -1,7 +1,7 @@
 //! A real table under test: a dealt game is the truth, of which the reports that a room needs are
 //! made.
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{
     Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, RuleSet, RuleSetSpec, Seat, Seed,
     Stop,
@@ -149,7 +149,12 @@ impl RealTable {
 
 pub const PERSON: Fill = Fill::AtTable(ParticipantKind::Human);
 /// Two players at the table, a remote agent and a built-in agent.
-pub const MIXED: [Fill; 4] = [PERSON, OPEN, Fill::BuiltIn(AgentKind::Greedy), PERSON];
+pub const MIXED: [Fill; 4] = [
+    PERSON,
+    OPEN,
+    Fill::BuiltIn(NamedAgent::Kind(AgentKind::Greedy)),
+    PERSON,
+];
 
 /// A policy with short times.
 pub fn policy() -> Policy {

@@ -313,10 +313,10 @@ fn a_game_without_participants_is_aborted_as_the_policy_says() {
 #[test]
 fn built_in_agents_play_without_requests_at_their_pace() {
     let fills = vec![
-        Fill::BuiltIn(AgentKind::Greedy),
-        Fill::BuiltIn(AgentKind::Random),
-        Fill::BuiltIn(AgentKind::RandomUnmasked),
-        Fill::BuiltIn(AgentKind::Greedy),
+        Fill::BuiltIn(AgentKind::Greedy.into()),
+        Fill::BuiltIn(AgentKind::Random.into()),
+        Fill::BuiltIn(AgentKind::RandomUnmasked.into()),
+        Fill::BuiltIn(AgentKind::Greedy.into()),
     ];
     let mut table = Table::empty(
         Policy {
@@ -392,9 +392,9 @@ fn built_in_agents_wait_a_second_if_a_person_plays() {
     ] {
         let fills = [
             OPEN,
-            Fill::BuiltIn(AgentKind::Greedy),
-            Fill::BuiltIn(AgentKind::Random),
-            Fill::BuiltIn(AgentKind::Random),
+            Fill::BuiltIn(AgentKind::Greedy.into()),
+            Fill::BuiltIn(AgentKind::Random.into()),
+            Fill::BuiltIn(AgentKind::Random.into()),
         ];
         let mut table = Table::empty(Policy::default(), fills.to_vec());
         let seat = table.join(kind).expect("a seat is free");

@@ -3,6 +3,7 @@
 mod clocks;
 mod physical;
 mod revival;
+mod searches;
 mod seats;
 mod silent;
 mod strange;

@@ -16,7 +16,7 @@ use crate::{BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, S
 
 impl Table {
     /// Simulates a crash and a restart after `downtime`.
-    fn restart(&mut self, downtime: Duration) {
+    pub(super) fn restart(&mut self, downtime: Duration) {
         self.now += downtime;
         let header = Arc::clone(self.core.header());
         self.core = Core::revived(header, &self.journal, self.now).expect("a consistent journal");
@@ -115,10 +115,10 @@ fn an_acknowledged_answer_is_acknowledged_again() {
 #[test]
 fn built_in_agents_decide_the_same_after_a_restart() {
     let fills = [
-        Fill::BuiltIn(AgentKind::Random),
-        Fill::BuiltIn(AgentKind::RandomUnmasked),
-        Fill::BuiltIn(AgentKind::Greedy),
-        Fill::BuiltIn(AgentKind::Random),
+        Fill::BuiltIn(AgentKind::Random.into()),
+        Fill::BuiltIn(AgentKind::RandomUnmasked.into()),
+        Fill::BuiltIn(AgentKind::Greedy.into()),
+        Fill::BuiltIn(AgentKind::Random.into()),
     ];
     let paced = Policy {
         pace: Some(ms(10)),

@@ -119,7 +119,7 @@ fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
 #[test]
 fn a_built_in_agent_takes_no_time_for_a_special_action() {
     let mut fills = vec![OPEN; 4];
-    fills[2] = Fill::BuiltIn(AgentKind::Greedy);
+    fills[2] = Fill::BuiltIn(AgentKind::Greedy.into());
     let mut table = offered(
         Policy {
             pace: Some(ms(300)),

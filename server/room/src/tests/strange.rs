@@ -91,7 +91,7 @@ proptest! {
     ) {
         let mut fills = vec![OPEN; 4];
         if let Some(seat) = built_in {
-            fills[seat] = Fill::BuiltIn(AgentKind::RandomUnmasked);
+            fills[seat] = Fill::BuiltIn(AgentKind::RandomUnmasked.into());
         }
         let policy = Policy {
             decision_time: ms(1000),

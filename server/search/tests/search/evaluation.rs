@@ -1,10 +1,9 @@
 //! Estimates of actions, and the agent that plays by them.
 
-use chefshat_agents::{AgentKind, AgentMaker as _, BuiltInAgent};
+use chefshat_agents::{AgentKind, AgentMaker as _, Budget, BuiltInAgent, MonteCarlo};
 use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
 use chefshat_search::{
-    Allocation, Budget, Estimate, Method, MonteCarlo, RolloutPolicy, Sampler, evaluate,
-    likely_hands,
+    Allocation, Estimate, Method, RolloutPolicy, Sampler, Searchers, evaluate, likely_hands,
 };
 
 use crate::scenario::{Moment, Scenario};
@@ -182,7 +181,7 @@ fn agent(rules: &RuleSet) -> BuiltInAgent {
         prior: AgentKind::Random,
         ..MonteCarlo::default()
     };
-    plays.agent(rules, [4; 32])
+    Searchers::new(plays).agent(rules, [4; 32])
 }
 
 /// What the agent does at a decision if it has followed the Shift.
@@ -228,39 +227,13 @@ fn the_agent_plays_by_what_its_seat_knows_alone() {
 }
 
 #[test]
-fn agents_are_named_with_their_budget() {
-    let check = |text: &str, expected: Option<&str>| {
-        let named = text
-            .parse::<MonteCarlo>()
-            .ok()
-            .map(|agent| agent.to_string());
-        assert_eq!(named.as_deref(), expected, "{text}");
-    };
-    let own = MonteCarlo::default().rollouts.name();
-    check("monte_carlo", Some(&format!("monte_carlo:50ms:{own}")));
-    check("monte_carlo:20ms", Some(&format!("monte_carlo:20ms:{own}")));
-    check("monte_carlo:300:random", Some("monte_carlo:300:random"));
-    for wrong in [
-        "greedy",
-        "monte_carlo:",
-        "monte_carlo:0",
-        "monte_carlo:0ms",
-        "monte_carlo:61000ms",
-        "monte_carlo:5:random_unmasked",
-        "monte_carlo:5:greedy:",
-    ] {
-        check(wrong, None);
-    }
-}
-
-#[test]
 fn without_the_history_the_agent_plays_as_its_prior() {
     let scenario = nearly_won();
     let plays = MonteCarlo {
         prior: AgentKind::Greedy,
         ..MonteCarlo::default()
     };
-    let mut agent = plays.agent(&scenario.rules, [0; 32]);
+    let mut agent = Searchers::new(plays).agent(&scenario.rules, [0; 32]);
     let moment = &scenario.moments[1];
     let legal = scenario.legal(1);
     let mut greedy = BuiltInAgent::new(AgentKind::Greedy, [0; 32]);

@@ -47,7 +47,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
             Fill::Open {
                 reserved_for: Some(ParticipantKind::Robot),
             },
-            Fill::BuiltIn(AgentKind::Greedy),
+            Fill::BuiltIn(AgentKind::Greedy.into()),
             Fill::Replay(RecordedSeat {
                 game: Id([9; 16]),
                 seat: Seat::new(2),

@@ -47,7 +47,7 @@ impl TournamentHandle {
             core.fold(&Change::Joined(Entrant {
                 name: digits + &long,
                 kind: ParticipantKind::Agent,
-                built_in: Some(AgentKind::Random),
+                built_in: Some(AgentKind::Random.into()),
                 filler: false,
                 stateless: true,
                 max_games: MAX_GAMES_AT_A_TIME,

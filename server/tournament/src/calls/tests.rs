@@ -20,7 +20,7 @@ fn join(tournament: &mut Tournament, max_games: usize, built_in: Option<AgentKin
     add(
         tournament,
         Entrant {
-            built_in,
+            built_in: built_in.map(Into::into),
             max_games,
             ..testing::entrant("")
         },

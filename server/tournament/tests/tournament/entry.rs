@@ -111,7 +111,7 @@ fn joining_is_refused_with_a_reason() {
     }
     let built_in = join(&tournament, |entrant| {
         entrant.stateless = false;
-        entrant.built_in = Some(AgentKind::Greedy);
+        entrant.built_in = Some(AgentKind::Greedy.into());
     });
     tournament.fold(&built_in.unwrap());
     assert!(tournament.is_present(2), "a built-in agent always is");

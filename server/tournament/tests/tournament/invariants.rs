@@ -33,7 +33,7 @@ fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
             let entrant = |(number, (max_games, place)): (usize, (usize, u8))| Entrant {
                 name: format!("entrant {number}"),
                 kind: ParticipantKind::Robot,
-                built_in: (place == 0).then_some(AgentKind::Greedy),
+                built_in: (place == 0).then_some(AgentKind::Greedy.into()),
                 filler: false,
                 stateless: true,
                 max_games: if place == 1 { 1 } else { max_games },
@@ -304,7 +304,7 @@ fn it_resumes_after_any_interruption() {
                 .map(|number| Entrant {
                     name: format!("entrant {number}"),
                     kind: ParticipantKind::Human,
-                    built_in: Some(AgentKind::Random),
+                    built_in: Some(AgentKind::Random.into()),
                     filler: false,
                     stateless: false,
                     max_games: 1,

@@ -28,7 +28,7 @@ mod view;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::NamedAgent;
 use chefshat_client::Client;
 use chefshat_client::v1::{self, seat_config::FilledBy};
 use chefshat_record::jsonl;
@@ -37,7 +37,7 @@ use clap::Args;
 use crate::CommandError;
 use crate::connect::ServerArg;
 use crate::data_dir;
-use crate::remote::agent_kind;
+use crate::remote::named_agent;
 use crate::rules_args::{RulesArgs, rules_of};
 use crate::tui::screen::missing;
 use chefshat_server::host::Host;
@@ -70,9 +70,9 @@ pub(crate) struct Play {
     )]
     name: String,
     /// With --local: the built-in agents, in turn: random, random_unmasked, greedy, trained.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent,
           default_values = ["trained", "greedy", "random"])]
-    agents: Vec<AgentKind>,
+    agents: Vec<NamedAgent>,
     /// With --local: milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 900, value_parser = clap::value_parser!(u32).range(0..=MAX_PACE_MS))]
     pace_ms: u32,
@@ -171,7 +171,7 @@ impl Play {
         let client = Client::connect(host.url()).await?;
         let person = FilledBy::ReservedFor(v1::ParticipantKind::Human.into());
         let agents = self.agents.iter().cycle();
-        let agents = agents.map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()));
+        let agents = agents.map(|kind| FilledBy::BuiltInAgent(kind.name()));
         let seats = std::iter::once(person).chain(agents).take(players);
         let seats = seats.map(|filled_by| v1::SeatConfig {
             filled_by: Some(filled_by),

@@ -1,6 +1,5 @@
 //! Headers and journals of tournaments.
 
-use chefshat_agents::AgentKind;
 use chefshat_proto::v1;
 use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistics};
 use prost::Message;
@@ -310,7 +309,7 @@ fn entrant_to_form(entrant: &Entrant) -> EntrantForm {
     EntrantForm {
         name: entrant.name.clone(),
         kind: number_of(&KINDS, &entrant.kind),
-        built_in: (entrant.built_in).map_or_else(String::new, |kind| kind.name().into()),
+        built_in: (entrant.built_in).map_or_else(String::new, |agent| agent.name()),
         filler: entrant.filler,
         stateless: entrant.stateless,
         max_games: wide(entrant.max_games),
@@ -323,10 +322,7 @@ fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
         kind: value_of(&KINDS, form.kind, "kind of participant")?,
         built_in: match form.built_in.as_str() {
             "" => None,
-            name => Some(
-                AgentKind::from_name(name)
-                    .ok_or_else(|| Unreadable::new(format!("{name:?} is not a built-in agent")))?,
-            ),
+            name => Some((name.parse()).map_err(|error| Unreadable::new(format!("{error}")))?),
         },
         name: form.name,
         filler: form.filler,

@@ -16,7 +16,7 @@ const RUNS: usize = 3_000;
 
 /// A game that was interrupted after some decisions, as its two columns of the database.
 fn interrupted() -> (Vec<u8>, Vec<u8>) {
-    let fills = vec![OPEN, OPEN, Fill::BuiltIn(AgentKind::Random), OPEN];
+    let fills = vec![OPEN, OPEN, Fill::BuiltIn(AgentKind::Random.into()), OPEN];
     let mut table = Table::with_rules(Policy::default(), fills, one_shift());
     for _ in 0..3 {
         let _ = table.join(ParticipantKind::Agent);

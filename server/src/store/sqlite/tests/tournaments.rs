@@ -38,7 +38,7 @@ pub(super) fn every_entry() -> Vec<TournamentEntry> {
     let filler = Entrant {
         name: "random 1".into(),
         kind: ParticipantKind::Agent,
-        built_in: Some(AgentKind::Random),
+        built_in: Some(AgentKind::Random.into()),
         filler: true,
         stateless: false,
         max_games: 64,

@@ -1,0 +1,136 @@
+//! Decisions of agents that search. A search takes long, so the core only says what to search and
+//! takes what was found as an input. The journal has the decision alone: after a restart of the server,
+//! the open one is searched again.
+
+use chefshat_agents::MonteCarlo;
+use chefshat_engine::{ActionId, Event, Mask, Observation, Seat, Viewer};
+
+use super::{Core, OpenDecision, State};
+use crate::journal::Fill;
+use crate::log::RoomEvent;
+
+/// The search for an open decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Not started.
+    NotStarted,
+    /// Started, and not ended.
+    Running,
+    /// Ended. Without an action, the agent plays as if it did not search.
+    Ended(Option<ActionId>),
+}
+
+impl Search {
+    /// The action that was found.
+    pub(super) fn found(self) -> Option<ActionId> {
+        match self {
+            Self::NotStarted | Self::Running => None,
+            Self::Ended(found) => found,
+        }
+    }
+}
+
+/// What to search, from what the seat knows alone.
+#[derive(Debug, Clone)]
+pub struct SearchRequest {
+    /// The seat.
+    pub seat: Seat,
+    /// Number of the decision, per seat, from 1.
+    pub decision: u64,
+    /// How to search.
+    pub plays: MonteCarlo,
+    /// What the seat sees.
+    pub observation: Observation,
+    /// The legal actions, two or more.
+    pub legal: Mask,
+    /// The events of the Shift, as the seat saw them.
+    pub history: Vec<Event>,
+    /// The seed of the agent, the same for all its decisions.
+    pub seed: [u8; 32],
+}
+
+impl Core {
+    /// Starts the search for the open decision, if it needs one that has not been started.
+    /// [`Core::searched`] takes the result.
+    pub fn start_search(&mut self) -> Option<SearchRequest> {
+        let (open, plays) = self.to_be_searched()?;
+        if open.search != Search::NotStarted {
+            return None;
+        }
+        let seat = open.decision.seat;
+        let request = SearchRequest {
+            seat,
+            decision: open.id,
+            plays,
+            observation: self.observe(Viewer::Seat(seat))?,
+            legal: self.legal_actions(),
+            history: self.shift_seen_by(seat),
+            seed: self.header.seed.agent_seed(seat.index()),
+        };
+        if let Some(open) = &mut self.open {
+            open.search = Search::Running;
+        }
+        Some(request)
+    }
+
+    /// Takes the result of a search; `None` if nothing was searched. The decision is then due like that of any
+    /// built-in agent. Does nothing if another decision is open.
+    pub fn searched(&mut self, seat: Seat, decision: u64, found: Option<ActionId>) {
+        let legal = self.legal_actions();
+        if let Some(open) = &mut self.open
+            && (open.decision.seat, open.id) == (seat, decision)
+        {
+            open.search = Search::Ended(found.filter(|action| legal.contains(*action)));
+        }
+    }
+
+    /// Whether the open decision waits for the end of a search.
+    pub(super) fn awaits_search(&self) -> bool {
+        self.to_be_searched()
+            .is_some_and(|(open, _)| !matches!(open.search, Search::Ended(_)))
+    }
+
+    /// The open decision, if an agent that searches takes it. It takes a silent one at once: otherwise
+    /// the time of the next event would reveal it.
+    fn to_be_searched(&self) -> Option<(&OpenDecision, MonteCarlo)> {
+        let runs = self.state == State::Playing && !self.header.is_physical();
+        let open = self
+            .open
+            .as_ref()
+            .filter(|open| runs && !open.is_silent())?;
+        let plays = self.search_of(open.decision.seat)?;
+        let searched = self.next_taken_over().is_none() && self.legal_actions().len() > 1;
+        searched.then_some((open, plays))
+    }
+
+    /// How the built-in agent or substitute of a seat searches, if it does.
+    fn search_of(&self, seat: Seat) -> Option<MonteCarlo> {
+        let state = &self.seats[seat.index()];
+        let agent = match state.fill {
+            _ if state.substituted => self.header.policy.substitute,
+            Fill::BuiltIn(agent) => agent,
+            Fill::Replay(_) if !self.header.recorded.contains_key(&seat.index()) => {
+                self.header.policy.substitute
+            }
+            Fill::Replay(_) | Fill::Open { .. } | Fill::AtTable(_) => return None,
+        };
+        agent.search()
+    }
+
+    /// The events of the Shift in progress, as a seat saw them.
+    fn shift_seen_by(&self, seat: Seat) -> Vec<Event> {
+        let log = &self.log;
+        let is_start = |position: &usize| {
+            log.get(*position).is_some_and(|entry| {
+                matches!(&entry.event, RoomEvent::Game(game) if matches!(game.event, Event::ShiftStarted { .. }))
+            })
+        };
+        let start = (log.first()..log.len()).rev().find(is_start);
+        log.since(start.unwrap_or(log.len()))
+            .filter_map(|entry| match &entry.event {
+                RoomEvent::Game(game) => Some(game.event.seen_by(Viewer::Seat(seat))),
+                _ => None,
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,182 @@
+//! Agents that search: the core waits for what others found.
+
+use chefshat_agents::{AgentKind, Budget, BuiltInAgent, MonteCarlo, NamedAgent};
+use chefshat_engine::{ActionId, DecisionKind, Event, Viewer};
+
+use crate::SearchRequest;
+use crate::tests::*;
+
+const SEARCHER: Fill = Fill::BuiltIn(NamedAgent::MonteCarlo(MonteCarlo {
+    budget: Budget::Rollouts(1),
+    rollouts: AgentKind::Trained,
+    prior: AgentKind::Trained,
+}));
+
+fn searching(pace: u64) -> Table {
+    let policy = Policy {
+        pace: Some(ms(pace)),
+        ..Policy::default()
+    };
+    let fills = vec![
+        SEARCHER,
+        Fill::BuiltIn(AgentKind::Greedy.into()),
+        SEARCHER,
+        SEARCHER,
+    ];
+    let mut table = Table::with_rules(policy, fills, one_shift());
+    table.core.begin_if_all_built_in(table.now);
+    table.commit();
+    table
+}
+
+/// Plays until the next search starts; `None` at the end of the game.
+fn next_search(table: &mut Table) -> Option<SearchRequest> {
+    while !table.core.state().is_over() {
+        if let Some(request) = table.core.start_search() {
+            return Some(request);
+        }
+        table.pass_time(ms(1_000));
+    }
+    None
+}
+
+fn last_legal(request: &SearchRequest) -> Option<ActionId> {
+    request.legal.iter().last()
+}
+
+#[test]
+fn a_decision_waits_for_the_search_and_takes_what_it_found() {
+    let mut table = searching(0);
+    let (mut found, mut without) = (0, 0);
+    while let Some(request) = next_search(&mut table) {
+        let decisions = table.core.decisions();
+        assert_eq!(table.core.deadline(), None, "nothing is due");
+        table.pass_time(Duration::from_secs(3_600));
+        assert_eq!(table.core.decisions(), decisions, "it waits");
+        assert!(table.core.start_search().is_none(), "it is started once");
+        assert!(
+            request.legal.len() > 1
+                && request.observation.kind != Some(DecisionKind::SpecialAction)
+        );
+
+        let action = last_legal(&request);
+        let given = action.filter(|_| decisions.is_multiple_of(2));
+        table
+            .core
+            .searched(request.seat, request.decision + 1, action);
+        assert_eq!(table.core.deadline(), None, "that was for another decision");
+        table.core.searched(request.seat, request.decision, given);
+        let mut prior = BuiltInAgent::new(AgentKind::Trained, [0; 32]);
+        let expected = given.unwrap_or_else(|| prior.decide(&request.observation, &request.legal));
+        let length = table.journal.len();
+        table.pass_time(ms(0));
+        let taken = table.journal[length..]
+            .iter()
+            .find_map(|entry| match &entry.change {
+                Change::Decided(decided) => Some((decided.seat, decided.action, decided.source)),
+                _ => None,
+            });
+        assert_eq!(taken, Some((request.seat, expected, Source::Agent)));
+        found += usize::from(given.is_some());
+        without += usize::from(given.is_none());
+    }
+    assert_eq!(table.core.state(), State::Finished);
+    assert!(found > 5 && without > 5, "{found} {without}");
+    table.assert_replays();
+}
+
+#[test]
+fn an_illegal_result_counts_as_none() {
+    let mut table = searching(0);
+    let request = next_search(&mut table).expect("a search");
+    let illegal = (0..u16::MAX)
+        .map(ActionId::new)
+        .find(|action| !request.legal.contains(*action));
+    table.core.searched(request.seat, request.decision, illegal);
+    table.pass_time(ms(0));
+    assert!(table.core.decisions() > 0);
+    table.assert_replays();
+}
+
+#[test]
+fn a_search_is_part_of_the_pace() {
+    let mut table = searching(500);
+    let request = next_search(&mut table).expect("a search");
+    let decisions = table.core.decisions();
+    table
+        .core
+        .searched(request.seat, request.decision, last_legal(&request));
+    table.pass_time(ms(499));
+    assert_eq!(table.core.decisions(), decisions);
+    table.pass_time(ms(1));
+    assert_eq!(table.core.decisions(), decisions + 1);
+}
+
+#[test]
+fn after_a_restart_the_open_decision_is_searched_again_from_what_the_seat_knows() {
+    let play = |restart: bool| {
+        let mut table = searching(0);
+        let mut number = 0;
+        while let Some(mut request) = next_search(&mut table) {
+            number += 1;
+            if restart && number % 3 == 0 {
+                let before = request;
+                table.restart(ms(10));
+                request = table
+                    .core
+                    .start_search()
+                    .expect("the decision is still open");
+                assert_eq!(
+                    (before.seat, before.decision, before.seed),
+                    (request.seat, request.decision, request.seed)
+                );
+                assert_eq!(before.observation, request.observation);
+                assert_eq!(before.history, request.history);
+            }
+            let seat = Viewer::Seat(request.seat);
+            assert!(matches!(
+                request.history.first(),
+                Some(Event::ShiftStarted { .. })
+            ));
+            assert!((request.history.iter()).all(|event| event.seen_by(seat) == *event));
+            let found = last_legal(&request);
+            table.core.searched(request.seat, request.decision, found);
+        }
+        table.assert_replays();
+        let decided = |entry: &crate::journal::Entry| match &entry.change {
+            Change::Decided(decided) => Some((decided.seat, decided.action)),
+            _ => None,
+        };
+        table.journal.iter().filter_map(decided).collect::<Vec<_>>()
+    };
+    assert_eq!(play(true), play(false));
+}
+
+#[test]
+fn a_seat_that_returns_from_a_substitute_is_not_played_by_its_search() {
+    let policy = Policy {
+        substitute: NamedAgent::MonteCarlo(MonteCarlo::default()),
+        max_timeouts: 1,
+        ..Policy::default()
+    };
+    let mut table = Table::playing(policy);
+    let (seat, _) = table.open();
+    let late = table.core.time_left(table.now);
+    table.pass_time(late.0 + late.1);
+    assert!(table.core.standing(seat).substituted);
+    let request = loop {
+        match table.core.start_search() {
+            Some(request) => break request,
+            None => table.play_one(),
+        };
+    };
+    assert_eq!(request.seat, seat);
+    table.attach(seat);
+    let decisions = table.core.decisions();
+    table
+        .core
+        .searched(request.seat, request.decision, last_legal(&request));
+    table.core.tick(table.now, None);
+    assert_eq!(table.core.decisions(), decisions, "the seat decides itself");
+    assert_eq!(table.play_one(), seat);
+}

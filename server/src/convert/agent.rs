@@ -1,0 +1,48 @@
+//! The built-in agents of rooms and tournaments by name, with the bounds of their searches.
+
+use chefshat_agents::{AgentNameError, Budget, NamedAgent};
+use chefshat_record::convert::FieldProblem;
+
+use crate::config::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
+
+/// The built-in agent with this name; `None` for the empty name.
+///
+/// # Errors
+/// There is no such agent, or its budget is too large for a server.
+pub(super) fn agent_from_proto(
+    field: &'static str,
+    name: &str,
+) -> Result<Option<NamedAgent>, FieldProblem> {
+    if name.is_empty() {
+        return Ok(None);
+    }
+    let agent: NamedAgent = (name.parse())
+        .map_err(|error: AgentNameError| FieldProblem::new(field, error.to_string()))?;
+    let fits = match agent.search().map(|plays| plays.budget) {
+        None => true,
+        Some(Budget::Time(time)) => time <= MAX_SEARCH_BUDGET,
+        Some(Budget::Rollouts(rollouts)) => rollouts <= MAX_SEARCH_ROLLOUTS,
+    };
+    if !fits {
+        let ms = MAX_SEARCH_BUDGET.as_millis();
+        let words = format!(
+            "{name}: on a server a search takes at most {ms}ms or {MAX_SEARCH_ROLLOUTS} rollouts"
+        );
+        return Err(FieldProblem::new(field, words));
+    }
+    Ok(Some(agent))
+}
+
+/// Checks that an agent can play where cards are real.
+///
+/// # Errors
+/// It searches, which needs to know how the cards were dealt.
+pub fn check_real_cards(field: &'static str, agent: NamedAgent) -> Result<(), FieldProblem> {
+    match agent.search() {
+        None => Ok(()),
+        Some(_) => Err(FieldProblem::new(
+            field,
+            "monte_carlo does not play at tables with real cards; choose trained",
+        )),
+    }
+}

@@ -1,0 +1,151 @@
+//! Built-in agents that search: in rooms, after a crash of the server, in tournaments.
+
+use chefshat_client::Client;
+use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
+use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_record::replay::replay;
+use chefshat_tests::{Launch, TestServer, one_shift, patiently};
+
+use crate::played::{built_in, ended, until_over};
+use crate::tournaments;
+
+/// Rollouts by random agents are quick.
+const SEARCHER: &str = "monte_carlo:8:random";
+
+fn request(agents: [&str; 4]) -> v1::CreateRoomRequest {
+    v1::CreateRoomRequest {
+        rules: Some(one_shift()),
+        seats: agents.map(built_in).to_vec(),
+        game_seed: vec![5; 32],
+        ..v1::CreateRoomRequest::default()
+    }
+}
+
+#[tokio::test]
+async fn agents_search_in_rooms_and_records_name_their_budgets() {
+    let server = TestServer::start().await;
+    let agents = [SEARCHER, "greedy", "monte_carlo:5ms:random", "random"];
+    let game = ended(&server.client().await, request(agents)).await;
+    let seats = game.header().seats.iter();
+    let named: Vec<&str> = (seats.clone())
+        .map(|seat| seat.built_in_agent.as_str())
+        .collect();
+    assert_eq!(named, agents);
+    assert!(seats.clone().all(|seat| seat.name == seat.built_in_agent));
+    assert!(
+        (game.decisions().iter())
+            .all(|it| it.source() == v1::DecisionSource::Agent && it.decision_time_us == 0)
+    );
+    let info = server.client().await.server_info().await.expect("info");
+    assert!(info.built_in_agents.contains(&"monte_carlo".to_owned()));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_game_of_agents_that_search_resumes_after_sigkill() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let mut server = launch.start().await.expect("the server starts");
+    let client = Client::connect(launch.url()).await.expect("it listens");
+    let created = client.create_room(request([SEARCHER; 4])).await;
+    let room = created.expect("a new room").room.expect("a room");
+    let mut kills = 0;
+    for decisions in [3, 20] {
+        let client = Client::connect(launch.url()).await.expect("it listens");
+        let mut watching = client.spectate(&room.room_id, 0);
+        let some = async {
+            let mut seen = 0;
+            while let Ok(Some(event)) = watching.next().await {
+                seen += usize::from(matches!(event.kind, Some(Kind::Play(_) | Kind::Pass(_))));
+                if seen == decisions {
+                    return;
+                }
+            }
+            panic!("the game ended before {decisions} decisions");
+        };
+        patiently("decisions", some).await;
+        server.kill().await;
+        kills += 1;
+        server = launch.start().await.expect("the server restarts");
+    }
+    let client = Client::connect(launch.url()).await.expect("it listens");
+    let game = patiently("the end", until_over(&client, room.room_id)).await;
+    let replayed = replay(&game.lines).expect("a valid record");
+    assert_eq!(replayed.state, v1::RoomState::Finished);
+    let restarts = game.events(|kind| matches!(kind, Kind::ServerRestarted(_)));
+    assert_eq!(restarts, kills);
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn agents_that_search_take_part_in_tournaments() {
+    let server = TestServer::start().await;
+    let mut service = TournamentServiceClient::new(server.channel().await);
+    let settings = v1::TournamentSettings {
+        format: v1::TournamentFormat::RoundRobin.into(),
+        rounds: 1,
+        built_in_agents: [SEARCHER, SEARCHER, "greedy"].map(str::to_owned).to_vec(),
+        filler: "monte_carlo:9:random".into(),
+        ..v1::TournamentSettings::default()
+    };
+    let created = tournaments::create(&mut service, settings).await;
+    tournaments::start(&mut service, &created).await;
+    let tournament = tournaments::over(&mut service, &tournaments::id_of(&created)).await;
+    assert_eq!(tournament.state(), v1::TournamentState::Finished);
+    let taking_part: Vec<(&str, &str)> = (tournament.participants.iter())
+        .map(|it| (it.name.as_str(), it.built_in_agent.as_str()))
+        .collect();
+    assert_eq!(taking_part[0], ("monte_carlo:8:random 1", SEARCHER));
+    assert_eq!(taking_part[1], ("monte_carlo:8:random 2", SEARCHER));
+    assert!(taking_part.iter().any(|it| it.1 == "monte_carlo:9:random"));
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn budgets_that_are_too_large_are_refused_with_their_bounds() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for (agent, words) in [
+        ("monte_carlo:1001ms", "at most 1000ms or 5000 rollouts"),
+        ("monte_carlo:5001", "at most 1000ms or 5000 rollouts"),
+        ("monte_carlo:0", "write monte_carlo, monte_carlo:50ms"),
+        ("monte carlo", "use one of random"),
+    ] {
+        let refused = client.create_room(request([agent; 4])).await;
+        let error = refused.expect_err(agent);
+        assert_eq!(error.reason(), Some("SEATS_REFUSED"), "{agent}");
+        assert!(error.to_string().contains(words), "{error}");
+        let policy = v1::RoomPolicy {
+            substitute: agent.into(),
+            ..v1::RoomPolicy::default()
+        };
+        let refused = client
+            .create_room(v1::CreateRoomRequest {
+                policy: Some(policy),
+                ..request(["greedy"; 4])
+            })
+            .await;
+        let error = refused.expect_err(agent);
+        assert_eq!(error.reason(), Some("POLICY_REFUSED"), "{agent}");
+    }
+    let real = v1::CreateRoomRequest {
+        physical: true,
+        game_seed: Vec::new(),
+        seats: [
+            v1::SeatConfig {
+                filled_by: Some(v1::seat_config::FilledBy::AtTable(
+                    v1::ParticipantKind::Human.into(),
+                )),
+                name: "Rosa".into(),
+            },
+            built_in(SEARCHER),
+            built_in("greedy"),
+            built_in("greedy"),
+        ]
+        .to_vec(),
+        ..request([SEARCHER; 4])
+    };
+    let error = client.create_room(real).await.expect_err("real cards");
+    assert!(error.to_string().contains("choose trained"), "{error}");
+    server.stop().await;
+}
