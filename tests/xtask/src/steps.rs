@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::process::Command;
+use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -55,44 +56,46 @@ impl Steps {
         self.run(name, || command::run(command))
     }
 
-    /// Runs programs side by side, each as a step: for those that often wait. What a program prints
-    /// appears when it has ended.
-    pub(crate) fn programs(&mut self, programs: Vec<(String, Command)>) -> Result<(), Failure> {
-        let start = Instant::now();
-        let ended = thread::scope(|scope| {
-            let running: Vec<_> = (programs.into_iter())
-                .map(|(name, mut command)| {
-                    println!("\n==> {name}, beside others");
-                    let run = move || (command::run_captured(&mut command), start.elapsed());
-                    (name, scope.spawn(run))
-                })
-                .collect();
-            let ended = running.into_iter().map(|(name, running)| {
-                let (output, took) = running.join().expect("starting a program does not panic");
-                (name, output, took)
-            });
-            ended.collect::<Vec<_>>()
-        });
-        let mut failed = Vec::new();
-        for (name, result, took) in ended {
-            println!("\n==> {name}");
-            let outcome = match result {
-                Ok(output) => {
-                    print!("{output}");
-                    Outcome::Passed
-                }
-                Err(failure) => {
-                    println!("{failure}");
-                    failed.push(name.clone());
-                    Outcome::Failed
-                }
-            };
-            self.done.push(Step {
-                name,
-                outcome,
-                took,
-            });
+    /// Runs programs side by side, each as a step: for those that often wait. Of several, what each
+    /// prints appears when it has ended.
+    pub(crate) fn programs(&mut self, mut programs: Vec<(String, Command)>) -> Result<(), Failure> {
+        if let [(name, command)] = programs.as_mut_slice() {
+            return self.program(name, command);
         }
+        let start = Instant::now();
+        let mut failed = Vec::new();
+        thread::scope(|scope| {
+            let (ended, results) = mpsc::channel();
+            for (name, mut command) in programs {
+                println!("\n==> {name}, beside others");
+                let ended = ended.clone();
+                scope.spawn(move || {
+                    let result = command::run_captured(&mut command);
+                    // The receiver lives until the last program has ended.
+                    let _ = ended.send((name, result, start.elapsed()));
+                });
+            }
+            drop(ended);
+            for (name, result, took) in results {
+                println!("\n==> {name}");
+                let outcome = match result {
+                    Ok(output) => {
+                        print!("{output}");
+                        Outcome::Passed
+                    }
+                    Err(failure) => {
+                        println!("{failure}");
+                        failed.push(name.clone());
+                        Outcome::Failed
+                    }
+                };
+                self.done.push(Step {
+                    name,
+                    outcome,
+                    took,
+                });
+            }
+        });
         match failed.as_slice() {
             [] => Ok(()),
             names => Err(Failure::new(format!("{} failed", names.join(", ")))),

@@ -71,6 +71,7 @@ pub(crate) fn run(
         steps.run("install the native module", || setup::native_module(places))?;
     }
 
+    let mut tests = Vec::new();
     if wants(Part::Rust) {
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
@@ -89,23 +90,21 @@ pub(crate) fn run(
             OPTIONAL_FEATURES,
             "--no-fail-fast",
         ];
-        steps.program("cargo test", cargo_command(places).args(test))?;
+        let mut cargo_test = cargo_command(places);
+        cargo_test.args(test);
+        tests.push(("cargo test".to_owned(), cargo_test));
     }
     if wants(Part::Python) {
         if has_python {
-            let packages = (places.python_packages().into_iter())
-                .filter(|package| *package != DEPLOYMENT)
-                .map(|package| pytest(places, package, &[]));
-            let mut tests: Vec<_> = packages.collect();
+            for package in places.python_packages() {
+                if package != DEPLOYMENT {
+                    tests.push(pytest(places, package, &[]));
+                }
+            }
             for which in VERSIONS {
                 let set_up = || setup::versions(places, which);
                 steps.run(&format!("set up the {which} versions"), set_up)?;
                 tests.push(pytest_with(places, which));
-            }
-            steps.programs(tests)?;
-            lint::python(places, steps)?;
-            if slow {
-                wheels::run(places, steps, "release", true)?;
             }
         } else {
             steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
@@ -114,9 +113,17 @@ pub(crate) fn run(
     if wants(Part::Node) {
         if has_node {
             let mut node = with_environment(places, Command::new("node"));
-            steps.program("node --test", node.arg("--test").current_dir(places.node()))?;
+            node.arg("--test").current_dir(places.node());
+            tests.push(("node --test".to_owned(), node));
         } else {
             steps.skip("node --test", NO_NODE_PACKAGE);
+        }
+    }
+    steps.programs(tests)?;
+    if wants(Part::Python) && has_python {
+        lint::python(places, steps)?;
+        if slow {
+            wheels::run(places, steps, "release", true)?;
         }
     }
     if wants(Part::Web) {
