@@ -13,8 +13,8 @@ mod seeds;
 pub use built_in::{AgentKind, AgentMaker, BuiltInAgent, Following};
 pub use named::{AgentNameError, Budget, MonteCarlo, MonteCarloError, NamedAgent};
 pub use network::{
-    MAX_FILE_BYTES, Network, NetworkBatch, NetworkError, NetworkInfo, NetworkInput, NetworkOutput,
-    table_features,
+    MAX_FILE_BYTES, Network, NetworkBatch, NetworkError, NetworkId, NetworkInfo, NetworkInput,
+    NetworkOutput, table_features,
 };
 pub use participant::ParticipantKind;
 pub use play::{Answer, Listener, ask, is_wrong_action, play, play_agents};

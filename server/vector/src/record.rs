@@ -4,7 +4,7 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
 use chefshat_record::convert::{Played, reward_scheme_to_proto};
-use chefshat_simulation::vector::{InvalidActions, PlayedGame, VectorSetup};
+use chefshat_simulation::vector::{InvalidActions, Opponent, PlayedGame, VectorSetup};
 use prost::Message as _;
 
 /// Size from which a part of a record is sent, bytes.
@@ -45,7 +45,7 @@ pub fn record_lines(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::RecordL
     let record = Played {
         by: "vector",
         rules: setup.rules(),
-        agents: &setup.agents().map(|agent| agent.map(AgentKind::name)),
+        agents: &setup.agents().map(|agent| agent.map(Opponent::name)),
         seed: played.seed,
         scheme: setup.scheme(),
         policy: &simulation_policy(limit, setup.scheme()),

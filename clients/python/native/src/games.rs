@@ -8,7 +8,7 @@ use chefshat_engine::{ActionId, ActionSpace};
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
 use chefshat_simulation::vector::{
-    Batch as Columns, Decisions, LEAVE_OPEN, VectorGames, VectorSetup,
+    Batch as Columns, LEAVE_OPEN, Opponent, VectorGames, VectorSetup,
 };
 use chefshat_vector::{
     Limits, Request, RequestError, record_lines, saved_to_proto, seeds_from_setup,
@@ -231,13 +231,8 @@ pub(crate) fn action_texts(faces: u8) -> PyResult<Vec<String>> {
 
 /// Whether all built-in agents decide in less than a microsecond.
 fn only_fast_agents(setup: &VectorSetup) -> bool {
-    let others = match setup.decisions() {
-        Decisions::Turns { others } => others,
-        Decisions::All => None,
-    };
-    let agents = setup.agents().values().copied().chain([others]);
-    let fast = [AgentKind::Random, AgentKind::Greedy];
-    agents.flatten().all(|agent| fast.contains(&agent))
+    let fast = [AgentKind::Random, AgentKind::Greedy].map(Opponent::BuiltIn);
+    setup.built_in().all(|agent| fast.contains(&agent))
 }
 
 /// The records of games that ended, taken from their columns.

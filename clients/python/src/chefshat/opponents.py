@@ -59,7 +59,7 @@ class Policies:
 def split(options: VectorOptions) -> tuple[VectorOptions, Policies | None]:
     """Separates functions among the `opponents` of the options: returns the options of the games inside, and the functions."""
     given = options.get("opponents")
-    listed: Sequence[Any] = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    listed: Sequence[Any] = given if isinstance(given, Sequence) and not isinstance(given, (str, bytes)) else [given]
     functions = tuple(opponent if callable(opponent) else None for opponent in listed)
     if not any(functions):
         return options, None

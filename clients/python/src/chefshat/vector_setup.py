@@ -1,6 +1,8 @@
 """The options of a `VectorEnv`, and the first request of its stream. The stream is in `vector`."""
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypedDict, cast
 
 import numpy as np
@@ -13,10 +15,15 @@ if TYPE_CHECKING:
 Rules: TypeAlias = "pb.RuleSet | str | Mapping[str, Any] | None"
 """A rule set: the message, the name of a preset, or the message's fields. Enum values have short names: `opening="golden"`."""
 
+Opponent: TypeAlias = str | PathLike[str] | bytes
+"""A built-in agent by its name, or a network file: a path or a name that ends with .safetensors, or its content."""
+
 Seed: TypeAlias = "int | Sequence[bytes] | None"
 """The seed of the deals: a base seed, 0..2**64-1, from which every game's seed is derived; or the games' seeds, 32 bytes each, used
 in turn; None: random."""
 
+NETWORK_SUFFIX = ".safetensors"
+MAX_NETWORK_BYTES = 64 << 20
 _SEED_BYTES = 32
 _MAX_SEEDS = 16384
 _MAX_BASE_SEED = 2**64 - 1
@@ -38,8 +45,8 @@ class VectorOptions(TypedDict, total=False):
     Attributes:
         client_seats: the seats played by the client; default: all.
         opponents: who plays the other seats: one for each, in the order of the seats, or one for all; default: "random". The name
-            of a built-in agent, or a function from a batch to the action of each row, for instance an earlier self; see `Policy`.
-            Functions decide within the same step: each is asked for all rows of its seats that wait, until only the client's are
+            of a built-in agent; a network file (a path or a name that ends with .safetensors, or its content as bytes), which plays
+            as fast as "trained"; or a function from a batch to the action of each row, see `Policy`. Functions decide within the same step: each is asked for all rows of its seats that wait, until only the client's are
             left. Its seats count for the server's limits as the client's. OPPONENT_FAILED says what it did wrong.
         rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
         episode: "shift" (default) or "game".
@@ -61,7 +68,7 @@ class VectorOptions(TypedDict, total=False):
     """
 
     client_seats: Sequence[int] | None
-    opponents: "str | Policy | Sequence[str | Policy]"
+    opponents: "Opponent | Policy | Sequence[Opponent | Policy]"
     rewards: str | None
     episode: str
     decisions: str
@@ -100,8 +107,6 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     setup = pb.VectorSetup(
         games=games,
         client_seats=() if client_seats is None else client_seats,
-        # Functions are not part of the setup.
-        opponents=cast("list[str]", [opponents] if isinstance(opponents, str) else opponents),
         episode=choice("episode", options.get("episode", "shift"), pb.EpisodeScope, "EPISODE_SCOPE_"),
         decisions=choice("decisions", decisions, pb.DecisionScope, "DECISION_SCOPE_"),
         other_decisions=options.get("other_decisions") or "",
@@ -117,6 +122,8 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
         # A branch has the record's rules.
         rules=None if branch is not None else rule_set(rules),
     )
+    # Functions are not part of the setup.
+    _put_opponents(setup, cast("Opponent | Sequence[Opponent]", opponents))
     if client_seats is not None and len(client_seats) == 0:
         raise ValueError("client_seats is empty: name at least one seat, or leave it out to play all")
     if starts is not None:
@@ -127,6 +134,27 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
         setup.reward_scheme = choice("rewards", rewards, pb.RewardScheme, "REWARD_SCHEME_")
     put_seed(setup, options.get("seed"))
     return setup
+
+
+def _put_opponents(setup: pb.VectorSetup, opponents: Opponent | Sequence[Opponent]) -> None:
+    """Sets the opponents of a request, with the network files among them, each once."""
+    numbers: dict[bytes, int] = {}
+    for opponent in [opponents] if isinstance(opponents, (str, bytes, PathLike)) else opponents:
+        if isinstance(opponent, bytes):
+            name, content = "", opponent
+        elif isinstance(opponent, PathLike) or opponent.endswith(NETWORK_SUFFIX):
+            path = Path(opponent)
+            # Files of other kinds may be huge.
+            if path.stat().st_size > MAX_NETWORK_BYTES:
+                raise ValueError(f"{path} is larger than {MAX_NETWORK_BYTES >> 20} MiB, which no network for this game needs")
+            name, content = str(path), path.read_bytes()
+        else:
+            setup.opponents.append(opponent)
+            continue
+        if content not in numbers:
+            numbers[content] = len(numbers)
+            setup.networks.add(name=name, content=content)
+        setup.opponents.append(f"network:{numbers[content]}")
 
 
 def rule_set(rules: Rules) -> pb.RuleSet:

@@ -11,10 +11,11 @@ use chefshat_engine::{RuleSet, RuleSetSpec};
 use half::f16;
 use safetensors::tensor::{SafeTensors, TensorView};
 use safetensors::{Dtype, SafeTensorError};
+use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
 use super::layers::{Hidden, Output};
-use super::{Network, NetworkInfo, NetworkInput, NetworkOutput};
+use super::{Network, NetworkId, NetworkInfo, NetworkInput, NetworkOutput};
 
 /// The format, as named in the metadata.
 const FORMAT: &str = "chefshat-network-1";
@@ -115,7 +116,10 @@ impl Network {
             .into_iter()
             .map(|layer| Hidden::new(&layer.weights, &layer.bias))
             .collect();
+        let digest = Sha256::digest(bytes);
+        let id = digest.first_chunk().expect("a digest has 32 bytes");
         Ok(Network {
+            id: NetworkId(*id),
             info,
             inputs,
             hidden,

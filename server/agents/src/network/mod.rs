@@ -70,9 +70,14 @@ pub struct NetworkInfo {
     pub trained_by: String,
 }
 
+/// Identifies a network: the first 16 bytes of the SHA-256 of its file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NetworkId(pub [u8; 16]);
+
 /// A multilayer perceptron that plays the legal action with the highest output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
+    id: NetworkId,
     info: NetworkInfo,
     /// Length of the input.
     inputs: usize,
@@ -84,6 +89,11 @@ impl Network {
     /// The network of the built-in agent `trained`, which is part of the program.
     pub fn trained() -> &'static Arc<Network> {
         &TRAINED
+    }
+
+    /// Identifies its file.
+    pub fn id(&self) -> NetworkId {
+        self.id
     }
 
     /// The metadata of its file.

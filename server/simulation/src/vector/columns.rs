@@ -269,6 +269,15 @@ impl Batch {
         self.masks.extend(next.masks);
     }
 
+    /// Sorts what happened by game, but not the rows of open decisions. What happened in a game keeps
+    /// its order.
+    pub(super) fn sort_by_game(&mut self) {
+        self.endings.sort_by_game();
+        self.beginnings.sort_by_game();
+        self.shifts.sort_by_game();
+        self.played.sort_by_key(|played| played.game);
+    }
+
     pub(super) fn push(&mut self, row: &Row<'_>) {
         self.rows += 1;
         put_u32(&mut self.games, row.game);
@@ -299,24 +308,31 @@ impl Totals {
 }
 
 impl ObservationColumns {
+    /// All columns.
+    fn columns(&mut self) -> [&mut Vec<u8>; 16] {
+        [
+            &mut self.shifts,
+            &mut self.pizzas,
+            &mut self.hands,
+            &mut self.golden,
+            &mut self.boards,
+            &mut self.board_owners,
+            &mut self.cards_left,
+            &mut self.passed,
+            &mut self.places,
+            &mut self.roles,
+            &mut self.points,
+            &mut self.played,
+            &mut self.gave,
+            &mut self.received,
+            &mut self.history,
+            &mut self.history_counts,
+        ]
+    }
+
     /// Adds the rows of another table.
-    fn append(&mut self, next: ObservationColumns) {
-        self.shifts.extend(next.shifts);
-        self.pizzas.extend(next.pizzas);
-        self.hands.extend(next.hands);
-        self.golden.extend(next.golden);
-        self.boards.extend(next.boards);
-        self.board_owners.extend(next.board_owners);
-        self.cards_left.extend(next.cards_left);
-        self.passed.extend(next.passed);
-        self.places.extend(next.places);
-        self.roles.extend(next.roles);
-        self.points.extend(next.points);
-        self.played.extend(next.played);
-        self.gave.extend(next.gave);
-        self.received.extend(next.received);
-        self.history.extend(next.history);
-        self.history_counts.extend(next.history_counts);
+    fn append(&mut self, mut next: ObservationColumns) {
+        append_columns(self.columns(), next.columns());
     }
 
     fn with_room(rows: usize, cards: usize, seats: usize, history: u16) -> ObservationColumns {
@@ -383,17 +399,32 @@ impl ObservationColumns {
 }
 
 impl Endings {
+    /// All columns but those of the observations.
+    fn columns(&mut self) -> [&mut Vec<u8>; 7] {
+        [
+            &mut self.games,
+            &mut self.indices,
+            &mut self.seats,
+            &mut self.rewards,
+            &mut self.ends,
+            &mut self.game_over,
+            &mut self.places_taken,
+        ]
+    }
+
     /// Adds the rows of another table.
-    fn append(&mut self, next: Endings) {
+    fn append(&mut self, mut next: Endings) {
         self.rows += next.rows;
+        append_columns(self.columns(), next.columns());
         self.observations.append(next.observations);
-        self.games.extend(next.games);
-        self.indices.extend(next.indices);
-        self.seats.extend(next.seats);
-        self.rewards.extend(next.rewards);
-        self.ends.extend(next.ends);
-        self.game_over.extend(next.game_over);
-        self.places_taken.extend(next.places_taken);
+    }
+
+    /// Sorts the rows by game. Those of a game keep their order.
+    fn sort_by_game(&mut self) {
+        if let Some(order) = order_by_game(&self.games) {
+            reorder(self.columns(), &order);
+            reorder(self.observations.columns(), &order);
+        }
     }
 
     pub(super) fn push(&mut self, row: &Ending<'_>) {
@@ -411,12 +442,22 @@ impl Endings {
 }
 
 impl Beginnings {
+    /// All columns.
+    fn columns(&mut self) -> [&mut Vec<u8>; 3] {
+        [&mut self.games, &mut self.indices, &mut self.seeds]
+    }
+
     /// Adds the rows of another table.
-    fn append(&mut self, next: Beginnings) {
+    fn append(&mut self, mut next: Beginnings) {
         self.rows += next.rows;
-        self.games.extend(next.games);
-        self.indices.extend(next.indices);
-        self.seeds.extend(next.seeds);
+        append_columns(self.columns(), next.columns());
+    }
+
+    /// Sorts the rows by game. Those of a game keep their order.
+    fn sort_by_game(&mut self) {
+        if let Some(order) = order_by_game(&self.games) {
+            reorder(self.columns(), &order);
+        }
     }
 
     pub(super) fn push(&mut self, game: u32, index: u64, seed: &[u8; 32]) {
@@ -428,26 +469,40 @@ impl Beginnings {
 }
 
 impl Shifts {
+    /// All columns.
+    fn columns(&mut self) -> [&mut Vec<u8>; 17] {
+        [
+            &mut self.games,
+            &mut self.indices,
+            &mut self.shifts,
+            &mut self.starters,
+            &mut self.pizzas,
+            &mut self.laps,
+            &mut self.turns,
+            &mut self.special_actions,
+            &mut self.adjudicated,
+            &mut self.game_winners,
+            &mut self.places,
+            &mut self.points,
+            &mut self.valid,
+            &mut self.wrong,
+            &mut self.passes,
+            &mut self.reward_sums,
+            &mut self.performance,
+        ]
+    }
+
     /// Adds the rows of another table.
-    fn append(&mut self, next: Shifts) {
+    fn append(&mut self, mut next: Shifts) {
         self.rows += next.rows;
-        self.games.extend(next.games);
-        self.indices.extend(next.indices);
-        self.shifts.extend(next.shifts);
-        self.starters.extend(next.starters);
-        self.pizzas.extend(next.pizzas);
-        self.laps.extend(next.laps);
-        self.turns.extend(next.turns);
-        self.special_actions.extend(next.special_actions);
-        self.adjudicated.extend(next.adjudicated);
-        self.game_winners.extend(next.game_winners);
-        self.places.extend(next.places);
-        self.points.extend(next.points);
-        self.valid.extend(next.valid);
-        self.wrong.extend(next.wrong);
-        self.passes.extend(next.passes);
-        self.reward_sums.extend(next.reward_sums);
-        self.performance.extend(next.performance);
+        append_columns(self.columns(), next.columns());
+    }
+
+    /// Sorts the rows by game. Those of a game keep their order.
+    fn sort_by_game(&mut self) {
+        if let Some(order) = order_by_game(&self.games) {
+            reorder(self.columns(), &order);
+        }
     }
 
     pub(super) fn push(
@@ -512,6 +567,34 @@ const fn kind_number(kind: DecisionKind) -> u8 {
 
 fn seat_or_none(seat: Option<Seat>) -> u8 {
     seat.map_or(NO_SEAT, |seat| seat.index() as u8)
+}
+
+/// Appends each column to its counterpart.
+fn append_columns<const N: usize>(columns: [&mut Vec<u8>; N], next: [&mut Vec<u8>; N]) {
+    for (column, next) in columns.into_iter().zip(next) {
+        column.append(next);
+    }
+}
+
+/// The rows in the order of their games; `None` if they are in it.
+fn order_by_game(games: &[u8]) -> Option<Vec<usize>> {
+    let (games, _) = games.as_chunks::<4>();
+    let game = |row: usize| u32::from_le_bytes(games[row]);
+    let mut order: Vec<usize> = (0..games.len()).collect();
+    if order.is_sorted_by_key(|row| game(*row)) {
+        return None;
+    }
+    order.sort_by_key(|row| game(*row));
+    Some(order)
+}
+
+/// Puts the rows of columns in another order.
+fn reorder<const N: usize>(columns: [&mut Vec<u8>; N], order: &[usize]) {
+    for column in columns {
+        let width = column.len() / order.len();
+        let rows = order.iter().flat_map(|row| &column[row * width..][..width]);
+        *column = rows.copied().collect();
+    }
 }
 
 fn put_u32(column: &mut Vec<u8>, value: u32) {

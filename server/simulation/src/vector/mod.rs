@@ -25,6 +25,7 @@ mod blocks;
 mod columns;
 mod error;
 mod history;
+mod opponent;
 mod part;
 mod running;
 mod sampling;
@@ -34,6 +35,7 @@ mod setup;
 mod slot;
 mod start;
 mod terms;
+mod waiting;
 
 use std::sync::Arc;
 
@@ -43,6 +45,7 @@ use rayon::ThreadPool;
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
 pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+pub use opponent::Opponent;
 use part::{OpenRow, Part};
 pub use saved::SavedGame;
 pub use seen::SeenShift;
@@ -50,6 +53,7 @@ pub use setup::{Episode, VectorSetup};
 use slot::Slot;
 pub use start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};
+use waiting::Waiting;
 
 /// Leaves a decision open, in place of an action: the next batch has it again, unchanged. For a
 /// client that decides for some seats first.
@@ -63,6 +67,8 @@ pub struct VectorGames {
     /// The rows of the last batch.
     open: Vec<OpenRow>,
     pool: Option<Arc<ThreadPool>>,
+    /// The buffers of each block of games. Empty between steps.
+    waiting: Vec<Waiting>,
     totals: Totals,
     step: u64,
 }
@@ -80,6 +86,7 @@ impl VectorGames {
             slots: Vec::with_capacity(setup.games() as usize),
             open: Vec::new(),
             pool,
+            waiting: Vec::new(),
             setup,
             totals: Totals::default(),
             step: 0,
@@ -129,7 +136,8 @@ impl VectorGames {
         }
         let (setup, open) = (&self.setup, std::mem::take(&mut self.open));
         let every_game = open.len() == self.slots.len();
-        let part = blocks::run(&mut self.slots, setup, self.pool.as_ref(), |slot, part| {
+        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
             let game = slot.number();
             let row = match every_game {
                 true => Some(game as usize),
@@ -140,7 +148,7 @@ impl VectorGames {
             {
                 slot.answer(actions[row], setup, part);
             }
-            slot.advance(setup, part);
+            true
         });
         let batch = self.finished(part);
         if self.setup.keeps_records()
@@ -246,11 +254,13 @@ impl VectorGames {
     /// Restarts some games, in ascending order, with their next indices.
     fn begin_some(&mut self, games: &[u32]) -> Batch {
         let setup = &self.setup;
-        let part = blocks::run(&mut self.slots, setup, self.pool.as_ref(), |slot, part| {
-            if games.binary_search(&slot.number()).is_ok() {
+        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
+            let begins = games.binary_search(&slot.number()).is_ok();
+            if begins {
                 slot.begin_next(setup, part);
-                slot.advance(setup, part);
             }
+            begins
         });
         self.finished(part)
     }
@@ -259,9 +269,10 @@ impl VectorGames {
         let setup = &self.setup;
         self.slots.clear();
         self.slots.extend((0..setup.games()).map(Slot::new));
-        let part = blocks::run(&mut self.slots, setup, self.pool.as_ref(), |slot, part| {
+        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
             slot.begin(setup, part);
-            slot.advance(setup, part);
+            true
         });
         self.finished(part)
     }

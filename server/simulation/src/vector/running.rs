@@ -7,6 +7,7 @@ use chefshat_engine::{
 
 use super::error::StateError;
 use super::history::History;
+use super::opponent::Opponent;
 use super::terms::{Decisions, InvalidActions, Terms};
 use chefshat_agents::{BuiltInAgent, agent_seed, is_wrong_action};
 
@@ -15,7 +16,8 @@ use chefshat_agents::{BuiltInAgent, agent_seed, is_wrong_action};
 pub(super) struct RunningGame {
     pub(super) seed: Seed,
     pub(super) game: Game,
-    /// Agents by seat; empty if there are none. On the client's seats they take the decisions that the client does not.
+    /// Agents by seat; empty if there are none. On the client's seats they take the decisions that
+    /// the client does not. Networks are not among them: they have no state, and the setup has them.
     pub(super) agents: Box<[Option<BuiltInAgent>]>,
     /// Collects statistics of Shifts, if enabled.
     pub(super) recorder: Option<MetricsRecorder>,
@@ -75,7 +77,11 @@ impl RunningGame {
             Decisions::All | Decisions::Turns { others: None } => None,
             Decisions::Turns { others } => others,
         };
-        let kind = |seat| terms.agents.get(seat).and_then(|agent| agent.or(others));
+        let kind = |seat| match terms.agents.get(seat) {
+            Some(Some(Opponent::BuiltIn(kind))) => Some(*kind),
+            Some(Some(Opponent::Network(_))) => None,
+            Some(None) | None => others,
+        };
         let kinds = (0..terms.agents.len()).map(|index| (Seat::new(index), kind(Seat::new(index))));
         if kinds.clone().all(|(_, kind)| kind.is_none()) {
             return Box::default();

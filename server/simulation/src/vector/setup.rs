@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Seed};
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, Network};
 
 use super::error::StateError;
 use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+use super::opponent::Opponent;
 use super::saved::SavedGame;
 use super::start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
 use super::terms::{Decisions, InvalidActions, Terms};
@@ -28,7 +29,9 @@ pub enum Episode {
 pub struct VectorSetup {
     rules: RuleSet,
     games: u32,
-    agents: BySeat<Option<AgentKind>>,
+    agents: BySeat<Option<Opponent>>,
+    /// `trained`, then those that the client has supplied, each once.
+    networks: Vec<Arc<Network>>,
     scheme: Option<RewardScheme>,
     episode: Episode,
     decisions: Decisions,
@@ -40,6 +43,22 @@ pub struct VectorSetup {
     statistics: bool,
     records: bool,
     history: u16,
+}
+
+/// Checks the numbers of games, seats and seeds.
+fn check_sizes<A>(games: u32, agents: &BySeat<Option<A>>, seeds: &Seeds) -> Result<(), SetupError> {
+    let seats = agents.values().filter(|agent| agent.is_none()).count();
+    if seats == 0 {
+        return Err(SetupError::NoClient);
+    }
+    let played = u64::from(games) * seats as u64;
+    if !(1..=u64::from(MAX_SEATS_PLAYED)).contains(&played) {
+        return Err(SetupError::Games { games, seats });
+    }
+    if matches!(seeds, Seeds::List(list) if list.is_empty()) {
+        return Err(SetupError::NoSeeds);
+    }
+    Ok(())
 }
 
 impl VectorSetup {
@@ -62,21 +81,12 @@ impl VectorSetup {
                 given: agents.len(),
                 players,
             })?;
-        let seats = agents.values().filter(|agent| agent.is_none()).count();
-        if seats == 0 {
-            return Err(SetupError::NoClient);
-        }
-        let played = u64::from(games) * seats as u64;
-        if !(1..=u64::from(MAX_SEATS_PLAYED)).contains(&played) {
-            return Err(SetupError::Games { games, seats });
-        }
-        if matches!(&seeds, Seeds::List(list) if list.is_empty()) {
-            return Err(SetupError::NoSeeds);
-        }
+        check_sizes(games, &agents, &seeds)?;
         Ok(VectorSetup {
             rules,
             games,
-            agents,
+            agents: agents.map(|agent| agent.map(Opponent::BuiltIn)),
+            networks: vec![Arc::clone(Network::trained())],
             scheme: None,
             episode: Episode::default(),
             decisions: Decisions::default(),
@@ -89,6 +99,36 @@ impl VectorSetup {
             records: false,
             history: 0,
         })
+    }
+
+    /// Has a network play a seat that the client does not.
+    ///
+    /// # Errors
+    /// If the client plays the seat, or the network was trained for other games.
+    pub fn with_network(
+        mut self,
+        seat: Seat,
+        network: Arc<Network>,
+    ) -> Result<VectorSetup, SetupError> {
+        if self.agents.get(seat).is_none_or(Option::is_none) {
+            return Err(SetupError::ClientsSeat(seat));
+        }
+        if !network.fits(&self.rules) {
+            let info = network.info();
+            return Err(SetupError::UnfitNetwork {
+                trained: [info.players, info.faces, info.hand_size],
+                here: [
+                    self.rules.players() as u8,
+                    self.rules.faces(),
+                    self.rules.hand_size(),
+                ],
+            });
+        }
+        self.agents[seat] = Some(Opponent::Network(network.id()));
+        if self.networks.iter().all(|known| known.id() != network.id()) {
+            self.networks.push(network);
+        }
+        Ok(self)
     }
 
     /// Rewards turns by a scheme.
@@ -213,12 +253,12 @@ impl VectorSetup {
     ) -> Result<VectorSetup, SetupError> {
         let copies = u32::try_from(games.len()).unwrap_or(u32::MAX);
         let copies = copies.saturating_mul(times);
-        let (agents, same_deals) = (self.agents.as_slice(), seeds.is_none());
+        let same_deals = seeds.is_none();
         let seeds = seeds.unwrap_or_else(|| self.seeds.clone());
-        let sized = VectorSetup::new(self.rules, copies, agents, seeds)?;
+        check_sizes(copies, &self.agents, &seeds)?;
         VectorSetup {
             games: copies,
-            seeds: sized.seeds,
+            seeds,
             total_games: self.total_games.and(NonZeroU64::new(copies.into())),
             records: false,
             start: Start::Deal,
@@ -265,25 +305,48 @@ impl VectorSetup {
         self.games
     }
 
-    /// The built-in agents by seat; `None` where the client plays.
-    pub fn agents(&self) -> &BySeat<Option<AgentKind>> {
+    /// The agents by seat; `None` where the client plays.
+    pub fn agents(&self) -> &BySeat<Option<Opponent>> {
         &self.agents
     }
 
-    /// All built-in agents: those of seats, and the one for decisions that the client does not take.
-    pub fn built_in(&self) -> impl Iterator<Item = AgentKind> + '_ {
+    /// All agents: those of seats, and the one for decisions that the client does not take.
+    pub fn built_in(&self) -> impl Iterator<Item = Opponent> + '_ {
         let others = match self.decisions {
             Decisions::Turns { others } => others,
             Decisions::All => None,
         };
-        self.agents.values().copied().chain([others]).flatten()
+        let agents = self.agents.values().copied();
+        agents.chain([others.map(Opponent::BuiltIn)]).flatten()
     }
 
     /// Whether steps are long because of the agents: a network takes long for a decision, and an
     /// agent that may pass at any time for a Shift.
     pub fn has_slow_agents(&self) -> bool {
-        let slow = [AgentKind::Trained, AgentKind::RandomUnmasked];
-        self.built_in().any(|agent| slow.contains(&agent))
+        self.built_in().any(|agent| match agent {
+            Opponent::BuiltIn(kind) => {
+                matches!(kind, AgentKind::Trained | AgentKind::RandomUnmasked)
+            }
+            Opponent::Network(_) => true,
+        })
+    }
+
+    /// The network that takes the decisions of a seat which the client does not take, by its number.
+    pub(super) fn network_at(&self, seat: Seat) -> Option<usize> {
+        let agent = match (self.agents[seat], self.decisions) {
+            (None, Decisions::Turns { others }) => others.map(Opponent::BuiltIn),
+            (agent, _) => agent,
+        };
+        match agent? {
+            Opponent::BuiltIn(AgentKind::Trained) => Some(0),
+            Opponent::BuiltIn(_) => None,
+            Opponent::Network(id) => self.networks.iter().position(|known| known.id() == id),
+        }
+    }
+
+    /// A network, by its number.
+    pub(super) fn network(&self, number: usize) -> &Network {
+        &self.networks[number]
     }
 
     /// The seats of the client, ascending.

@@ -2,7 +2,7 @@
 //! agents to the client's next decision, and writes rewards, ended episodes and counts.
 
 use chefshat_engine::{
-    Action, ActionId, BySeat, Decision, Event, MetricsRecorder, Standings, Viewer,
+    Action, ActionId, BySeat, Decision, Event, Mask, MetricsRecorder, Standings, Viewer,
 };
 
 use super::columns::{Ending, PlayedGame, Row, places_taken};
@@ -13,6 +13,7 @@ use super::saved::SavedGame;
 use super::setup::{Episode, VectorSetup};
 use super::start::Start;
 use super::terms::Decisions;
+use super::waiting::Waiting;
 use chefshat_agents::{ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;
 
@@ -27,6 +28,8 @@ pub(super) struct Slot {
     index: u64,
     /// `None` once the last game is over.
     running: Option<RunningGame>,
+    /// Shifts that have ended in this step, not counting one that the client's action ended.
+    shifts: u64,
 }
 
 impl Slot {
@@ -36,6 +39,7 @@ impl Slot {
             number,
             index: u64::from(number),
             running: None,
+            shifts: 0,
         }
     }
 
@@ -114,11 +118,41 @@ impl Slot {
         self.take(taken, taken != action, setup, part);
     }
 
-    /// Advances until the client has to decide, the last game is over, or the step's limit is
-    /// reached. Decisions and attempts of built-in agents count against the part's budget.
-    pub(super) fn advance(&mut self, setup: &VectorSetup, part: &mut Part) {
-        let shifts_before = part.totals.shifts;
-        while part.budget > 0 && part.totals.shifts - shifts_before < MAX_SHIFTS_PER_STEP {
+    /// Advances until the client or a network has to decide, the last game is over, or the step's
+    /// limit is reached. Decisions and attempts of built-in agents count against the part's budget.
+    /// `place` is that of the slot among those of the part.
+    pub(super) fn advance(
+        &mut self,
+        place: usize,
+        setup: &VectorSetup,
+        part: &mut Part,
+        waiting: &mut Waiting,
+    ) {
+        self.shifts = 0;
+        self.continue_step(place, setup, part, waiting);
+    }
+
+    /// Takes a network's action, for which the game has waited, and advances on.
+    pub(super) fn advance_with(
+        &mut self,
+        action: ActionId,
+        place: usize,
+        setup: &VectorSetup,
+        part: &mut Part,
+        waiting: &mut Waiting,
+    ) {
+        self.take_counted(action, false, setup, part);
+        self.continue_step(place, setup, part, waiting);
+    }
+
+    fn continue_step(
+        &mut self,
+        place: usize,
+        setup: &VectorSetup,
+        part: &mut Part,
+        waiting: &mut Waiting,
+    ) {
+        while part.budget > 0 && self.shifts < MAX_SHIFTS_PER_STEP {
             let Some(running) = &mut self.running else {
                 return;
             };
@@ -129,11 +163,12 @@ impl Slot {
                 self.finish(setup, part);
                 continue;
             };
-            let taken = running.built_in_action(setup, decision, &mut part.budget);
-            if let Some((action, by_default)) = taken {
-                self.take(action, by_default, setup, part);
-            } else {
-                return;
+            let budget = &mut part.budget;
+            match running.decide(place, setup, decision, budget, waiting) {
+                Decided::Action(action, by_default) => {
+                    self.take_counted(action, by_default, setup, part);
+                }
+                Decided::Later => return,
             }
         }
     }
@@ -162,6 +197,19 @@ impl Slot {
             seat,
             legal: open.legal,
         });
+    }
+
+    /// Applies a legal action of an agent, and counts a Shift that it ends.
+    fn take_counted(
+        &mut self,
+        action: ActionId,
+        by_default: bool,
+        setup: &VectorSetup,
+        part: &mut Part,
+    ) {
+        let before = part.totals.shifts;
+        self.take(action, by_default, setup, part);
+        self.shifts += part.totals.shifts - before;
     }
 
     /// Applies a legal action and records its effects.
@@ -263,6 +311,19 @@ impl Slot {
     }
 }
 
+/// The result of asking those who decide without the client.
+enum Decided {
+    /// An action, and whether it is the default after invalid attempts.
+    Action(ActionId, bool),
+    /// None yet: the client or a network has to be asked.
+    Later,
+}
+
+/// The only legal action, if there is no other.
+fn only(legal: &Mask) -> Option<ActionId> {
+    (legal.len() == 1).then(|| legal.nth(0)).flatten()
+}
+
 impl RunningGame {
     /// Begins the game with this index.
     fn begin(setup: &VectorSetup, index: u64) -> RunningGame {
@@ -296,14 +357,16 @@ impl RunningGame {
         }
     }
 
-    /// Takes a decision without the client: the action, and whether it is the default after invalid
-    /// attempts. Opens the decision and returns `None` if it is the client's.
-    fn built_in_action(
+    /// Takes a decision without the client. Opens it if it is the client's; if a network has to be
+    /// asked, adds it to those that wait.
+    fn decide(
         &mut self,
+        place: usize,
         setup: &VectorSetup,
         decision: Decision,
         budget: &mut u64,
-    ) -> Option<(ActionId, bool)> {
+        waiting: &mut Waiting,
+    ) -> Decided {
         *budget = budget.saturating_sub(1);
         let seat = decision.seat;
         let owned = setup.agents()[seat].is_none();
@@ -311,8 +374,10 @@ impl RunningGame {
             let asked = setup.decisions() == Decisions::All || is_wrong_action(decision);
             if asked {
                 let legal = self.game.legal_actions();
-                if setup.skip_forced() && legal.len() == 1 {
-                    return legal.nth(0).map(|action| (action, false));
+                if setup.skip_forced()
+                    && let Some(action) = only(&legal)
+                {
+                    return Decided::Action(action, false);
                 }
                 self.open = Some(Open {
                     decision,
@@ -320,12 +385,21 @@ impl RunningGame {
                     attempts: 0,
                     reward: 0.0,
                 });
-                return None;
+                return Decided::Later;
             }
+        }
+        if let Some(number) = setup.network_at(seat) {
+            let legal = self.game.legal_actions();
+            let chosen = only(&legal).or_else(|| {
+                let seen = self.game.observe(Viewer::Seat(seat));
+                waiting.decide_or_wait(number, setup.network(number), place, &seen, &legal)
+            });
+            return chosen.map_or(Decided::Later, |action| Decided::Action(action, false));
         }
         let agent = self.agents.get_mut(seat.index());
         let Some(agent) = agent.and_then(Option::as_mut) else {
-            return self.game.default_action().map(|action| (action, false));
+            let action = self.game.default_action();
+            return Decided::Action(action.expect("an open decision has a default"), false);
         };
         let legal = self.game.legal_actions();
         let answer = ask(
@@ -346,7 +420,7 @@ impl RunningGame {
                 }
             },
         );
-        Some((answer.action, answer.by_default))
+        Decided::Action(answer.action, answer.by_default)
     }
 
     /// Records an illegal action of the client.

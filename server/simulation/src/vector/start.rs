@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use chefshat_agents::game_seed;
-use chefshat_engine::{ActionError, ActionId, Game, Script, ScriptError, Seed};
+use chefshat_engine::{ActionError, ActionId, Game, Script, ScriptError, Seat, Seed};
 use thiserror::Error;
 
 use super::error::{StateError, StepError};
@@ -85,6 +85,20 @@ pub enum SetupError {
     /// The client has no seat.
     #[error("the client plays no seat: give it at least one")]
     NoClient,
+    /// A network is to play a seat of the client.
+    #[error("the client plays seat {0}: a network plays only other seats")]
+    ClientsSeat(Seat),
+    /// A network was trained for other games. Players, faces, cards of a hand.
+    #[error(
+        "it is for {} players, {} faces and hands of {}, and these games have {} players, {} faces and hands of {}: use one that was trained under such rules",
+        .trained[0], .trained[1], .trained[2], .here[0], .here[1], .here[2]
+    )]
+    UnfitNetwork {
+        /// Those of the network.
+        trained: [u8; 3],
+        /// Those of the games.
+        here: [u8; 3],
+    },
     /// The number of games is 0 or too large.
     #[error(
         "{games} games with {seats} of the client's seats: play at least 1 game, and at most {MAX_SEATS_PLAYED} games times seats"

@@ -6,6 +6,8 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::{BySeat, RewardScheme, RuleSet};
 use thiserror::Error;
 
+use super::opponent::Opponent;
+
 /// Which decisions of its seats the client takes.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub enum Decisions {
@@ -51,7 +53,7 @@ pub struct Difference {
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub(super) struct Terms {
     pub(super) rules: RuleSet,
-    pub(super) agents: BySeat<Option<AgentKind>>,
+    pub(super) agents: BySeat<Option<Opponent>>,
     pub(super) scheme: Option<RewardScheme>,
     pub(super) decisions: Decisions,
     pub(super) invalid: InvalidActions,
@@ -67,7 +69,8 @@ impl Terms {
         let (saved_rules, rules) = (self.rules.spec(), here.rules.spec());
         let agents = |terms: &Terms| {
             let names = terms.agents.values();
-            let names = names.map(|agent| agent.map_or("client", AgentKind::name));
+            let names =
+                names.map(|agent| agent.map_or("client".to_owned(), |agent| agent.to_string()));
             names.collect::<Vec<_>>().join(", ")
         };
         let scheme = |terms: &Terms| terms.scheme.map_or("none", RewardScheme::name);

@@ -13,7 +13,6 @@
 
 use std::num::NonZeroU32;
 
-use chefshat_agents::AgentKind;
 use chefshat_engine::{
     ActionId, Game, MetricsRecorder, Opening, PassScope, PlayedDecision, RecorderState,
     RewardScheme, RuleSet, RuleSetSpec, SeatCounts, Seed, Stop,
@@ -25,6 +24,7 @@ use super::history::{history, put_history};
 use super::reader::Reader;
 use crate::vector::error::{STATE_VERSION, StateError};
 use crate::vector::history::MAX_HISTORY;
+use crate::vector::opponent::Opponent;
 use crate::vector::running::{Open, RunningGame};
 use crate::vector::terms::{Decisions, InvalidActions, Terms};
 
@@ -93,8 +93,8 @@ fn put_text(out: &mut Vec<u8>, text: &str) {
     out.extend(text.as_bytes());
 }
 
-fn put_agent(out: &mut Vec<u8>, agent: Option<AgentKind>) {
-    put_text(out, agent.map_or("", AgentKind::name));
+fn put_agent(out: &mut Vec<u8>, agent: Option<Opponent>) {
+    put_text(out, &agent.map_or(String::new(), |agent| agent.to_string()));
 }
 
 fn put_terms(out: &mut Vec<u8>, terms: &Terms) {
@@ -129,7 +129,7 @@ fn put_terms(out: &mut Vec<u8>, terms: &Terms) {
         Decisions::Turns { others } => (true, others),
     };
     out.push(turns.into());
-    put_agent(out, others);
+    put_agent(out, others.map(Opponent::BuiltIn));
     let (asks, limit) = match terms.invalid {
         InvalidActions::Error => (false, None),
         InvalidActions::AskAgain { limit } => (true, limit),
@@ -151,6 +151,11 @@ fn terms(reader: &mut Reader<'_>) -> Result<Terms, StateError> {
         }
     };
     let (turns, others) = (reader.flag()?, reader.agent()?);
+    let others = match others {
+        None => None,
+        Some(Opponent::BuiltIn(kind)) => Some(kind),
+        Some(Opponent::Network(_)) => return Err(StateError::Malformed("no network takes these")),
+    };
     let (asks, limit) = (reader.flag()?, NonZeroU32::new(reader.u32()?));
     Ok(Terms {
         rules,

@@ -1,10 +1,10 @@
 //! Reads numbers from bytes that may be anything: every read is checked, and no length is trusted.
 
-use chefshat_agents::AgentKind;
 use chefshat_engine::{BySeat, Seat};
 
 use crate::vector::columns::NO_SEAT;
 use crate::vector::error::StateError;
+use crate::vector::opponent::Opponent;
 
 /// Bytes not yet read.
 pub(super) struct Reader<'a>(pub(super) &'a [u8]);
@@ -78,14 +78,14 @@ impl<'a> Reader<'a> {
         std::str::from_utf8(bytes).map_err(|_| StateError::Malformed("a name is not text"))
     }
 
-    /// The name of a built-in agent; `None` if empty.
-    pub(super) fn agent(&mut self) -> Result<Option<AgentKind>, StateError> {
+    /// An agent; `None` if empty.
+    pub(super) fn agent(&mut self) -> Result<Option<Opponent>, StateError> {
         let name = self.text()?;
         if name.is_empty() {
             return Ok(None);
         }
         let unknown = StateError::Malformed("an agent of this name is not built in");
-        AgentKind::from_name(name).map(Some).ok_or(unknown)
+        Opponent::from_text(name).map(Some).ok_or(unknown)
     }
 
     pub(super) fn seat(&mut self, players: usize) -> Result<Seat, StateError> {

@@ -3,6 +3,7 @@
 mod episodes;
 mod histories;
 mod limits;
+mod networks;
 mod play;
 mod starts;
 mod states;

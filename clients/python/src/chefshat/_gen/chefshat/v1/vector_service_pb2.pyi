@@ -302,6 +302,32 @@ class SavedStart(_message.Message):
 Global___SavedStart: _TypeAlias = SavedStart  # noqa: Y015
 
 @_typing.final
+class NetworkFile(_message.Message):
+    """A network file, as `chefshat.learn` writes it."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    CONTENT_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """Its name, for messages; may be empty."""
+    content: _builtins.bytes
+    """Its content."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+        content: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["content", b"content", "name", b"name"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___NetworkFile: _TypeAlias = NetworkFile  # noqa: Y015
+
+@_typing.final
 class VectorSetup(_message.Message):
     """How the games of a stream are played."""
 
@@ -328,6 +354,7 @@ class VectorSetup(_message.Message):
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
     HISTORY_FIELD_NUMBER: _builtins.int
+    NETWORKS_FIELD_NUMBER: _builtins.int
     games: _builtins.int
     """Number of parallel games n, at least 1. Games times client seats is at most max_vector_seats;
     all streams of a server together have at most max_vector_seats_in_all.
@@ -381,8 +408,9 @@ class VectorSetup(_message.Message):
 
     @_builtins.property
     def opponents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """Names of the built-in agents of the other seats: one for each in the order of the seats, or one
-        for all; empty: "random". They decide within the same step.
+        """Names of the agents of the other seats: one for each in the order of the seats, or one for all;
+        empty: "random". A name is that of a built-in agent, or "network:I" for the network file at I
+        of `networks`, from 0. They decide within the same step.
         """
 
     @_builtins.property
@@ -404,6 +432,14 @@ class VectorSetup(_message.Message):
     @_builtins.property
     def listed(self) -> Global___ListedStarts:
         """With hands and actions of its own."""
+
+    @_builtins.property
+    def networks(self) -> _containers.RepeatedCompositeFieldContainer[Global___NetworkFile]:
+        """Network files that `opponents` name, each at least once: at most one for each seat that the
+        client does not play. Their numbers of players, faces and cards dealt are those of the games.
+        Over the network, the setup with all files has at most max_vector_message_bytes: enough for two
+        of the size of "trained". A state can be restored where the same files play the same seats.
+        """
 
     def __init__(
         self,
@@ -429,10 +465,11 @@ class VectorSetup(_message.Message):
         shift_statistics: _builtins.bool = ...,
         records: _builtins.bool = ...,
         history: _builtins.int = ...,
+        networks: _abc.Iterable[Global___NetworkFile] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "listed", b"listed", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "listed", b"listed", "max_invalid_attempts", b"max_invalid_attempts", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "listed", b"listed", "max_invalid_attempts", b"max_invalid_attempts", "networks", b"networks", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
