@@ -392,4 +392,10 @@ def _begin(
     if address is None or address == LOCAL:
         # A server of this process knows no tokens.
         address = ServerAddress(local_server.shared_address(), token="")
+    if setup.networks and setup.ByteSize() > MAX_MESSAGE_BYTES:
+        size = sum(len(file.content) for file in setup.networks)
+        raise ValueError(
+            f"the network files have {size >> 10} KiB, and a server takes less than {MAX_MESSAGE_BYTES >> 10}: save them as 16-bit "
+            "floats (`network.save(..., dtype=numpy.float16)`), or leave the address out to play in this process"
+        )
     return RemoteGames(server_address(address, token, ca), setup)

@@ -45,9 +45,10 @@ class VectorOptions(TypedDict, total=False):
     Attributes:
         client_seats: the seats played by the client; default: all.
         opponents: who plays the other seats: one for each, in the order of the seats, or one for all; default: "random". The name
-            of a built-in agent; a network file (a path or a name that ends with .safetensors, or its content as bytes), which plays
-            as fast as "trained"; or a function from a batch to the action of each row, see `Policy`. Functions decide within the same step: each is asked for all rows of its seats that wait, until only the client's are
-            left. Its seats count for the server's limits as the client's. OPPONENT_FAILED says what it did wrong.
+            of a built-in agent; a network file (a path, a name that ends with .safetensors, or the content as bytes), which plays
+            as fast as "trained"; or a function from a batch to the action of each row, see `Policy`. Functions decide within the
+            same step: each is asked for all rows of its seats that wait, until only the client's are left. Its seats count for the
+            server's limits as the client's. OPPONENT_FAILED says what it did wrong.
         rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
         episode: "shift" (default) or "game".
         decisions: "all" (default), or "turns": only the first T actions.

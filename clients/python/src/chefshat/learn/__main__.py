@@ -108,7 +108,13 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--evaluation-games", type=_count, default=400, help="games against greedy and random in each evaluation")
     plan.add_argument("--games", type=_natural, default=256, help="parallel games of self-play; 0: learn a best response")
     plan.add_argument("--opponent-games", type=_natural, default=0, help="further games with one seat against built-in agents")
-    plan.add_argument("--opponents", default="greedy", help="the built-in agent in these")
+    plan.add_argument(
+        "--opponents",
+        default="greedy",
+        metavar="NAMES",
+        help="who plays the other seats of these: a built-in agent or a network file, or several, separated by commas, one for "
+        "each seat; for instance past.safetensors,trained,greedy",
+    )
     plan.add_argument("--steps", type=_count, default=128, help="decisions in each game between two updates")
     plan.add_argument("--epochs", type=_count, default=2, help="passes over them in an update")
     plan.add_argument("--minibatches", type=_count, default=16, help="number of parts they are split into")
@@ -142,7 +148,11 @@ def _common(command: argparse.ArgumentParser) -> None:
 def _evaluate(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", type=Path, help="the network")
     command.add_argument(
-        "--opponents", nargs="+", default=["greedy"], metavar="NAME", help="built-in agents, one name or one for each seat"
+        "--opponents",
+        nargs="+",
+        default=["greedy"],
+        metavar="NAME",
+        help="built-in agents or network files, one or one for each seat",
     )
     command.add_argument("--games", type=_count, default=2000, help="games to play")
     _common(command)
@@ -180,7 +190,9 @@ def _tune(command: argparse.ArgumentParser) -> None:
 
 def _deep_q_games(command: argparse.ArgumentParser) -> None:
     _common(command)
-    command.add_argument("--opponents", default="random", metavar="NAME", help="the built-in agent of the three other seats")
+    command.add_argument(
+        "--opponents", default="random", metavar="NAME", help="the built-in agent or network file of the three other seats"
+    )
     command.add_argument("--rewards", default="paper", metavar="SCHEME", help="the reward scheme of turns")
     command.add_argument(
         "--mask", action=_Given, nargs=0, const=True, default=False, help="choose and learn only among legal actions"

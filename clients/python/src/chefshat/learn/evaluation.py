@@ -64,7 +64,7 @@ def evaluate(
 
     Args:
         network: takes the legal action with the highest output.
-        opponents: built-in agents of the other seats, one name for all or one for each.
+        opponents: built-in agents or network files of the other seats, one name for all or one for each.
         games: number of games.
         seed: seed of the deals.
         rules: the rule set.

@@ -31,7 +31,7 @@ class Plan:
     Attributes:
         games: parallel games of self-play; 0: only those against the opponents, for a best response to them.
         opponent_games: further games, in which the policy plays only seat 0.
-        opponents: the built-in agent of the other seats of these.
+        opponents: who plays the other seats of these, a built-in agent or a network file, or one for each, separated by commas.
         value_updates: first updates, which learn only the value network.
         steps: decisions in each game between two updates.
         epochs: passes over the samples of an update.

@@ -152,7 +152,7 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     evaluations = [
         evaluate(
             current,
-            opponents,
+            opponents.split(","),
             games=games,
             seed=runs.EVALUATION_SEED,
             rules=training.rules,

@@ -35,7 +35,7 @@ class Trainer:
         self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
         # Every resumption plays other games.
         first_seed = training.seed + SEED_STEP * runs
-        alone = {"client_seats": [0], "opponents": plan.opponents}
+        alone = {"client_seats": [0], "opponents": plan.opponents.split(",")}
         kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
         self._envs: list[VectorEnv] = []
         self._collectors: list[Collector] = []
