@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use chefshat_engine::{Cards, DecisionKind, Opening, PassScope, RuleSet, RuleSetSpec};
+use chefshat_engine::{Cards, DecisionKind, Observation, Opening, PassScope, RuleSet, RuleSetSpec};
 use chefshat_search::{Chance, Knowledge, KnowledgeError, Sampler};
 
 use crate::enumeration::{Outcome, enumerate};
@@ -109,6 +109,30 @@ fn check_frequencies(sampler: &Sampler, expected: &HashMap<Outcome, f64>, all: f
         deviate < DEVIATE,
         "{what}: chi-square {statistic:.1} with {df} degrees of freedom"
     );
+}
+
+#[test]
+fn the_owner_of_the_board_may_be_missing_but_not_wrong() {
+    let scenario = Scenario::random(rules(|_| {}), 3, None);
+    let owned: Vec<_> = (scenario.moments.iter())
+        .filter(|moment| moment.observation.board_owner.is_some())
+        .collect();
+    assert!(owned.len() > 5);
+    for moment in owned.into_iter().take(5) {
+        let ways = |board_owner| {
+            let observation = Observation {
+                board_owner,
+                ..moment.observation
+            };
+            let knowledge = Knowledge::new(scenario.rules, &observation, &moment.history)?;
+            Sampler::new(knowledge, MAX_STEPS).map(|sampler| sampler.ways())
+        };
+        let told = ways(moment.observation.board_owner);
+        assert!(told.is_ok());
+        assert_eq!(ways(None), told);
+        // The seat that has the turn never played the board.
+        assert_eq!(ways(Some(moment.seat)), Err(KnowledgeError::Inconsistent));
+    }
 }
 
 #[test]
