@@ -17,7 +17,9 @@ from chefshat.local_server import BINARY
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Caches JAX's compilations, which take most of the time of the learning tests, between runs."""
+    """Shortens JAX's compilations, which take most of the time of the learning tests, and caches them between runs."""
+    # Not level 0: there, results depend on how many agents are computed together.
+    os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1 --xla_llvm_disable_expensive_passes=true")
     if config.pluginmanager.hasplugin("cacheprovider"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")

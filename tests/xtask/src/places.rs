@@ -14,6 +14,9 @@ pub(crate) const NO_NODE_PACKAGE: &str = "missing: clients/node/package-lock.jso
 /// Why steps are skipped if [`Places::has_web_package`] is false.
 pub(crate) const NO_WEB_PACKAGE: &str = "missing: clients/web/package-lock.json";
 
+/// The Python SDK.
+pub(crate) const CLIENTS: &str = "clients/python";
+
 /// The Python package that tests docker/. The other Python packages are clients.
 pub(crate) const DEPLOYMENT: &str = "tests/deployment";
 
@@ -53,7 +56,7 @@ impl Places {
     /// The Python packages in the source tree, relative to its root: the SDK, then those built on
     /// it.
     pub(crate) fn python_packages(&self) -> Vec<&'static str> {
-        let all = ["clients/python", "clients/robot", DEPLOYMENT];
+        let all = [CLIENTS, "clients/robot", DEPLOYMENT];
         all.into_iter()
             .filter(|package| self.root.join(package).join("pyproject.toml").exists())
             .collect()

@@ -8,7 +8,9 @@ use clap::ValueEnum;
 use crate::command::{cargo, python_command, with_environment};
 use crate::failure::Failure;
 use crate::lint::{self, OPTIONAL_FEATURES};
-use crate::places::{DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
+use crate::places::{
+    CLIENTS, DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places,
+};
 use crate::setup;
 use crate::steps::Steps;
 use crate::web;
@@ -97,7 +99,11 @@ pub(crate) fn run(
     if wants(Part::Python) {
         if has_python {
             for package in places.python_packages() {
-                if package != DEPLOYMENT {
+                if package == CLIENTS {
+                    // The longest suite: it has both cores once the others have ended.
+                    let options = ["--numprocesses=2", "--dist=loadfile"];
+                    tests.push(pytest(places, package, &options));
+                } else if package != DEPLOYMENT {
                     tests.push(pytest(places, package, &[]));
                 }
             }
