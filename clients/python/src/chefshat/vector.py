@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import local_server, pb
-from chefshat._games import MAX_MESSAGE_BYTES, MAX_STATES_BYTES, Games, checked
+from chefshat._games import LEAVE_OPEN, MAX_MESSAGE_BYTES, MAX_STATES_BYTES, Games, checked
 from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
@@ -165,23 +165,30 @@ class VectorEnv:
     def __reduce__(self) -> NoReturn:
         raise TypeError("a VectorEnv cannot be pickled or copied: copy its games with fork(), or save() and restore() their states")
 
-    def step(self, actions: ArrayLike) -> Batch:
+    def step(self, actions: ArrayLike, *, leave_open: NDArray[np.bool_] | None = None) -> Batch:
         """Takes the decisions of the latest batch and returns the next batch.
 
         Args:
             actions: (R,) integers, the action of each row of `batch`, in order. See `sample_legal`.
+            leave_open: (R,) booleans: decisions that are not taken; the next batch has them again, unchanged. None: none of them.
         """
         if self._ended is not None:
             self._check_open()
         batch = self.batch
         if batch.done:
             raise ChefsHatError("GAMES_OVER", "all games are over; call reset(seed) to start new ones")
-        if self._memory is not None:
+        taken = batch
+        if self._memory is not None or leave_open is not None:
             actions = checked(actions, batch)
         try:
-            stepped = self._games.step(actions, batch)
+            if leave_open is None:
+                stepped = self._games.step(actions, batch)
+            else:
+                stepped = self._games.take(np.where(leave_open, np.uint16(LEAVE_OPEN), actions))
+                if self._memory is not None:
+                    taken, actions = batch.take(~leave_open), np.asarray(actions)[~leave_open]
             if self._memory is not None:
-                self._memory.remember(batch.games, batch.attempts, batch, np.asarray(actions))
+                self._memory.remember(taken.games, taken.attempts, taken, np.asarray(actions))
         except (TypeError, ValueError):
             # Wrong arguments: nothing has changed.
             raise

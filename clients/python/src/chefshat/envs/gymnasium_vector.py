@@ -27,8 +27,10 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     `infos["final_info"]`. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium, `infos["_key"]` marks
     the valid rows of `infos["key"]`.
 
-    `AutoresetMode.NEXT_STEP` is not available, since no game can pause for a step. Gymnasium's `NormalizeObservation` requires it
-    and refuses this environment; most other wrappers support both. The forms "classic" and "table" are normalised.
+    With `autoreset_mode="next_step"` (`AutoresetMode.NEXT_STEP`) the step that ends an episode returns its last observation, and
+    `infos["place"]`; the game then pauses: the next step ignores its action, whose mask has all actions, and returns the first
+    observation of the next episode. Gymnasium's wrappers that change observations, such as `NormalizeObservation`, require this
+    mode. The forms "classic" and "table" are normalised.
 
     In the rare case that a game's other seats have so many decisions that some are left for the next step, its row stays unchanged,
     and its next action is ignored.
@@ -50,6 +52,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
         """Starts the games.
@@ -63,12 +66,19 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             invalid: effect of an illegal action.
             invalid_penalty: subtracted from the reward of an illegal action.
             render_mode: only None: there is no rendering.
+            autoreset_mode: when a game begins its next episode: in the step that ends one ("same_step"), or in the next step.
             options: further arguments of `VectorEnv`, except for `total_games`: new games follow without limit.
         """
         if render_mode is not None:
             raise ValueError("many games cannot be rendered: leave render_mode out, or use ChefsHatEnv")
         if {"client_seats", "games", "total_games"} & options.keys():
             raise ValueError("give seat= and num_envs= instead of client_seats, games and total_games, or use chefshat.VectorEnv")
+        modes = {AutoresetMode.SAME_STEP: "same_step", AutoresetMode.NEXT_STEP: "next_step"}
+        if autoreset_mode not in modes and autoreset_mode not in modes.values():
+            raise ValueError(f'autoreset_mode={autoreset_mode!r}: choose "same_step" or "next_step"')
+        self._pauses = autoreset_mode in (AutoresetMode.NEXT_STEP, "next_step")
+        mode = AutoresetMode.NEXT_STEP if self._pauses else AutoresetMode.SAME_STEP
+        self.metadata = {**type(self).metadata, "autoreset_mode": mode}
         self.num_envs = num_envs
         self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, **with_limit(invalid, options))
         self._invalid_penalty = invalid_penalty
@@ -81,6 +91,8 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         # The last observation of each game, for games without a row in a batch.
         self._seen: Observed | None = None
         self._masks = np.zeros((num_envs, sizes.num_actions), np.int8)
+        # The games that pause for a step, because an episode has ended.
+        self._paused = np.zeros(num_envs, np.bool_)
 
     def reset(
         self,
@@ -99,11 +111,14 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         check_open(self.vector)
         super().reset(seed=seed)
         chosen = None if options is None else options.get("reset_mask")
+        if chosen is None:
+            self._paused = np.zeros(self.num_envs, np.bool_)
         if chosen is not None:
             mask = np.asarray(chosen)
             if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or seed is not None:
                 raise ValueError(f"a reset_mask is an array of {self.num_envs} booleans, and excludes a seed")
             batch = self.vector.reset(games=np.flatnonzero(mask))
+            self._paused = self._paused & ~mask
         else:
             batch = self.vector.reset(seed)
         return self._observe(batch), self._infos(batch)
@@ -118,7 +133,13 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if len(waiting) < self.num_envs and chosen.shape == (self.num_envs,):
             chosen = chosen[waiting.games]
         rows, cost = waiting.games, penalties(waiting, chosen, self._invalid_penalty)
-        batch = self.vector.step(chosen)
+        paused = self._paused
+        if paused.any():
+            left = paused[rows]
+            cost = np.where(left, 0.0, cost)
+            batch = self.vector.step(chosen, leave_open=left)
+        else:
+            batch = self.vector.step(chosen)
         rewards = np.zeros(self.num_envs, np.float64)
         rewards[batch.games] = batch.rewards
         terminations = np.zeros(self.num_envs, np.bool_)
@@ -129,8 +150,15 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             rewards[endings.games] = endings.rewards
             terminations[endings.games] = ~endings.truncated
             truncations[endings.games] = endings.truncated
-            self._add_endings(infos, endings)
+            if self._pauses:
+                observed = self._last(observed, infos, endings)
+            else:
+                self._add_endings(infos, endings)
         rewards[rows] -= cost
+        if self._pauses:
+            # The rewards of the rows that have waited were those of the first step.
+            rewards[paused] = 0
+            self._paused = terminations | truncations
         return observed, rewards, terminations, truncations, infos
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -166,6 +194,20 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             infos[name][batch.games] = column
             infos[f"_{name}"] = everywhere
         return infos
+
+    def _last(self, observed: Any, infos: dict[str, Any], endings: Endings) -> Any:  # noqa: ANN401 - Of the space's kind.
+        """Puts the last observations of the episodes that have ended in place of the first ones of the next, which come again."""
+        ended, last = endings.games, self._form.of(endings)
+        # The mask of an action that is ignored.
+        self._masks = masks = self._masks.copy()
+        masks[ended] = 1
+        places = np.zeros(self.num_envs, np.int64)
+        places[ended] = endings.places_taken
+        infos["action_mask"] = masks
+        infos["place"], infos["_place"] = places, np.isin(np.arange(self.num_envs), ended)
+        if isinstance(last, dict):
+            return {**{name: _put(observed[name], ended, last[name]) for name in last}, "action_mask": masks}
+        return _put(observed, ended, last)
 
     def _add_endings(self, infos: dict[str, Any], endings: Endings) -> None:
         """Adds the final observations."""
