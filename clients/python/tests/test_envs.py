@@ -244,7 +244,12 @@ def test_games_without_a_row_do_not_change(toy: FakeVector) -> None:
     assert env._infos(left)["action_mask"].sum(axis=1).tolist() == [2, 2, 2]
     env.vector.batch = left
     sent: list[Any] = []
-    env.vector.step = lambda actions: sent.append(actions) or batch  # type: ignore[func-returns-value, method-assign]
+
+    def step(actions: Any, **_: Any) -> Any:
+        sent.append(actions)
+        return batch
+
+    env.vector.step = step  # type: ignore[method-assign]
     env.step([10, 11, 12])
     assert sent[0].tolist() == [10, 12]
     env.close()

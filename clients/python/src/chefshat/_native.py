@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar, cast
 
 import chefshat_native
 import numpy as np
@@ -21,7 +21,13 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 class NativeBatch(Batch):
     """A batch of the engine. Its tables are created on first use."""
 
-    def __init__(self, native: chefshat_native.Batch, sizes: Sizes, layouts: Mapping[str, Mapping[str, int]]) -> None:
+    def __init__(
+        self,
+        native: chefshat_native.Batch,
+        sizes: Sizes,
+        layouts: Mapping[str, Mapping[str, int]],
+        empty: dict[str, Table],
+    ) -> None:
         # Not the constructor of the class above: a step in this process takes about as long as one.
         self.sizes = sizes
         self.step = native.step
@@ -29,6 +35,8 @@ class NativeBatch(Batch):
         self._rows = native.rows
         self._native = native
         self._layouts = layouts
+        # Tables without rows, which all batches of the games share.
+        self._empty = empty
 
     @classmethod
     def of(cls, rows: int, sizes: Sizes, columns: Mapping[str, Any]) -> Batch:  # type: ignore[override] # Arrays are not the engine's.
@@ -63,9 +71,13 @@ class NativeBatch(Batch):
         return Totals(*self._native.totals())
 
     def _table(self, kind: type[AnyTable], name: str, rows: int, columns: NDArray[np.uint8]) -> AnyTable:
-        table = kind(rows, self.sizes)
-        table.packed = Packed(columns, self._layouts[name])
-        return table
+        found = None if rows else self._empty.get(name)
+        if found is None:
+            found = kind(rows, self.sizes)
+            found.packed = Packed(columns, self._layouts[name])
+            if not rows:
+                self._empty[name] = found
+        return cast(AnyTable, found)
 
 
 class NativeGames:
@@ -82,6 +94,7 @@ class NativeGames:
         self._sizes = Sizes.of(self.started)
         self._layouts = self._games.layouts
         self._records = setup.records
+        self._empty: dict[str, Table] = {}
 
     def first(self) -> Batch:
         """Returns the first batch."""
@@ -144,7 +157,7 @@ class NativeGames:
         vars(self).pop("_games", None)
 
     def _batch(self, native: chefshat_native.Batch) -> Batch:
-        batch = NativeBatch(native, self._sizes, self._layouts)
+        batch = NativeBatch(native, self._sizes, self._layouts, self._empty)
         if self._records:
             records = native.records()
             batch.records = tuple(

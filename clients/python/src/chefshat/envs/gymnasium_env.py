@@ -11,12 +11,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
-from chefshat.columns import Situations
+from chefshat.columns import Endings, Situations
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
+from chefshat.envs.single import SingleRow
 from chefshat.errors import ChefsHatError
-from chefshat.vector import VectorEnv
+from chefshat.vector import Batch, VectorEnv
 
 
 def wait_for_a_row(vector: VectorEnv, *, or_an_end: bool = False) -> None:
@@ -90,7 +91,13 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         self._form = Form(observation, sizes, self.vector.batch)
         self.observation_space = self._form.space_with_mask
         #: The seat's current situation, in row 0.
-        self._now: Situations = self.vector.batch
+        self._now: Batch | Endings = self.vector.batch
+        # How rows are read, by their table.
+        self._singles: dict[type[Situations], SingleRow] = {}
+        for table in (self.vector.batch, self.vector.batch.endings):
+            # A reward function's rewards are not in the row.
+            if table.packed is not None and "reward_function" not in options:
+                self._singles[type(table)] = SingleRow(sizes, table.packed.before)
         # Whether an episode has begun, and whether a step has been taken in it.
         self._running = False
         self._stepped = False
@@ -109,7 +116,8 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         self._now = self.vector.batch
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._info()
+        observed, _, info = self._read(self._now)
+        return observed, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:  # noqa: ANN401 - As Gymnasium has it.
         """Takes the open decision. Returns the observation at the seat's next decision, or at the end of the episode."""
@@ -117,26 +125,31 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         if not self._running:
             raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
         actions = np.asarray([action])
-        penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
-        self.vector.step(actions)
+        penalty = 0.0
+        if self._invalid_penalty:
+            penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
+        batch = self.vector.step(actions)
         self._stepped = True
-        wait_for_a_row(self.vector, or_an_end=True)
-        batch = self.vector.batch
-        ended = len(batch.endings) > 0
-        if ended:
-            # The seat had no decision in further ones.
-            self._now = batch.endings
-            self._running = False
-        else:
+        endings = batch.endings
+        if not len(batch) and not len(endings):
+            wait_for_a_row(self.vector, or_an_end=True)
+            batch = self.vector.batch
+            endings = batch.endings
+        if not len(endings):
             self._now = batch
-        truncated = ended and bool(batch.endings.truncated[0])
-        reward = float(batch.endings.rewards[0] if ended else batch.rewards[0]) - penalty
-        info = self._info()
-        if ended:
-            info["place"] = int(batch.endings.places_taken[0])
+            observed, reward, info = self._read(batch)
+            terminated = truncated = False
+        else:
+            # The seat had no decision in further ones.
+            self._now = endings
+            self._running = False
+            observed, reward, info = self._read(endings)
+            truncated = bool(endings.truncated[0])
+            terminated = not truncated
+            info["place"] = int(endings.places_taken[0])
         if self.render_mode == "human":
             self.render()
-        return self._observation(), reward, ended and not truncated, truncated, info
+        return observed, reward - penalty, terminated, truncated, info
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns whether each of the A actions is legal now."""
@@ -157,15 +170,27 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         """Ends the game."""
         self.vector.close()
 
-    def _observation(self) -> Any:  # noqa: ANN401 - Of the space's kind.
-        observed = self._form.row(self._form.of(self._now), 0)
-        if self._form.has_parts:
-            observed["action_mask"] = self._mask()
-        return observed
-
-    def _mask(self) -> NDArray[np.int8]:
-        return np.array(self._now.masks[0], np.int8)
-
-    def _info(self) -> dict[str, Any]:
-        attempts = int(self.vector.batch.attempts[0]) if self._running else 0
-        return {"action_mask": self._mask(), "kind": int(self._now.kinds[0]), "invalid_attempts": attempts}
+    def _read(self, now: Batch | Endings) -> tuple[Any, float, dict[str, Any]]:
+        """Returns the observation, the reward and the info of the first row."""
+        packed = now.packed
+        single = self._singles.get(type(now))
+        if single is None or packed is None or len(now) != 1:
+            mask = np.array(now.masks[0], np.int8)
+            attempts = int(now.attempts[0]) if isinstance(now, Batch) else 0
+            observed = self._form.row(self._form.of(now), 0)
+            if self._form.has_parts:
+                observed["action_mask"] = mask
+            return (
+                observed,
+                float(now.rewards[0]),
+                {"action_mask": mask.copy(), "kind": int(now.kinds[0]), "invalid_attempts": attempts},
+            )
+        row = packed.columns
+        mask = single.mask(row)
+        observed = single.table(row) if self._form.is_table else None
+        if observed is None:
+            observed = self._form.row(self._form.of(now), 0)
+            if self._form.has_parts:
+                observed["action_mask"] = mask.copy()
+        kind, attempts = (single.kind(row), single.attempts(row)) if isinstance(now, Batch) else (0, 0)
+        return observed, single.reward(row), {"action_mask": mask, "kind": kind, "invalid_attempts": attempts}

@@ -78,7 +78,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             raise ValueError(f'autoreset_mode={autoreset_mode!r}: choose "same_step" or "next_step"')
         self._pauses = autoreset_mode in (AutoresetMode.NEXT_STEP, "next_step")
         mode = AutoresetMode.NEXT_STEP if self._pauses else AutoresetMode.SAME_STEP
-        self.metadata = {**type(self).metadata, "autoreset_mode": mode}
+        self.metadata = {**type(self).metadata, "autoreset_mode": mode}  # type: ignore[misc]  # As Gymnasium's own do.
         self.num_envs = num_envs
         self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, **with_limit(invalid, options))
         self._invalid_penalty = invalid_penalty

@@ -32,6 +32,7 @@ class Form:
         space: the space of one observation.
         space_with_mask: the same, with "action_mask" if observations are dictionaries, for Gymnasium.
         has_parts: whether an observation is a dictionary.
+        is_table: whether it is that of `chefshat.learn.features.table`.
     """
 
     space: "spaces.Space[Any]"
@@ -50,6 +51,7 @@ class Form:
         """
         self._function: ObservationFunction | None = None
         self.has_parts = observation == "columns"
+        self.is_table = observation == "table"
         if callable(observation):
             self._function = observation
             self.space = _space_of(np.asarray(observation(sample)), len(sample))

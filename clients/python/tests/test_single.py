@@ -1,0 +1,101 @@
+"""One game of Gymnasium, whose rows are looked up: every number is that of the columns."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chefshat.columns import Table
+from chefshat.learn import features
+from chefshat.vector import Batch, VectorEnv
+
+pytest.importorskip("chefshat_native")
+pytest.importorskip("gymnasium")
+
+from chefshat.envs import ChefsHatEnv
+from chefshat.envs.single import SingleRow
+
+
+@pytest.mark.parametrize("rules", [None, {"players": 2, "faces": 4}, {"players": 6, "faces": 12, "jokers": 1}])
+def test_rows_are_those_of_the_columns(rules: Any) -> None:
+    kinds = ends = 0
+    for seat in (0, 1):
+        with VectorEnv(rules=rules, seed=6, rewards="winning", client_seats=[seat], invalid="ask_again") as env:
+            chance = np.random.default_rng(seat)
+            readers: dict[type[Table], SingleRow] = {}
+            for _ in range(500):
+                action = env.sample() if chance.random() < 0.9 else chance.integers(0, env.num_actions, 1)
+                batch = env.step(action)
+                for table in (batch, batch.endings):
+                    if len(table) != 1:
+                        continue
+                    assert table.packed is not None
+                    reader = readers.setdefault(type(table), SingleRow(env.sizes, table.packed.before))
+                    row = table.packed.columns
+                    np.testing.assert_array_equal(reader.table(row), features.table_of(table)[0])
+                    np.testing.assert_array_equal(reader.mask(row), table.masks[0])
+                    assert reader.reward(row) == table.rewards[0]
+                    kinds |= 1 << int(table.kinds[0])
+                    if isinstance(table, Batch):
+                        assert (reader.attempts(row), reader.kind(row)) == (table.attempts[0], table.kinds[0])
+                ends += len(batch.endings)
+    assert ends > 10
+    # Ends, turns and exchanges; in the default game also special actions.
+    wanted = 0b1111 if rules is None else 0b0111
+    assert kinds & wanted == wanted
+
+
+def test_a_number_that_is_too_large_is_not_looked_up() -> None:
+    with VectorEnv(seed=1) as env:
+        packed = env.batch.packed
+        assert packed is not None
+        reader = SingleRow(env.sizes, packed.before)
+        row = packed.columns.copy()
+        row[packed.before["pizzas"]] = 255
+        assert reader.table(row) is not None
+        row[packed.before["pizzas"] + 1] = 1
+        assert reader.table(row) is None
+
+
+@pytest.mark.parametrize("observation", ["table", "columns", "classic"])
+def test_steps_are_those_of_an_environment_without_rows(observation: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    options: Any = {"observation": observation, "rewards": "winning", "seed": 8}
+    with monkeypatch.context() as patched:
+        patched.setattr("chefshat.envs.gymnasium_env.SingleRow", lambda *_: None)
+        plain = ChefsHatEnv(**options)
+    env = ChefsHatEnv(**options)
+    chance = np.random.default_rng(1)
+    same(env.reset(), plain.reset())
+    ended = 0
+    for _ in range(300):
+        action = int(chance.choice(np.flatnonzero(env.action_masks()))) if chance.random() < 0.9 else int(chance.integers(214))
+        step, expected = env.step(action), plain.step(action)
+        same(step, expected)
+        if step[2]:
+            ended += 1
+            same(env.reset(), plain.reset())
+    assert ended > 5
+
+
+def test_rewards_of_a_function_are_not_those_of_the_row() -> None:
+    env = ChefsHatEnv(rewards="winning", reward_function=lambda transitions: np.full(len(transitions), 7.0), seed=1)
+    env.reset()
+    assert env.step(int(env.action_masks().argmax()))[1] == 7
+
+
+def same(found: Any, expected: Any) -> None:
+    """Compares results with their types."""
+    assert type(found) is type(expected)
+    if isinstance(found, dict):
+        assert found.keys() == expected.keys()
+        for name in found:
+            same(found[name], expected[name])
+    elif isinstance(found, tuple):
+        for one, other in zip(found, expected, strict=True):
+            same(one, other)
+    elif isinstance(found, np.ndarray):
+        assert found.dtype == expected.dtype
+        assert found.flags.writeable == expected.flags.writeable
+        np.testing.assert_array_equal(found, expected)
+    else:
+        assert found == expected
