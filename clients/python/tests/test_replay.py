@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import chefshat
 from chefshat import ChefsHatError, Transitions, VectorEnv, local_server, pb, replay, sample_legal
+from chefshat.columns import NO_SEAT
 from chefshat.local_server import BINARY
 from chefshat.transitions import concatenate
 
@@ -95,6 +96,16 @@ def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
     assert len(replay.from_dataset(tmp_path, agents=["Ada"])) == len(made)
     with pytest.raises(ValueError, match="called 'Bob'; they are Ada"):
         replay.from_dataset(tmp_path, agents=["Ada", "Bob"])
+
+
+def test_datasets_of_earlier_versions_do_not_say_who_played_the_board(tmp_path: Path) -> None:
+    board = {"board_face": 9, "board_size": 2}
+    rows: list[dict[str, Any]] = [{**board, "board_owner": 3}, {"board_owner": None}, {**board, "board_owner": 0}]
+    made = replay.from_dataset(dataset(tmp_path, *rows))
+    assert made.before.observations.board_owners.tolist() == [3, NO_SEAT, 0]
+    assert made.after.observations.board_owners.tolist() == [NO_SEAT, 0, NO_SEAT]
+    made = replay.from_dataset(dataset(tmp_path, board, board))
+    assert made.before.observations.board_owners.tolist() == [NO_SEAT] * 2
 
 
 def test_an_empty_dataset_has_no_transitions(tmp_path: Path) -> None:
