@@ -59,6 +59,8 @@ pub const MAX_ANALYSIS_STEPS: u64 = 500_000;
 pub const ANALYSIS_TIME: Duration = Duration::from_secs(1);
 /// Longest time of an analysis.
 pub const MAX_ANALYSIS_TIME: Duration = Duration::from_secs(10);
+/// Least time between estimates so far of an analysis.
+pub const MIN_ANALYSIS_UPDATE: Duration = Duration::from_millis(50);
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.

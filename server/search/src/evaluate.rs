@@ -139,6 +139,22 @@ pub fn evaluate(
     pool: Option<&ThreadPool>,
     progress: impl Fn(u64) -> f64,
 ) -> Vec<Estimate> {
+    let watched = |rollouts, _: &[Estimate]| progress(rollouts);
+    evaluate_watched(sampler, actions, method, seed, pool, watched)
+}
+
+/// As [`evaluate`]; `progress` also gets the estimates so far.
+///
+/// # Panics
+/// As [`evaluate`].
+pub fn evaluate_watched(
+    sampler: &Sampler,
+    actions: &[ActionId],
+    method: &Method,
+    seed: [u8; 32],
+    pool: Option<&ThreadPool>,
+    mut progress: impl FnMut(u64, &[Estimate]) -> f64,
+) -> Vec<Estimate> {
     let mut estimates: Vec<Estimate> = actions.iter().map(|id| Estimate::new(*id)).collect();
     let mut active: Vec<usize> = (0..actions.len()).collect();
     let rounds = match method.allocation {
@@ -148,7 +164,7 @@ pub fn evaluate(
     let (mut worlds, mut rollouts) = (0u64, 0u64);
     for round in 1..=rounds {
         let part = f64::from(round) / f64::from(rounds);
-        while worlds == 0 || progress(rollouts) < part {
+        while worlds == 0 || progress(rollouts, &estimates) < part {
             let tried: Vec<ActionId> = active.iter().map(|&index| actions[index]).collect();
             let batch = worlds..worlds + (worlds / 8).clamp(*BATCH.start(), *BATCH.end());
             let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);

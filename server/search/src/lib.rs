@@ -12,7 +12,7 @@ mod sampler;
 mod table;
 
 pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent};
-pub use evaluate::{Allocation, Estimate, Method, evaluate, likely_hands};
+pub use evaluate::{Allocation, Estimate, Method, evaluate, evaluate_watched, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
 pub use rollout::RolloutPolicy;

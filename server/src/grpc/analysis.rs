@@ -6,17 +6,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, Mask, RuleSet, Seed, Viewer};
+use chefshat_engine::{ActionId, Event, RuleSet, Seed, Viewer};
 use chefshat_proto::v1::{
     self, analysis_service_server::AnalysisService, evaluate_request::Position,
 };
-use chefshat_record::branch::{BranchError, branch_of};
+use chefshat_record::branch::{Branch, BranchError, branch_of};
 use chefshat_record::convert::{
     FieldProblem, decision_kind, rules_from_proto, seat_number, situation_from_proto,
 };
 use chefshat_search::{
     Allocation, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler, ShiftHistory,
-    evaluate, likely_hands,
+    evaluate_watched, likely_hands,
 };
 use rayon::{ThreadPool, ThreadPoolBuildError};
 use tokio::sync::mpsc;
@@ -31,6 +31,7 @@ use super::status::{Refusal, field, internal, shutting_down};
 use crate::access::Caller;
 use crate::config::{
     ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS, MAX_ANALYSIS_TIME,
+    MIN_ANALYSIS_UPDATE,
 };
 use crate::limits::{Places, Refused};
 
@@ -53,6 +54,8 @@ struct Plan {
     rollouts: u64,
     time: Duration,
     seed: [u8; 32],
+    /// Time between answers with estimates so far.
+    update: Option<Duration>,
 }
 
 impl Analyses {
@@ -75,32 +78,17 @@ impl Analyses {
         })
     }
 
-    /// What the seat of a recorded decision knows there, and what is legal.
-    async fn moment(
+    /// Reads something of a recorded decision.
+    async fn moment<T: Send + 'static>(
         &self,
         caller: &Caller,
         moment: v1::RecordedMoment,
-    ) -> Result<(Knowledge, Mask), Status> {
+        read: impl FnOnce(Branch) -> Option<T> + Send + 'static,
+    ) -> Result<T, Status> {
         let decisions = moment.decisions;
         self.recorded
             .of_game(caller, &moment.game_id, move |lines, _| {
-                let branch = branch_of(&lines, decisions)?;
-                let mut histories: Vec<ShiftHistory> = (0..branch.rules.players())
-                    .map(|seat| ShiftHistory::new(chefshat_engine::Seat::new(seat)))
-                    .collect();
-                let game = branch.replayed(Seed([0; 32]), |event| {
-                    histories
-                        .iter_mut()
-                        .for_each(|history| history.on_event(&event));
-                });
-                let position = game.and_then(|game| {
-                    let seat = game.decision()?.seat;
-                    let seen = game.observe(Viewer::Seat(seat));
-                    let history = &histories[seat.index()];
-                    let knowledge = Knowledge::new(branch.rules, &seen, history).ok()?;
-                    Some((knowledge, game.legal_actions()))
-                });
-                Ok(position)
+                Ok(read(branch_of(&lines, decisions)?))
             })
             .await?
             .map_err(|error: BranchError| refused("moment", error.to_string()))?
@@ -142,15 +130,20 @@ impl AnalysisService for Analyses {
         let knowledge = match message.position {
             None => return Err(refused("position", "set moment or situation")),
             Some(Position::Situation(situation)) => situation_knowledge(&situation)?,
-            Some(Position::Moment(moment)) => self.moment(&caller, moment).await?.0,
+            Some(Position::Moment(moment)) => {
+                self.moment(&caller, moment, recorded_knowledge).await?
+            }
         };
         let (responses, stream) = mpsc::channel(1);
         let service = self.clone();
         tokio::spawn(async move {
+            let updates = responses.clone();
             let work = service.run_on_pool(move |stopped| {
                 // Work that was given up keeps its place until it ends.
                 let _place = place;
-                evaluated(knowledge, &plan, stopped)
+                // A client that reads slowly misses some.
+                let update = |so_far| drop(updates.try_send(Ok(so_far)));
+                evaluated(knowledge, &plan, stopped, update)
             });
             let answer = tokio::select! {
                 answer = work => answer,
@@ -171,24 +164,26 @@ impl AnalysisService for Analyses {
         let caller = Caller::of(request.extensions());
         let moment = request.into_inner().moment;
         let moment = moment.ok_or_else(|| refused("moment", "not set"))?;
-        let (knowledge, legal) = self.moment(&caller, moment).await?;
-        let kind = knowledge.observation().kind;
-        let size = knowledge.rules().actions().size();
-        Ok(Response::new(v1::LegalActionsResponse {
-            seat: seat_number(knowledge.seat()),
-            kind: kind
-                .map_or(v1::DecisionKind::Unspecified, decision_kind)
-                .into(),
-            action_mask: legal.to_bytes(size),
-        }))
+        let read = |branch: Branch| {
+            let game = branch.replayed(Seed([0; 32]), |_| {})?;
+            let decision = game.decision()?;
+            let size = branch.rules.actions().size();
+            Some(v1::LegalActionsResponse {
+                seat: seat_number(decision.seat),
+                kind: decision_kind(decision.kind).into(),
+                action_mask: game.legal_actions().to_bytes(size),
+            })
+        };
+        self.moment(&caller, moment, read).await.map(Response::new)
     }
 }
 
-/// Evaluates a position.
+/// Evaluates a position. `update` gets the estimates so far, as often as the plan says.
 fn evaluated(
     knowledge: Knowledge,
     plan: &Plan,
     stopped: &dyn Fn() -> bool,
+    update: impl Fn(v1::EvaluateResponse),
 ) -> Result<v1::EvaluateResponse, KnowledgeError> {
     let start = Instant::now();
     let seat = knowledge.seat();
@@ -201,17 +196,28 @@ fn evaluated(
     };
     // The hands take at most half of the time.
     let of_hands = |deals: u64| spent(deals, DEALS_FOR_HANDS, plan.time / 2);
-    let hands = likely_hands(&sampler, plan.seed, of_hands);
-    let progress = |rollouts: u64| spent(rollouts, plan.rollouts, plan.time);
-    let found = evaluate(&sampler, &actions, &plan.method, plan.seed, None, progress);
-    Ok(v1::EvaluateResponse {
+    let hands: Vec<v1::ExpectedHand> = likely_hands(&sampler, plan.seed, of_hands)
+        .into_iter()
+        .map(|cards| v1::ExpectedHand { cards })
+        .collect();
+    let response = |found: &[Estimate]| v1::EvaluateResponse {
         seat: seat_number(seat),
         rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
         actions: found.iter().map(estimate_to_proto).collect(),
-        hands: (hands.into_iter())
-            .map(|cards| v1::ExpectedHand { cards })
-            .collect(),
-    })
+        hands: hands.clone(),
+    };
+    let mut updated = start;
+    let progress = |rollouts: u64, found: &[Estimate]| {
+        let due = |every: Duration| rollouts > 0 && updated.elapsed() >= every;
+        if plan.update.is_some_and(due) {
+            updated = Instant::now();
+            update(response(found));
+        }
+        spent(rollouts, plan.rollouts, plan.time)
+    };
+    let (method, seed) = (&plan.method, plan.seed);
+    let found = evaluate_watched(&sampler, &actions, method, seed, None, progress);
+    Ok(response(&found))
 }
 
 fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
@@ -243,6 +249,12 @@ fn plan(message: &v1::EvaluateRequest) -> Result<Plan, Status> {
         let words = format!("choose at most {}", MAX_ANALYSIS_TIME.as_millis());
         return Err(refused("time_ms", words));
     }
+    let update = Duration::from_millis(message.update_ms.into());
+    if !update.is_zero() && !(MIN_ANALYSIS_UPDATE..=MAX_ANALYSIS_TIME).contains(&update) {
+        let (least, most) = (MIN_ANALYSIS_UPDATE, MAX_ANALYSIS_TIME);
+        let words = format!("choose 0, or {} to {}", least.as_millis(), most.as_millis());
+        return Err(refused("update_ms", words));
+    }
     let mut seed = [0; 32];
     seed[..8].copy_from_slice(&message.seed.to_le_bytes());
     Ok(Plan {
@@ -256,7 +268,23 @@ fn plan(message: &v1::EvaluateRequest) -> Result<Plan, Status> {
         },
         time,
         seed,
+        update: Some(update).filter(|update| !update.is_zero()),
     })
+}
+
+/// What the seat of a recorded decision knows there.
+fn recorded_knowledge(branch: Branch) -> Option<Knowledge> {
+    let mut shift = Vec::new();
+    let game = branch.replayed(Seed([0; 32]), |event| {
+        if matches!(event, Event::ShiftStarted { .. }) {
+            shift.clear();
+        }
+        shift.push(event);
+    })?;
+    let seat = game.decision()?.seat;
+    let mut history = ShiftHistory::new(seat);
+    shift.iter().for_each(|event| history.on_event(event));
+    Knowledge::new(branch.rules, &game.observe(Viewer::Seat(seat)), &history).ok()
 }
 
 /// What the seat of a situation knows.

@@ -13,10 +13,10 @@ use tonic::{Request, Response, Status};
 
 use super::status::field;
 use crate::config::{
-    MAX_FOLLOWERS, MAX_HOSTED_SHIFTS, MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
-    MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
-    MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS,
-    ServerConfig,
+    MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_HOSTED_SHIFTS,
+    MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION,
+    MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES, MAX_VECTOR_RECORDED_GAMES,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
 };
 use crate::convert;
 use crate::limits::CallLimits;
@@ -50,6 +50,7 @@ impl Info {
                 "max_vector_recorded_games",
                 MAX_VECTOR_RECORDED_GAMES as usize,
             ),
+            ("max_analyses", MAX_ANALYSES),
             ("max_seats_per_stream", MAX_SEATS_PER_STREAM),
             ("max_seats_per_watch", MAX_SEATS_PER_WATCH),
             ("max_spectators_per_room", MAX_SPECTATORS),
@@ -74,6 +75,8 @@ impl Info {
                 "built_in_decisions_per_second",
                 config.built_in_decisions_per_second,
             ),
+            ("max_analysis_rollouts", MAX_ANALYSIS_ROLLOUTS),
+            ("max_analysis_ms", MAX_ANALYSIS_TIME.as_millis() as u64),
             ("local_share_percent", config.shares.local.into()),
             ("caller_share_percent", config.shares.remote.into()),
         ])

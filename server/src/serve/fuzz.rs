@@ -6,6 +6,10 @@ use std::sync::Once;
 use std::time::Duration;
 
 use bolero::check;
+use chefshat_engine::{Event, Game, RuleSetSpec, Seed, Viewer};
+use chefshat_record::convert::{
+    By, decision_kind, event_kind, observation_to_proto, rules_to_proto, seat_number,
+};
 use chefshat_record::testing::Edits;
 use http::Request;
 use http_body_util::{BodyExt as _, Full};
@@ -234,10 +238,58 @@ fn calls(
             ],
         ),
         call(
+            "AnalysisService/Evaluate",
+            [&v1::EvaluateRequest {
+                position: Some(v1::evaluate_request::Position::Situation(situation())),
+                rollouts: 8,
+                update_ms: 50,
+                agent: "random".into(),
+                ..v1::EvaluateRequest::default()
+            }],
+        ),
+        call(
+            "AnalysisService/LegalActions",
+            [&v1::LegalActionsRequest {
+                moment: Some(v1::RecordedMoment {
+                    game_id: "0".repeat(32),
+                    decisions: 3,
+                }),
+            }],
+        ),
+        call(
             "ServerService/GetActionTable",
             [&v1::GetActionTableRequest { faces: 11 }],
         ),
     ]
+}
+
+/// The first decision of a game, as its seat sees it.
+fn situation() -> v1::Situation {
+    let rules = RuleSetSpec::default().validate().expect("a rule set");
+    let mut events = Vec::new();
+    let game = Game::new(rules, Seed([6; 32]), |event| events.push(event));
+    let decision = game.decision().expect("a decision is open");
+    let viewer = Viewer::Seat(decision.seat);
+    let by = By {
+        source: v1::DecisionSource::Unspecified,
+        decision_time_us: 0,
+    };
+    let seen = |event: &Event| event_kind(&event.seen_by(viewer), rules.actions(), by);
+    v1::Situation {
+        rules: Some(rules_to_proto(&rules)),
+        seat: seat_number(decision.seat),
+        decision: Some(v1::DecisionRequest {
+            kind: decision_kind(decision.kind).into(),
+            observation: Some(observation_to_proto(&game.observe(viewer))),
+            ..v1::DecisionRequest::default()
+        }),
+        events: (events.iter().filter_map(seen))
+            .map(|kind| v1::GameEvent {
+                kind: Some(kind),
+                ..v1::GameEvent::default()
+            })
+            .collect(),
+    }
 }
 
 fn vector(request: v1::run_request::Request) -> v1::RunRequest {

@@ -1,5 +1,7 @@
 //! Estimates of recorded decisions and of situations that a client describes.
 
+use std::sync::Arc;
+
 use chefshat_client::Client;
 use chefshat_engine::{Seed, Viewer};
 use chefshat_proto::v1::{
@@ -10,7 +12,9 @@ use chefshat_record::branch::branch_of;
 use chefshat_record::convert::{
     By, decision_kind, event_kind, observation_to_proto, rules_to_proto, seat_number,
 };
-use chefshat_tests::{TestServer, one_shift, room_of_four};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::store::MemoryStore;
+use chefshat_tests::{TestServer, one_shift, patiently, room_of_four};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
@@ -164,6 +168,85 @@ async fn a_recorded_decision_is_evaluated_by_what_its_seat_knew() {
 }
 
 #[tokio::test]
+async fn estimates_so_far_come_before_the_last() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let game = original(&client).await;
+    let position = || Position::Moment(moment(game.game_id(), points(&game)[0]));
+    let plain = v1::EvaluateRequest {
+        rollouts: 2_000,
+        ..request(position())
+    };
+    let last = evaluated(&client, plain.clone()).await.expect("estimates");
+    let asked = v1::EvaluateRequest {
+        update_ms: 50,
+        ..plain
+    };
+    let mut service = AnalysisServiceClient::new(client.channel());
+    let answers = service.evaluate(asked).await.expect("estimates");
+    let mut answers = answers.into_inner();
+    let mut all = Vec::new();
+    while let Some(answer) = answers.message().await.expect("an answer") {
+        all.push(answer);
+    }
+    assert_eq!(all.last(), Some(&last));
+    assert!(all.is_sorted_by(|one, next| one.rollouts <= next.rollouts));
+    for answer in &all {
+        assert_eq!(answer.actions.len(), last.actions.len());
+        assert_eq!(answer.hands, last.hands);
+    }
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn a_client_that_goes_away_frees_the_thread_and_the_place() {
+    let one_thread = |config: &mut ServerConfig| config.vector_threads = 1;
+    let server = TestServer::with(one_thread, Arc::new(MemoryStore::default())).await;
+    let client = server.client().await;
+    let game = original(&client).await;
+    let limits = client.server_info().await.expect("information").limits;
+    // One caller may have half of them on the server's machine.
+    let most = limits["max_analyses"] * limits["local_share_percent"] / 100;
+    let position = || Position::Moment(moment(game.game_id(), points(&game)[0]));
+    let longest = || v1::EvaluateRequest {
+        rollouts: limits["max_analysis_rollouts"],
+        time_ms: u32::try_from(limits["max_analysis_ms"]).expect("milliseconds"),
+        agent: "trained".into(),
+        ..request(position())
+    };
+    let mut service = AnalysisServiceClient::new(client.channel());
+    let mut open = Vec::new();
+    for _ in 0..most {
+        open.push(service.evaluate(longest()).await.expect("an analysis"));
+    }
+    let status = service.evaluate(longest()).await.expect_err("one too many");
+    let details = status.get_details_error_info().expect("details");
+    assert_eq!(
+        (status.code(), details.reason.as_str()),
+        (Code::ResourceExhausted, "TOO_MANY_ANALYSES")
+    );
+    // With one thread, they would take minutes. Others wait for none of them, and can be as many.
+    drop(open);
+    patiently("places for as many analyses", async {
+        let mut again = Vec::new();
+        while (again.len() as u64) < most {
+            match service.evaluate(longest()).await {
+                Ok(stream) => again.push(stream),
+                Err(_) => tokio::task::yield_now().await,
+            }
+        }
+    })
+    .await;
+    patiently("an analysis after those that were cancelled", async {
+        while evaluated(&client, request(position())).await.is_err() {
+            tokio::task::yield_now().await;
+        }
+    })
+    .await;
+    server.stop().await;
+}
+
+#[tokio::test]
 async fn what_cannot_be_evaluated_is_refused() {
     let server = TestServer::start().await;
     let client = server.client().await;
@@ -211,6 +294,10 @@ async fn what_cannot_be_evaluated_is_refused() {
         },
         v1::EvaluateRequest {
             agent: "clever".into(),
+            ..valid.clone()
+        },
+        v1::EvaluateRequest {
+            update_ms: 49,
             ..valid
         },
         described(|situation| situation.seat = 4),

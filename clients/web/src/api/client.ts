@@ -3,6 +3,7 @@
 
 import { createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
+import { AnalysisService } from "../gen/chefshat/v1/analysis_service_pb";
 import { PlayService } from "../gen/chefshat/v1/play_service_pb";
 import { RecordService } from "../gen/chefshat/v1/record_service_pb";
 import { RoomService } from "../gen/chefshat/v1/room_service_pb";
@@ -28,6 +29,8 @@ export const spectatorApi = createClient(SpectatorService, transport);
 export const tableApi = createClient(TableService, transport);
 /** Records of finished games. */
 export const recordApi = createClient(RecordService, transport);
+/** Estimates of the actions of a decision. */
+export const analysisApi = createClient(AnalysisService, transport);
 /** Tournaments, their results, the leaderboard. */
 export const tournamentApi = createClient(TournamentService, transport);
 

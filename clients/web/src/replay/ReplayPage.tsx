@@ -16,6 +16,7 @@ import type { TableState } from "../table/model/state";
 import { LookupTable } from "../table/view/LookupTable";
 import { TableView } from "../table/view/TableView";
 import { distinctName, moveWords } from "../table/words";
+import { Analysis } from "./Analysis";
 import { Controls, type Speed } from "./Controls";
 import { type Film, filmOf } from "./frames";
 import { decidingFor, type Perspective, seenFrom } from "./perspective";
@@ -49,14 +50,15 @@ export function ReplayPage({ route }: PageProps<"replay">) {
   if (fault) return <ErrorPage title={t().replay.title} words={fault} />;
   if (!film) return <p class="soft">{t().common.loading}</p>;
   if (film.length === 0) return <ErrorPage title={t().replay.title} words={t().replay.empty} />;
-  return <Playback film={film} />;
+  return <Playback gameId={gameId} film={film} />;
 }
 
-function Playback({ film }: { film: Film }) {
+function Playback({ gameId, film }: { gameId: string; film: Film }) {
   const [at, setAt] = useState(() => firstFrame(film));
   const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState<Speed>(1);
   const [perspective, setPerspective] = useState<Perspective>("all");
+  const [analysing, setAnalysing] = useState(false);
   const last = film.length - 1;
   useEffect(() => {
     if (!playing) return;
@@ -103,6 +105,16 @@ function Playback({ film }: { film: Film }) {
         onPerspective={setPerspective}
       />
       {known && <Decision table={frame.table} open={open} />}
+      {known && (
+        <Analysis
+          gameId={gameId}
+          decisions={frame.decisions}
+          table={frame.table}
+          open={open}
+          shown={analysing}
+          onShown={setAnalysing}
+        />
+      )}
     </TableView>
   );
 }

@@ -100,6 +100,11 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
     ready: '[data-part~="replay"]',
     opened: '[data-part~="replay-decision"] summary',
   },
+  analysis: {
+    path: () => `/replay/${gameId}`,
+    ready: '[data-part~="replay"]',
+    opened: '[data-part~="replay-analysis"] summary',
+  },
   tournaments: { path: () => "/tournaments", ready: "main li a" },
   "new tournament": {
     path: () => "/tournaments/new",

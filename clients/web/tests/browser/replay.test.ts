@@ -59,6 +59,48 @@ test("an address with a decision starts the replay there", async () => {
   await expect.poll(taken).toBeGreaterThanOrEqual(14);
 });
 
+test("the analysis of a moment shows what its actions were worth, and follows to the next one", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/replay/${gameId}?decision=12`);
+  const analysis = page.locator('[data-part~="replay-analysis"]');
+  const position = page.getByLabel("Position in the game");
+  const taken = async () => Number((await position.getAttribute("aria-valuetext"))?.split(" ")[0]);
+  await expect.poll(taken).toBe(11);
+  // From the end of a pizza to the next decision.
+  const stepTo = async (decisions: number) => {
+    while ((await taken()) < decisions || (await analysis.count()) === 0) {
+      await page.getByRole("button", { name: "One step forward" }).click();
+    }
+  };
+  await stepTo(11);
+  await analysis.locator("summary").click();
+  for (const number of [12, 13, 14]) {
+    const { hands, decision } = before(number);
+    const legal = legalActions(decision.actionMask);
+    // The estimates so far are those of all actions; the last ones say that no better ones follow.
+    await analysis.locator('[data-state="done"]').waitFor();
+    const rows = analysis.locator('[data-part~="estimate"]');
+    expect(await rows.count()).toBeGreaterThanOrEqual(Math.min(8, legal.length));
+    expect(await rows.count()).toBeLessThanOrEqual(Math.min(9, legal.length));
+    expect(await analysis.locator('[data-best="true"]').count()).toBe(1);
+    expect(await rows.first().getAttribute("data-best")).toBe("true");
+    expect(await analysis.locator('[data-taken="true"]').count()).toBe(1);
+    expect(await rows.first().textContent()).toMatch(/\d\.\d\d ± \d\.\d\d/);
+    // The seat knows its own hand.
+    const own = analysis.locator('[data-part~="likely-hands"] tbody tr').nth(decision.seat);
+    const counts = Array.from(
+      { length: JOKER },
+      (_, kind) => hands[decision.seat]?.filter((card) => card === kind + 1).length,
+    );
+    expect(await own.locator("td").allTextContents()).toEqual(counts.map((count) => count?.toFixed(1)));
+    // Stepping on leaves the analysis open, for the next decision.
+    await stepTo(number);
+  }
+  await page.getByLabel("Cards shown").selectOption({ label: "as a spectator" });
+  await expect.poll(() => analysis.count()).toBe(0);
+  expect(faults).toEqual([]);
+});
+
 /** The sorted hands when a decision is open, and the decision, from the record. */
 function before(number: number): { hands: number[][]; decision: DecisionRecord } {
   let hands: number[][] = [];

@@ -22,5 +22,23 @@ export const replay = {
   seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
   estimate: (value: number) => `estimate ${value.toFixed(2)}`,
   noTable: "This decision is not a turn, so it has no look-up table.",
+  analysis: {
+    title: "Analysis",
+    subtitle: (name: string) => `what the actions were worth, from what ${name} knew`,
+    running: "Playing on from possible deals…",
+    caption: (rollouts: number) =>
+      `Mean points of the Shift and standard error, from ${rollouts.toLocaleString("en")} games played on by greedy agents`,
+    action: "Action",
+    points: "Points",
+    value: (points: number, error: number) => `${points.toFixed(2)} ± ${error.toFixed(2)}`,
+    taken: "played",
+    best: "best",
+    others: (count: number) =>
+      count === 1 ? "One more action is worth less." : `${count} more actions are worth less.`,
+    hands: "Cards that each seat holds on average",
+    seat: "Seat",
+    joker: "J",
+    cards: (count: number) => count.toFixed(1),
+  },
   empty: "This record contains no events.",
 };

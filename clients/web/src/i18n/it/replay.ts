@@ -24,5 +24,22 @@ export const replay: Texts["replay"] = {
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `stima ${value.toFixed(2).replace(".", ",")}`,
   noTable: "Questa decisione non è un turno e non ha una tabella.",
+  analysis: {
+    title: "Analisi",
+    subtitle: (name) => `il valore delle azioni, da ciò che ${name} sapeva`,
+    running: "Si giocano le distribuzioni possibili…",
+    caption: (rollouts) =>
+      `Punti medi dello Shift con errore standard, da ${rollouts.toLocaleString("it")} partite continuate da agenti greedy`,
+    action: "Azione",
+    points: "Punti",
+    value: (points, error) => `${points.toFixed(2)} ± ${error.toFixed(2)}`.replaceAll(".", ","),
+    taken: "giocata",
+    best: "migliore",
+    others: (count) => (count === 1 ? "Un’altra azione vale meno." : `Altre ${count} azioni valgono meno.`),
+    hands: "Carte che ogni posto ha in media",
+    seat: "Posto",
+    joker: "J",
+    cards: (count) => count.toFixed(1).replace(".", ","),
+  },
   empty: "Questa registrazione non contiene eventi.",
 };

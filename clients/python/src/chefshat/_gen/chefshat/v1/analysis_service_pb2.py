@@ -27,7 +27,7 @@ from chefshat._gen.chefshat.v1 import event_pb2 as chefshat_dot_v1_dot_event__pb
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"chefshat/v1/analysis_service.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x17\x63hefshat/v1/rules.proto\"4\n\x0eRecordedMoment\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x11\n\tdecisions\x18\x02 \x01(\x04\"\x96\x01\n\tSituation\x12#\n\x05rules\x18\x01 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x0c\n\x04seat\x18\x02 \x01(\r\x12.\n\x08\x64\x65\x63ision\x18\x03 \x01(\x0b\x32\x1c.chefshat.v1.DecisionRequest\x12&\n\x06\x65vents\x18\x04 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\"\xb9\x01\n\x0f\x45valuateRequest\x12-\n\x06moment\x18\x01 \x01(\x0b\x32\x1b.chefshat.v1.RecordedMomentH\x00\x12+\n\tsituation\x18\x02 \x01(\x0b\x32\x16.chefshat.v1.SituationH\x00\x12\x10\n\x08rollouts\x18\x03 \x01(\x04\x12\x0f\n\x07time_ms\x18\x04 \x01(\r\x12\r\n\x05\x61gent\x18\x05 \x01(\t\x12\x0c\n\x04seed\x18\x06 \x01(\x04\x42\n\n\x08position\"i\n\x0e\x41\x63tionEstimate\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\r\x12\x0e\n\x06points\x18\x02 \x01(\x01\x12\x16\n\x0estandard_error\x18\x03 \x01(\x01\x12\r\n\x05place\x18\x04 \x01(\x01\x12\x10\n\x08rollouts\x18\x05 \x01(\x04\"\x1d\n\x0c\x45xpectedHand\x12\r\n\x05\x63\x61rds\x18\x01 \x03(\x01\"\x8a\x01\n\x10\x45valuateResponse\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12,\n\x07\x61\x63tions\x18\x02 \x03(\x0b\x32\x1b.chefshat.v1.ActionEstimate\x12(\n\x05hands\x18\x03 \x03(\x0b\x32\x19.chefshat.v1.ExpectedHand\x12\x10\n\x08rollouts\x18\x04 \x01(\x04\"B\n\x13LegalActionsRequest\x12+\n\x06moment\x18\x01 \x01(\x0b\x32\x1b.chefshat.v1.RecordedMoment\"b\n\x14LegalActionsResponse\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\'\n\x04kind\x18\x02 \x01(\x0e\x32\x19.chefshat.v1.DecisionKind\x12\x13\n\x0b\x61\x63tion_mask\x18\x03 \x01(\x0c\x32\xb1\x01\n\x0f\x41nalysisService\x12I\n\x08\x45valuate\x12\x1c.chefshat.v1.EvaluateRequest\x1a\x1d.chefshat.v1.EvaluateResponse0\x01\x12S\n\x0cLegalActions\x12 .chefshat.v1.LegalActionsRequest\x1a!.chefshat.v1.LegalActionsResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"chefshat/v1/analysis_service.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x17\x63hefshat/v1/rules.proto\"4\n\x0eRecordedMoment\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x11\n\tdecisions\x18\x02 \x01(\x04\"\x96\x01\n\tSituation\x12#\n\x05rules\x18\x01 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x0c\n\x04seat\x18\x02 \x01(\r\x12.\n\x08\x64\x65\x63ision\x18\x03 \x01(\x0b\x32\x1c.chefshat.v1.DecisionRequest\x12&\n\x06\x65vents\x18\x04 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\"\xcc\x01\n\x0f\x45valuateRequest\x12-\n\x06moment\x18\x01 \x01(\x0b\x32\x1b.chefshat.v1.RecordedMomentH\x00\x12+\n\tsituation\x18\x02 \x01(\x0b\x32\x16.chefshat.v1.SituationH\x00\x12\x10\n\x08rollouts\x18\x03 \x01(\x04\x12\x0f\n\x07time_ms\x18\x04 \x01(\r\x12\r\n\x05\x61gent\x18\x05 \x01(\t\x12\x0c\n\x04seed\x18\x06 \x01(\x04\x12\x11\n\tupdate_ms\x18\x07 \x01(\rB\n\n\x08position\"i\n\x0e\x41\x63tionEstimate\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\r\x12\x0e\n\x06points\x18\x02 \x01(\x01\x12\x16\n\x0estandard_error\x18\x03 \x01(\x01\x12\r\n\x05place\x18\x04 \x01(\x01\x12\x10\n\x08rollouts\x18\x05 \x01(\x04\"\x1d\n\x0c\x45xpectedHand\x12\r\n\x05\x63\x61rds\x18\x01 \x03(\x01\"\x8a\x01\n\x10\x45valuateResponse\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12,\n\x07\x61\x63tions\x18\x02 \x03(\x0b\x32\x1b.chefshat.v1.ActionEstimate\x12(\n\x05hands\x18\x03 \x03(\x0b\x32\x19.chefshat.v1.ExpectedHand\x12\x10\n\x08rollouts\x18\x04 \x01(\x04\"B\n\x13LegalActionsRequest\x12+\n\x06moment\x18\x01 \x01(\x0b\x32\x1b.chefshat.v1.RecordedMoment\"b\n\x14LegalActionsResponse\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\'\n\x04kind\x18\x02 \x01(\x0e\x32\x19.chefshat.v1.DecisionKind\x12\x13\n\x0b\x61\x63tion_mask\x18\x03 \x01(\x0c\x32\xb1\x01\n\x0f\x41nalysisService\x12I\n\x08\x45valuate\x12\x1c.chefshat.v1.EvaluateRequest\x1a\x1d.chefshat.v1.EvaluateResponse0\x01\x12S\n\x0cLegalActions\x12 .chefshat.v1.LegalActionsRequest\x1a!.chefshat.v1.LegalActionsResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -39,17 +39,17 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SITUATION']._serialized_start=184
   _globals['_SITUATION']._serialized_end=334
   _globals['_EVALUATEREQUEST']._serialized_start=337
-  _globals['_EVALUATEREQUEST']._serialized_end=522
-  _globals['_ACTIONESTIMATE']._serialized_start=524
-  _globals['_ACTIONESTIMATE']._serialized_end=629
-  _globals['_EXPECTEDHAND']._serialized_start=631
-  _globals['_EXPECTEDHAND']._serialized_end=660
-  _globals['_EVALUATERESPONSE']._serialized_start=663
-  _globals['_EVALUATERESPONSE']._serialized_end=801
-  _globals['_LEGALACTIONSREQUEST']._serialized_start=803
-  _globals['_LEGALACTIONSREQUEST']._serialized_end=869
-  _globals['_LEGALACTIONSRESPONSE']._serialized_start=871
-  _globals['_LEGALACTIONSRESPONSE']._serialized_end=969
-  _globals['_ANALYSISSERVICE']._serialized_start=972
-  _globals['_ANALYSISSERVICE']._serialized_end=1149
+  _globals['_EVALUATEREQUEST']._serialized_end=541
+  _globals['_ACTIONESTIMATE']._serialized_start=543
+  _globals['_ACTIONESTIMATE']._serialized_end=648
+  _globals['_EXPECTEDHAND']._serialized_start=650
+  _globals['_EXPECTEDHAND']._serialized_end=679
+  _globals['_EVALUATERESPONSE']._serialized_start=682
+  _globals['_EVALUATERESPONSE']._serialized_end=820
+  _globals['_LEGALACTIONSREQUEST']._serialized_start=822
+  _globals['_LEGALACTIONSREQUEST']._serialized_end=888
+  _globals['_LEGALACTIONSRESPONSE']._serialized_start=890
+  _globals['_LEGALACTIONSRESPONSE']._serialized_end=988
+  _globals['_ANALYSISSERVICE']._serialized_start=991
+  _globals['_ANALYSISSERVICE']._serialized_end=1168
 # @@protoc_insertion_point(module_scope)

@@ -104,6 +104,7 @@ class EvaluateRequest(_message.Message):
     TIME_MS_FIELD_NUMBER: _builtins.int
     AGENT_FIELD_NUMBER: _builtins.int
     SEED_FIELD_NUMBER: _builtins.int
+    UPDATE_MS_FIELD_NUMBER: _builtins.int
     rollouts: _builtins.int
     """Rollouts in all, at most 1,000,000; 0: as many as the time allows. With a number of rollouts
     and a seed the result is always the same, if the time suffices. Every legal action is tried in 4
@@ -117,6 +118,10 @@ class EvaluateRequest(_message.Message):
     """
     seed: _builtins.int
     """Seed of the random choices."""
+    update_ms: _builtins.int
+    """Milliseconds between messages with estimates so far, 50 to 10,000; 0: only the last one is sent.
+    A message is left out if the client has not received the one before.
+    """
     @_builtins.property
     def moment(self) -> Global___RecordedMoment:
         """A decision of a recorded game, from the knowledge of its seat alone."""
@@ -134,10 +139,11 @@ class EvaluateRequest(_message.Message):
         time_ms: _builtins.int = ...,
         agent: _builtins.str = ...,
         seed: _builtins.int = ...,
+        update_ms: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["moment", b"moment", "position", b"position", "situation", b"situation"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["agent", b"agent", "moment", b"moment", "position", b"position", "rollouts", b"rollouts", "seed", b"seed", "situation", b"situation", "time_ms", b"time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["agent", b"agent", "moment", b"moment", "position", b"position", "rollouts", b"rollouts", "seed", b"seed", "situation", b"situation", "time_ms", b"time_ms", "update_ms", b"update_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_position: _TypeAlias = _typing.Literal["moment", "situation"]  # noqa: Y015
     _WhichOneofArgType_position: _TypeAlias = _typing.Literal["position", b"position"]  # noqa: Y015

@@ -37,8 +37,9 @@ class AnalysisServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> AnalysisServiceAsyncStub: ...
     Evaluate: _grpc.UnaryStreamMultiCallable[_analysis_service_pb2.EvaluateRequest, _analysis_service_pb2.EvaluateResponse]
-    """Estimates each legal action of a decision and the likely hands. The stream has one message, sent
-    when the budget is spent. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
+    """Estimates each legal action of a decision and the likely hands. The last message of the stream is
+    sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
+    work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
     (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
     (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -51,8 +52,9 @@ class AnalysisServiceAsyncStub(AnalysisServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     Evaluate: _aio.UnaryStreamMultiCallable[_analysis_service_pb2.EvaluateRequest, _analysis_service_pb2.EvaluateResponse]  # type: ignore[assignment]
-    """Estimates each legal action of a decision and the likely hands. The stream has one message, sent
-    when the budget is spent. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
+    """Estimates each legal action of a decision and the likely hands. The last message of the stream is
+    sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
+    work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
     (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
     (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -68,8 +70,9 @@ class AnalysisServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _analysis_service_pb2.EvaluateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_analysis_service_pb2.EvaluateResponse], _abc.AsyncIterator[_analysis_service_pb2.EvaluateResponse]]:
-        """Estimates each legal action of a decision and the likely hands. The stream has one message, sent
-        when the budget is spent. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
+        """Estimates each legal action of a decision and the likely hands. The last message of the stream is
+        sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
+        work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
         (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
         (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
         """

@@ -93,7 +93,7 @@ class GetServerInfoResponse(_message.Message):
     @_builtins.property
     def limits(self) -> _containers.ScalarMap[_builtins.str, _builtins.int]:
         """Limits by name: max_rooms, max_seats_per_stream, max_message_bytes, max_spectators_per_room,
-        max_shifts, ...
+        max_shifts, max_analyses (running or waiting), max_analysis_rollouts, max_analysis_ms, ...
         """
 
     def __init__(

@@ -276,7 +276,7 @@ class SavedStart(_message.Message):
     same_deals: _builtins.bool
     """Whether a copy continues exactly as the saved game would: with its seed, and with the random
     choices of its built-in agents. A game that follows a copy of the same state then has the same
-    deals and choices again, and is no new sample: set total_games to `games` so that none follows.
+    deals and choices again, which tells nothing new: set total_games to `games` so that none follows.
     Otherwise later Shifts are dealt, and built-in agents choose, by the seed of each game; the
     cards of the current Shift stay the same.
     """
@@ -892,8 +892,8 @@ class ObservationColumns(_message.Message):
     Shift, its history begins there.
     """
     history_counts: _builtins.bytes
-    """u32: number of these actions since the Shift began, also those beyond the width; empty if there
-    is no history.
+    """u32: number of these actions since the Shift began, also those beyond the width; empty without a
+    history.
     """
     board_owners: _builtins.bytes
     """u8: the seat that played the cards on the board; 255 if the board is empty."""
