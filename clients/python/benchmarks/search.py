@@ -1,5 +1,7 @@
 """Latency of estimates of all legal actions, and rollouts a second: in this process, and with `--address` on a server.
 
+Rollouts a second of processor time are measured in this process only: on a busy machine they tell more than those of a second.
+
 A position is a decision with a choice, of a game by random agents; on a server, of a recorded game by greedy ones.
 """
 
@@ -31,6 +33,7 @@ class Row(TypedDict):
     p50_ms: float
     p99_ms: float
     rollouts_per_second: int
+    rollouts_per_cpu_second: int | None
 
 
 def positions(count: int, seed: int) -> list[search.Position]:
@@ -56,10 +59,10 @@ def recorded(client: chefshat.Client, count: int) -> Iterator[pb.RecordedMoment]
     return (pb.RecordedMoment(game_id=game, decisions=choices[place % len(choices)]) for place in range(count))
 
 
-def measure(name: str, calls: Sequence[Callable[[], int]]) -> Row:
+def measure(name: str, calls: Sequence[Callable[[], int]], *, here: bool) -> Row:
     """Measures calls that return their number of rollouts. The first one does not count."""
     calls[0]()
-    times, rollouts = [], 0
+    times, rollouts, busy = [], 0, time.process_time()
     for call in calls:
         start = time.perf_counter()
         rollouts += call()
@@ -71,6 +74,7 @@ def measure(name: str, calls: Sequence[Callable[[], int]]) -> Row:
         "p50_ms": round(float(p50), 3),
         "p99_ms": round(float(p99), 3),
         "rollouts_per_second": round(1000 * rollouts / sum(times)),
+        "rollouts_per_cpu_second": round(rollouts / (time.process_time() - busy)) if here else None,
     }
 
 
@@ -107,18 +111,24 @@ def main() -> None:
     rows = []
     here = positions(options.positions, options.seed)
     for cost in costs:
-        rows.append(measure(f"in process {named(*cost)}", [partial(in_process, at, *cost, options.threads) for at in here]))
+        rows.append(
+            measure(f"in process {named(*cost)}", [partial(in_process, at, *cost, options.threads) for at in here], here=True)
+        )
     if options.address:
         with chefshat.Client(options.address) as client:
             moments = list(recorded(client, options.positions))
             for cost in costs:
-                rows.append(measure(f"on a server {named(*cost)}", [partial(on_server, client, at, *cost) for at in moments]))
+                rows.append(
+                    measure(f"on a server {named(*cost)}", [partial(on_server, client, at, *cost) for at in moments], here=False)
+                )
     if options.json:
         print(json.dumps({"cores": os.cpu_count(), "load": os.getloadavg()[0], "rows": rows}))
         return
     for row in rows:
         times = f"p50 {row['p50_ms']:8.2f} ms  p99 {row['p99_ms']:8.2f} ms"
-        print(f"{row['name']:36} {times}  {row['rollouts_per_second']:9,} rollouts/s")
+        own = row["rollouts_per_cpu_second"]
+        of_processor = "" if own is None else f"  {own:9,} a second of processor time"
+        print(f"{row['name']:36} {times}  {row['rollouts_per_second']:9,} rollouts/s{of_processor}")
 
 
 if __name__ == "__main__":
