@@ -186,9 +186,12 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
                 {"action_mask": mask.copy(), "kind": int(now.kinds[0]), "invalid_attempts": attempts},
             )
         row = packed.columns
-        mask = single.mask(row)
         observed = single.table(row) if self._form.is_table else None
-        if observed is None:
+        if observed is not None:
+            # The mask is its last part.
+            mask = observed[-self.vector.num_actions :].astype(np.int8)
+        else:
+            mask = single.mask(row)
             observed = self._form.row(self._form.of(now), 0)
             if self._form.has_parts:
                 observed["action_mask"] = mask.copy()
