@@ -48,6 +48,20 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
         assert trainer.training.progress.decisions == 16 * 16
 
 
+def test_some_games_may_be_against_a_past_self(real_address: str, tmp_path: Path) -> None:
+    rules = full_rules({**SMALL, "players": 3}, real_address)
+    past = ppo_checkpoint.begin(PLAN, 1, rules, "a test").network("past")
+    file = tmp_path / "past.safetensors"
+    network.save(file, past.layers, past.info, dtype=np.float16)
+    plan = replace(PLAN, games=0, opponent_games=8, opponents=f"{file},greedy", steps=16)
+    with Trainer(ppo_checkpoint.begin(plan, 1, rules, "a test"), address=real_address) as trainer:
+        trainer.update(0.0)
+        # A game may have no decision within two Shifts, and then no row.
+        assert 8 * 14 < trainer.training.progress.decisions <= 8 * 16
+        found = evaluate(trainer.training.network("now"), [str(file), "greedy"], games=3, seed=2, rules=rules, address=real_address)
+    assert found.opponents == (str(file), "greedy")
+
+
 def test_the_value_network_may_see_all_hands_and_learn_first(real_address: str, tmp_path: Path) -> None:
     plan = replace(PLAN, games=8, steps=16, value_updates=1, hyper=replace(PLAN.hyper, all_hands=True))
     begun = ppo_checkpoint.begin(plan, 1, full_rules(SMALL, real_address), "a test")
