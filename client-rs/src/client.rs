@@ -251,6 +251,25 @@ impl Client {
         Ok(())
     }
 
+    /// Asks for a hint for the open decision of the ticket's seat, where the room's policy allows
+    /// hints. It takes about half a second of the seat's time.
+    ///
+    /// # Errors
+    /// `TICKET_UNKNOWN`, `HINTS_OFF`, `DECISION_CLOSED`, `TOO_MANY_HINTS`.
+    pub async fn hint(
+        &self,
+        ticket: impl Into<String>,
+        decision_id: u64,
+    ) -> Result<v1::Hint, Error> {
+        let mut service = PlayServiceClient::new(self.channel());
+        let request = v1::ActRequest {
+            ticket: ticket.into(),
+            command: Some(Command::Hint(v1::AskHint { decision_id })),
+        };
+        let response = service.act(request).await?.into_inner();
+        Ok(response.hint.unwrap_or_default())
+    }
+
     /// Watches a room from an event number on; 0 and 1 are the first event. Connects when the first
     /// event is requested.
     pub fn spectate(&self, room_id: impl Into<String>, from_sequence: u64) -> Spectator {

@@ -45,6 +45,8 @@ pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
 /// How long a client may take to receive one message.
 pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time of a hint.
+pub const HINT_TIME: Duration = Duration::from_millis(400);
 /// The largest budget of a search of a built-in agent in a room, as time.
 pub const MAX_SEARCH_BUDGET: Duration = Duration::from_secs(1);
 /// The largest budget of a search of a built-in agent in a room, as rollouts.

@@ -93,7 +93,7 @@ def run(binary: Path, *arguments: object) -> Any:
 
 
 class Talkative(RandomAgent):
-    """Plays at random, and sends expressions."""
+    """Plays at random, sends expressions, and asks for one hint."""
 
     def __init__(self, client: chefshat.Client, ticket: str) -> None:
         super().__init__(1)
@@ -107,6 +107,10 @@ class Talkative(RandomAgent):
         if request.decision_id % 7 == 3:
             private = pb.Expression(label="doubt", confidence=0.25, media="clip", record_only=True)
             self.client.express(self.ticket, private)
+        if request.decision_id == 3:
+            hint = self.client.hint(self.ticket, request.decision_id)
+            assert request.mask[hint.action]
+            assert {estimate.action for estimate in hint.actions} <= set(request.legal_actions)
         return super().decide(request)
 
 
@@ -163,7 +167,7 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     rules = pb.RuleSet(target_shifts=2)
     with RealServer(binary, data_dir) as server, chefshat.Client(server.address) as client:
         seats = [None, "random", "greedy", "random"]
-        room = client.create_room("talk", rules=rules, seats=seats)
+        room = client.create_room("talk", rules=rules, policy=pb.RoomPolicy(hints=True), seats=seats)
         ticket = client.join_room(room.join_code, "Talkative").ticket
         client.play(Talkative(client, ticket), ticket)
         policy = pb.RoomPolicy(max_invalid_attempts=3)
@@ -189,7 +193,7 @@ def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset
 @pytest.mark.parametrize("table", TABLES)
 def test_every_column_has_its_documented_type(hosted: Dataset, table: str) -> None:
     columns = documented_columns(table)
-    assert len(columns) == {"decisions": 58, "expressions": 15}[table]
+    assert len(columns) == {"decisions": 59, "expressions": 15}[table]
     schema = pyarrow.parquet.read_schema(hosted.parquet(table))
     in_polars = polars.read_parquet(hosted.parquet(table))
     in_pandas = pandas.read_parquet(hosted.parquet(table), dtype_backend="pyarrow")
@@ -243,6 +247,8 @@ def test_rows_are_the_decisions_of_the_records(hosted: Dataset) -> None:
     played = decisions.filter(polars.col("agent") == "Talkative")
     assert played["agent_kind"].unique().to_list() == ["agent"]
     assert played["decision_time_us"].null_count() == 0
+    hinted = decisions.filter("hinted")
+    assert hinted.select("agent", "decision_id").rows() == [("Talkative", 3)]
     built_in = decisions.filter(polars.col("agent_kind") == "built_in")
     assert built_in["decision_time_us"].null_count() == built_in.height > 0
     assert set(built_in["built_in_agent"]) == {"random", "greedy"}

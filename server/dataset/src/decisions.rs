@@ -39,6 +39,7 @@ pub(super) struct DecisionRow {
     pub(super) text: String,
     pub(super) invalid_attempts: Vec<u32>,
     pub(super) source: &'static str,
+    pub(super) hinted: bool,
     pub(super) decision_time_us: Option<u64>,
     pub(super) elapsed_ms: u64,
     /// The latest expression of each seat, index = seat.
@@ -350,6 +351,12 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         Type::Text,
         "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, with its reason), `recorded` (taken over from the parent game of a branch), `table` (reported from a physical table).",
         |row| row.source.into(),
+    ),
+    Column::new(
+        "hinted",
+        Type::Bool,
+        "Whether the seat was given a hint for the decision.",
+        |row| row.hinted.into(),
     ),
     Column::new(
         "decision_time_us",

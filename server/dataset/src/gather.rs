@@ -192,6 +192,7 @@ impl Gatherer {
             text: record.text.clone(),
             invalid_attempts: record.invalid_attempts.clone(),
             source: source_name(record.source()),
+            hinted: record.hints > 0,
             decision_time_us: measured.then_some(record.decision_time_us),
             elapsed_ms: record.elapsed_ms,
             expressions: self.latest.clone(),

@@ -4,6 +4,8 @@
 /// Invalid attempts at one decision after which the default is taken even if attempts are
 /// unlimited, so that records stay bounded.
 pub const MAX_ATTEMPTS: u32 = 10_000;
+/// Most hints for one decision.
+pub const MAX_HINTS: u32 = 3;
 /// Most annotations recorded per decision, bytes.
 pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
 /// Most annotations recorded per seat and game, bytes.

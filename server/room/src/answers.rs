@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::journal::{Fill, SeatedParticipant};
-use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
+use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_HINTS, MAX_SEATINGS};
 use chefshat_referee::Refusal;
 pub use chefshat_referee::Verdict as ReportVerdict;
 
@@ -75,6 +75,20 @@ pub enum ExpressError {
     GameOver,
     /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
+    TooMany,
+}
+
+/// Why there is no hint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum HintError {
+    /// The policy does not allow hints.
+    #[error("this room gives no hints; its creator decides that")]
+    Off,
+    /// The decision is not open for the seat.
+    #[error("this decision is not open; ask while it is the seat's turn")]
+    Closed,
+    /// There were too many for the decision, or another one is being computed.
+    #[error("at most {MAX_HINTS} hints for a decision, one at a time")]
     TooMany,
 }
 

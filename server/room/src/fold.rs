@@ -62,6 +62,11 @@ impl Core {
                     open.attempts += 1;
                 }
             }
+            Change::Hinted(_) => {
+                if let Some(open) = &mut self.open {
+                    open.hints += 1;
+                }
+            }
             Change::Decided(decided) => self.decide(at, decided),
             Change::Expressed {
                 seat,
@@ -280,6 +285,8 @@ impl Core {
                     paused_since: None,
                     attempts: 0,
                     search: Search::NotStarted,
+                    hints: 0,
+                    hint_runs: false,
                 }
             });
     }

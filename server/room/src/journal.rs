@@ -200,6 +200,8 @@ pub enum Change {
         /// The action, as it was sent.
         action: u32,
     },
+    /// A seat was given a hint for its open decision.
+    Hinted(Seat),
     /// A decision was taken.
     Decided(Decided),
     /// A seat expressed something.

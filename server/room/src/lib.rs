@@ -33,14 +33,14 @@ use chefshat_engine::{
 };
 
 pub use answers::{
-    Answer, Answered, ExpressError, JoinError, LeaveError, ReportError, ReportOutcome,
+    Answer, Answered, ExpressError, HintError, JoinError, LeaveError, ReportError, ReportOutcome,
     ReportVerdict, SeatStanding, Verdict,
 };
 
 pub use limits::{
     BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
-    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_IDLE,
-    MAX_REPORTS, MAX_SEATINGS, RECALL_TIME,
+    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_HINTS,
+    MAX_IDLE, MAX_REPORTS, MAX_SEATINGS, RECALL_TIME,
 };
 pub use revive::BadJournal;
 pub use search::SearchRequest;
@@ -161,6 +161,10 @@ pub struct OpenDecision {
     attempts: u32,
     /// The search for it, if an agent that searches takes it.
     search: Search,
+    /// Hints that its seat was given.
+    hints: u32,
+    /// Whether a hint is being computed.
+    hint_runs: bool,
 }
 
 impl OpenDecision {
@@ -177,6 +181,7 @@ impl OpenDecision {
         self.start = None;
         self.recheck_at = Duration::ZERO;
         self.search = Search::NotStarted;
+        self.hint_runs = false;
     }
 }
 

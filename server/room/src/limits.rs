@@ -4,6 +4,7 @@ use std::time::Duration;
 
 pub use chefshat_engine::limits::{
     MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_CONNECTION_EVENTS,
+    MAX_HINTS,
 };
 
 /// Before the game starts, a seat becomes free again if its ticket is not attached within this

@@ -96,6 +96,8 @@ pub struct Policy {
     pub one_seat_per_client: bool,
     /// Who sees the room and its record.
     pub visibility: Visibility,
+    /// Whether seats may ask for hints.
+    pub hints: bool,
 }
 
 impl Policy {
@@ -143,6 +145,7 @@ impl Default for Policy {
             clocks: vec![KindClock::PEOPLE],
             one_seat_per_client: false,
             visibility: Visibility::Public,
+            hints: false,
         }
     }
 }

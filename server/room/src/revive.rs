@@ -71,7 +71,7 @@ impl Core {
                 let bounded = entropy.iter().all(|bytes| bytes.len() <= MAX_ENTROPY);
                 check(bounded, "a seat's contribution to the seed is too long")
             }
-            Change::Attempted { seat, .. } => self.check_decision(*seat),
+            Change::Attempted { seat, .. } | Change::Hinted(seat) => self.check_decision(*seat),
             Change::Decided(decided) => {
                 self.check_decision(decided.seat)?;
                 let legal = self.legal_actions().contains(decided.action);

@@ -1,12 +1,14 @@
-//! Decisions of agents that search. A search takes long, so the core only says what to search and
+//! Decisions of agents that search, and hints for other seats. A search takes long, so the core only says what to search and
 //! takes what was found as an input. The journal has the decision alone: after a restart of the server,
 //! the open one is searched again.
+
+use std::time::Duration;
 
 use chefshat_agents::MonteCarlo;
 use chefshat_engine::{ActionId, Event, Mask, Observation, Seat, Viewer};
 
-use super::{Core, OpenDecision, State};
-use crate::journal::Fill;
+use super::{Core, HintError, MAX_HINTS, OpenDecision, State};
+use crate::journal::{Change, Fill};
 use crate::log::RoomEvent;
 
 /// The search for an open decision.
@@ -41,7 +43,7 @@ pub struct SearchRequest {
     pub plays: MonteCarlo,
     /// What the seat sees.
     pub observation: Observation,
-    /// The legal actions, two or more.
+    /// The legal actions.
     pub legal: Mask,
     /// The events of the Shift, as the seat saw them.
     pub history: Vec<Event>,
@@ -57,20 +59,68 @@ impl Core {
         if open.search != Search::NotStarted {
             return None;
         }
-        let seat = open.decision.seat;
-        let request = SearchRequest {
-            seat,
-            decision: open.id,
-            plays,
-            observation: self.observe(Viewer::Seat(seat))?,
-            legal: self.legal_actions(),
-            history: self.shift_seen_by(seat),
-            seed: self.header.seed.agent_seed(seat.index()),
-        };
+        let request = self.search_request(open, plays);
         if let Some(open) = &mut self.open {
             open.search = Search::Running;
         }
         Some(request)
+    }
+
+    fn search_request(&self, open: &OpenDecision, plays: MonteCarlo) -> SearchRequest {
+        let seat = open.decision.seat;
+        let observation = self.observe(Viewer::Seat(seat));
+        SearchRequest {
+            seat,
+            decision: open.id,
+            plays,
+            observation: observation.expect("a decision is open"),
+            legal: self.legal_actions(),
+            history: self.shift_seen_by(seat),
+            seed: self.header.seed.agent_seed(seat.index()),
+        }
+    }
+
+    /// Starts a hint for the open decision of a seat. [`Core::hinted`] takes its end.
+    ///
+    /// # Errors
+    /// There is no hint for it now.
+    pub fn start_hint(
+        &mut self,
+        seat: Seat,
+        decision: u64,
+        plays: MonteCarlo,
+    ) -> Result<SearchRequest, HintError> {
+        if !self.header.policy.hints || self.header.is_physical() {
+            return Err(HintError::Off);
+        }
+        let open = self.awaited_from(seat).filter(|open| open.id == decision);
+        let open = open.ok_or(HintError::Closed)?;
+        if open.hint_runs || open.hints >= MAX_HINTS {
+            return Err(HintError::TooMany);
+        }
+        let request = self.search_request(open, plays);
+        if let Some(open) = &mut self.open {
+            open.hint_runs = true;
+        }
+        Ok(request)
+    }
+
+    /// Records that a hint is given now.
+    ///
+    /// # Errors
+    /// Its decision is closed.
+    pub fn hinted(&mut self, now: Duration, seat: Seat, decision: u64) -> Result<(), HintError> {
+        let awaited = self
+            .awaited_from(seat)
+            .is_some_and(|open| open.id == decision);
+        if !awaited {
+            return Err(HintError::Closed);
+        }
+        self.commit(now, Change::Hinted(seat));
+        if let Some(open) = &mut self.open {
+            open.hint_runs = false;
+        }
+        Ok(())
     }
 
     /// Takes the result of a search; `None` if nothing was searched. The decision is then due like that of any

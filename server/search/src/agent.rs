@@ -140,6 +140,22 @@ impl Choice<'_> {
         pool: Option<&ThreadPool>,
         stopped: impl Fn() -> bool,
     ) -> Result<ActionId, KnowledgeError> {
+        let estimates = self.estimates(plays, Allocation::Halving, seed, pool, stopped)?;
+        Ok(suggested(&estimates))
+    }
+
+    /// Estimates of all legal actions within the budget, first that of the prior. `stopped` ends the search early.
+    ///
+    /// # Errors
+    /// As [`Choice::search`].
+    pub fn estimates(
+        &self,
+        plays: MonteCarlo,
+        allocation: Allocation,
+        seed: [u8; 32],
+        pool: Option<&ThreadPool>,
+        stopped: impl Fn() -> bool,
+    ) -> Result<Vec<Estimate>, KnowledgeError> {
         let start = Instant::now();
         let knowledge = Knowledge::new(self.rules, self.observation, self.history)?;
         let sampler = Sampler::new(knowledge, MAX_STEPS)?;
@@ -147,16 +163,24 @@ impl Choice<'_> {
         let actions: Vec<ActionId> = std::iter::once(self.prior).chain(others).collect();
         let method = Method {
             policy: RolloutPolicy::Kind(plays.rollouts),
-            allocation: Allocation::Halving,
+            allocation,
         };
         let progress = |rollouts: u64| match plays.budget {
             _ if stopped() => 1.0,
             Budget::Rollouts(all) => rollouts as f64 / all as f64,
             Budget::Time(time) => start.elapsed().as_secs_f64() / time.as_secs_f64(),
         };
-        let estimates = evaluate(&sampler, &actions, &method, seed, pool, progress);
-        Ok(surely_better(&estimates, MARGIN).unwrap_or(self.prior))
+        Ok(evaluate(&sampler, &actions, &method, seed, pool, progress))
     }
+}
+
+/// The action that `monte_carlo` takes by these estimates: the first, unless another surely gains
+/// points.
+///
+/// # Panics
+/// If there are none.
+pub fn suggested(estimates: &[Estimate]) -> ActionId {
+    surely_better(estimates, MARGIN).unwrap_or(estimates[0].action)
 }
 
 /// The agent of one seat.

@@ -72,6 +72,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Ok(visibility) => visibility_from_proto(visibility),
             Err(_) => return Err(FieldProblem::unknown("visibility", message.visibility)),
         },
+        hints: message.hints,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -118,6 +119,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             .collect(),
         one_seat_per_client: policy.one_seat_per_client,
         visibility: visibility_to_proto(policy.visibility).into(),
+        hints: policy.hints,
     }
 }
 

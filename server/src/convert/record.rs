@@ -26,13 +26,17 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
     let mut core = Core::new(Arc::clone(header));
     let mut body = Vec::with_capacity(journal.len() * 2);
     let mut attempts: Vec<u32> = Vec::new();
-    let mut decisions = 0;
+    let (mut decisions, mut hints) = (0, 0);
     for entry in journal {
         match &entry.change {
             Change::Attempted { action, .. } => attempts.push(*action),
+            Change::Hinted(_) => hints += 1,
             Change::Decided(decided) => {
                 decisions += 1;
-                let record = decision(&core, entry, decided, &std::mem::take(&mut attempts));
+                let record = v1::DecisionRecord {
+                    hints: std::mem::take(&mut hints),
+                    ..decision(&core, entry, decided, &std::mem::take(&mut attempts))
+                };
                 body.push(Line::Decision(record));
             }
             Change::Expressed {
@@ -119,5 +123,6 @@ fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> 
         invalid_reward: open
             .and_then(|open| invalid_reward(scheme, open.decision.kind, attempts.len())),
         elapsed_ms: elapsed_ms(entry),
+        hints: 0,
     }
 }

@@ -74,6 +74,10 @@ pub fn tournament_plan(
     let policy = policy(message, deals, no_show_ms)?;
     if physical_tables > 0 {
         check_real_cards("filler", filler)?;
+        if policy.hints {
+            let problem = "hints are not given at tables with real cards";
+            return Err(FieldProblem::new("hints", problem));
+        }
         check_real_cards("policy.substitute", policy.substitute)?;
         (built_in.iter()).try_for_each(|agent| check_real_cards("built_in_agents", *agent))?;
         Referee::check_rules(&rules).map_err(|problem| FieldProblem::new("rules", problem))?;

@@ -220,7 +220,7 @@ fn evaluated(
     Ok(response(&found))
 }
 
-fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
+pub(super) fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
     v1::ActionEstimate {
         action: estimate.action.index().into(),
         points: estimate.points(),

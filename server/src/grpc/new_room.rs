@@ -72,6 +72,13 @@ pub(super) async fn new_room(
     check_table(&request, &fills, &beginning.rules)?;
     if request.physical {
         check_agents(&policy, &fills)?;
+        if policy.hints {
+            let problem = "hints are not given at tables with real cards";
+            return Err(field(
+                "POLICY_REFUSED",
+                &FieldProblem::new("hints", problem),
+            ));
+        }
     }
     Ok(NewRoom {
         name,

@@ -14,11 +14,13 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::analysis::estimate_to_proto;
 use super::reach::Reach;
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
+use crate::limits::Hint;
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
@@ -153,6 +155,17 @@ impl PlayService for Play {
             Some(act_request::Command::Express(expression)) => express_action(&expression)
                 .map_err(|problem| field("EXPRESSION_REFUSED", &problem))?,
             Some(act_request::Command::Resume(_)) => SeatAction::Resume,
+            Some(act_request::Command::Hint(ask)) => {
+                let hint = room.hint(token.secret, ask.decision_id).await;
+                let hint = hint
+                    .map_err(Refusal::from)?
+                    .ok_or_else(ticket_unknown)?
+                    .map_err(Refusal::from)?;
+                return Ok(Response::new(v1::ActResponse {
+                    result: None,
+                    hint: Some(hint_to_proto(&hint)),
+                }));
+            }
             None => {
                 return Err(field(
                     "COMMAND_MISSING",
@@ -166,7 +179,14 @@ impl PlayService for Play {
             .map_err(Refusal::from)?
             .ok_or_else(ticket_unknown)?
             .map_err(Refusal::from)?;
-        Ok(Response::new(v1::ActResponse { result }))
+        Ok(Response::new(v1::ActResponse { result, hint: None }))
+    }
+}
+
+fn hint_to_proto(hint: &Hint) -> v1::Hint {
+    v1::Hint {
+        action: hint.suggested.index().into(),
+        actions: hint.estimates.iter().map(estimate_to_proto).collect(),
     }
 }
 

@@ -17,7 +17,7 @@ use crate::outbox::StreamEnd;
 use crate::room::{ReportRefusal, RoomGone, SpectateError};
 use crate::rooms::CreateError;
 use crate::store::StoreError;
-use chefshat_room::{ExpressError, JoinError, LeaveError, ReportError};
+use chefshat_room::{ExpressError, HintError, JoinError, LeaveError, ReportError};
 
 /// Domain of every `ErrorInfo`.
 const DOMAIN: &str = "chefshat";
@@ -302,6 +302,17 @@ impl From<ExpressError> for Refusal {
         let refused = convert::express_refused(error);
         let code = Code::from(i32::try_from(refused.code).unwrap_or_default());
         Self(status(code, &refused.reason, refused.message, []))
+    }
+}
+
+impl From<HintError> for Refusal {
+    fn from(error: HintError) -> Self {
+        let (code, reason) = match error {
+            HintError::Off => (Code::FailedPrecondition, "HINTS_OFF"),
+            HintError::Closed => (Code::FailedPrecondition, "DECISION_CLOSED"),
+            HintError::TooMany => (Code::ResourceExhausted, "TOO_MANY_HINTS"),
+        };
+        Self(status(code, reason, error.to_string(), []))
     }
 }
 

@@ -25,7 +25,7 @@ pub use key::{Key, Shares};
 pub use log_pace::LogPace;
 pub use places::{Held, Places};
 pub use rate::Rate;
-pub use searches::Searches;
+pub use searches::{Hint, Searches};
 
 /// Why something is refused although the caller may do it: it or others use too much of it now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

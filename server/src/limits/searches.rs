@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, RuleSet};
 use chefshat_room::SearchRequest;
-use chefshat_search::{Chance, Choice, ShiftHistory};
+use chefshat_search::{
+    Allocation, Chance, Choice, Estimate, KnowledgeError, ShiftHistory, suggested,
+};
 use rayon::ThreadPoolBuildError;
 use tokio_util::sync::CancellationToken;
 
@@ -54,6 +56,30 @@ impl Searches {
         rules: RuleSet,
         request: SearchRequest,
     ) -> Option<ActionId> {
+        self.run(key, move |stopped| searched(rules, &request, stopped))
+            .await
+    }
+
+    /// Estimates the actions of a decision for a hint. Without a place or time for it, suggests what is
+    /// played without a search.
+    pub async fn hint(self: Arc<Self>, key: Key, rules: RuleSet, request: SearchRequest) -> Hint {
+        let prior = prior_of(&request);
+        let estimates = self.run(key, move |stopped| estimated(rules, &request, stopped));
+        let estimates = estimates.await.unwrap_or_default();
+        Hint {
+            suggested: match estimates.is_empty() {
+                true => prior,
+                false => suggested(&estimates),
+            },
+            estimates,
+        }
+    }
+
+    async fn run<T: Send + 'static>(
+        &self,
+        key: Key,
+        work: impl FnOnce(&dyn Fn() -> bool) -> Result<T, SearchOutcome> + Send + 'static,
+    ) -> Option<T> {
         let asked = Instant::now();
         let ended = match self.places.try_take(key) {
             None => Err(SearchOutcome::Busy),
@@ -66,39 +92,72 @@ impl Searches {
                     if gone.is_cancelled() || asked.elapsed() > MAX_SEARCH_WAIT {
                         return Err(SearchOutcome::Busy);
                     }
-                    searched(rules, &request, || gone.is_cancelled())
+                    let start = Instant::now();
+                    work(&|| gone.is_cancelled() || start.elapsed() > MAX_SEARCH_TIME)
                 };
                 let ended = self.threads.run(work).await;
                 ended.unwrap_or(Err(SearchOutcome::Failed))
             }
         };
-        let outcome = ended.err().unwrap_or(SearchOutcome::Searched);
-        self.metrics.searched(outcome);
+        let outcome = ended.as_ref().err().copied();
+        self.metrics
+            .searched(outcome.unwrap_or(SearchOutcome::Searched));
         ended.ok()
     }
+}
+
+/// A hint.
+#[derive(Debug)]
+pub struct Hint {
+    /// The action that it suggests.
+    pub suggested: ActionId,
+    /// Estimates of all legal actions, or none.
+    pub estimates: Vec<Estimate>,
 }
 
 /// Searches on the calling thread.
 fn searched(
     rules: RuleSet,
     request: &SearchRequest,
-    stopped: impl Fn() -> bool,
+    stopped: &dyn Fn() -> bool,
 ) -> Result<ActionId, SearchOutcome> {
-    let start = Instant::now();
+    choosing(rules, request, |choice, seed| {
+        choice.search(request.plays, seed, None, stopped)
+    })
+}
+
+/// Estimates all legal actions on the calling thread, in their order.
+fn estimated(
+    rules: RuleSet,
+    request: &SearchRequest,
+    stopped: &dyn Fn() -> bool,
+) -> Result<Vec<Estimate>, SearchOutcome> {
+    choosing(rules, request, |choice, seed| {
+        choice.estimates(request.plays, Allocation::Uniform, seed, None, stopped)
+    })
+}
+
+fn choosing<T>(
+    rules: RuleSet,
+    request: &SearchRequest,
+    work: impl FnOnce(&Choice<'_>, [u8; 32]) -> Result<T, KnowledgeError>,
+) -> Result<T, SearchOutcome> {
     let mut history = ShiftHistory::new(request.seat);
     (request.history.iter()).for_each(|event| history.on_event(event));
-    let mut prior = BuiltInAgent::new(request.plays.prior, request.seed);
     let choice = Choice {
         rules,
         observation: &request.observation,
         legal: &request.legal,
         history: &history,
-        prior: prior.decide(&request.observation, &request.legal),
+        prior: prior_of(request),
     };
     // Each decision has its own numbers, so that a game that resumes is repeatable, too.
     let seed = Chance::stream(request.seed, request.decision).seed();
-    let stopped = || stopped() || start.elapsed() > MAX_SEARCH_TIME;
-    choice
-        .search(request.plays, seed, None, stopped)
-        .map_err(|_| SearchOutcome::Impossible)
+    work(&choice, seed).map_err(|_| SearchOutcome::Impossible)
+}
+
+/// What is played without a search.
+fn prior_of(request: &SearchRequest) -> ActionId {
+    let mut prior = BuiltInAgent::new(request.plays.prior, request.seed);
+    prior.decide(&request.observation, &request.legal)
 }

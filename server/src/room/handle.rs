@@ -9,7 +9,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
 use super::message::{
-    Acted, AttachRequest, JoinRequest, Joined, Message, Ruled, SeatAction, SpectateError,
+    Acted, AttachRequest, Hinted, JoinRequest, Joined, Message, Ruled, SeatAction, SpectateError,
     SpectateRequest, Watching,
 };
 use super::resting::Resting;
@@ -175,6 +175,15 @@ impl Handle {
         arrived: Instant,
     ) -> Result<Option<Acted>, RoomGone> {
         self.ask(|reply| Message::Act(secret, action, arrived, reply))
+            .await
+    }
+
+    /// Asks for a hint for a decision; `None` if the room has no such ticket.
+    ///
+    /// # Errors
+    /// The room is gone, or (inner result) there is no hint.
+    pub async fn hint(&self, secret: [u8; 32], decision: u64) -> Result<Option<Hinted>, RoomGone> {
+        self.ask(|reply| Message::Hint(secret, decision, reply))
             .await
     }
 

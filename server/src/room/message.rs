@@ -10,12 +10,14 @@ use tokio::time::Instant;
 
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
-use crate::limits::Key;
+use crate::limits::{Hint, Key};
 use crate::outbox::{OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::{AbortReason, ParticipantKind};
-use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError, ReportError};
+use chefshat_room::{
+    Answer, ConnectionId, ExpressError, HintError, JoinError, LeaveError, ReportError,
+};
 
 /// A request for a seat.
 #[derive(Debug)]
@@ -120,6 +122,9 @@ pub enum ReportRefusal {
     Refused(ReportError),
 }
 
+/// The result of a request for a hint.
+pub(super) type Hinted = Result<Hint, HintError>;
+
 /// The result of a report.
 pub type Ruled = Result<Box<v1::ReportResponse>, ReportRefusal>;
 /// The states of a table, from the current one on.
@@ -140,6 +145,8 @@ pub(super) enum Message {
         Instant,
         oneshot::Sender<Option<Acted>>,
     ),
+    /// Asks for a hint for a decision, with the secret of the seat's ticket.
+    Hint([u8; 32], u64, oneshot::Sender<Option<Hinted>>),
     Spectate(
         Box<SpectateRequest>,
         oneshot::Sender<Result<(), SpectateError>>,

@@ -10,13 +10,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 
+use chefshat_agents::{Budget, MonteCarlo};
 use chefshat_engine::{ActionId, Seat};
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind, SeatedParticipant};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
-use futures::FutureExt as _;
 use futures::future::BoxFuture;
+use futures::stream::FuturesUnordered;
+use futures::{FutureExt as _, StreamExt as _};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
@@ -24,7 +26,7 @@ use tracing::{Instrument as _, debug, error, info};
 
 use super::clients::Clients;
 use super::message::{
-    Acted, AttachRequest, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
+    Acted, AttachRequest, Hinted, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
     SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::observed::Observed;
@@ -34,9 +36,9 @@ use super::subscriber::{
 };
 use super::table_view::TableView;
 use crate::clock::RoomClock;
-use crate::config::ROOM_MAILBOX;
+use crate::config::{HINT_TIME, ROOM_MAILBOX};
 use crate::convert::{self, Deck};
-use crate::limits::{Background, Held, Key, Places, Searches, Shares, Turn};
+use crate::limits::{Background, Held, Hint, Key, Places, Searches, Shares, Turn};
 use crate::metrics::Metrics;
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
@@ -113,6 +115,7 @@ pub(super) fn spawn(
         spectator_places: Places::new(MAX_SPECTATORS, context.shares),
         on_space: Arc::new(NotifySpace(mailbox.downgrade())),
         releases: Vec::new(),
+        hints: FuturesUnordered::new(),
         public: PublicEvents::default(),
         delivered: 0,
         always_visit: vec![false; seats],
@@ -159,6 +162,7 @@ enum Release {
     ),
     Reported(oneshot::Sender<Option<Ruled>>, ReportOutcome),
     WatchTable(oneshot::Sender<Option<Watching>>),
+    Hint(oneshot::Sender<Option<Hinted>>, Hint),
 }
 
 /// The state of a room: its core, journal and subscribers.
@@ -173,6 +177,8 @@ pub(super) struct Room {
     spectator_places: Arc<Places>,
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
+    /// The hints that are being computed.
+    hints: FuturesUnordered<BoxFuture<'static, HintEnded>>,
     public: PublicEvents,
     /// Length of the log at the last delivery.
     delivered: usize,
@@ -199,6 +205,9 @@ pub(super) struct Room {
 /// The seat and number of a decision, and what a search found for it.
 type Found = (Seat, u64, Option<ActionId>);
 
+/// A hint for a decision of a seat, and who asked for it.
+type HintEnded = (Seat, u64, Hint, oneshot::Sender<Option<Hinted>>);
+
 /// What the task of a room does next.
 enum Next {
     /// Reads this number of messages; 0: nobody has a handle any more.
@@ -207,6 +216,8 @@ enum Next {
     Turn(Turn),
     /// Takes the result of a search.
     Searched(Found),
+    /// Gives a hint.
+    Hint(HintEnded),
     /// Does what is due.
     Timer,
 }
@@ -257,6 +268,12 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
             if let Some(Poll::Ready(found)) = search.as_mut().map(|it| it.poll_unpin(context)) {
                 return Poll::Ready((resting.take(), Next::Searched(found)));
             }
+            let hints = resting.as_mut().map(|room| &mut room.hints);
+            if let Some(hints) = hints.filter(|hints| !hints.is_empty())
+                && let Poll::Ready(Some(hint)) = hints.poll_next_unpin(context)
+            {
+                return Poll::Ready((resting.take(), Next::Hint(hint)));
+            }
             let fired = armed && timer.as_mut().poll(context).is_ready();
             if fired {
                 Poll::Ready((resting.take(), Next::Timer))
@@ -280,16 +297,21 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
             continue;
         }
         room.now = room.clock.now();
-        if let Next::Searched((seat, decision, found)) = next {
-            search = None;
-            room.core.searched(seat, decision, found);
+        let searched = matches!(next, Next::Searched(_));
+        let fired = matches!(next, Next::Timer);
+        match next {
+            Next::Searched((seat, decision, found)) => {
+                search = None;
+                room.core.searched(seat, decision, found);
+            }
+            Next::Hint(hint) => room.give_hint(hint),
+            _ => {}
         }
         for message in messages.drain(..) {
             room.receive(message);
         }
         // A busy mailbox must not delay deadlines.
-        let due = matches!(next, Next::Timer | Next::Searched(_))
-            || room.timer_at.is_some_and(|at| at <= room.now);
+        let due = fired || searched || room.timer_at.is_some_and(|at| at <= room.now);
         if due && !room.fire() {
             break;
         }
@@ -352,6 +374,35 @@ impl Room {
         Some(found.map(move |found| (seat, decision, found)).boxed())
     }
 
+    /// Starts to compute a hint.
+    fn start_hint(&mut self, secret: &[u8], decision: u64, reply: oneshot::Sender<Option<Hinted>>) {
+        let Some(seat) = self.core.seat_of_ticket(secret) else {
+            return answer(reply, None);
+        };
+        let plays = MonteCarlo {
+            budget: Budget::Time(HINT_TIME),
+            ..MonteCarlo::default()
+        };
+        match self.core.start_hint(seat, decision, plays) {
+            Ok(request) => {
+                let searches = Arc::clone(&self.context.searches);
+                let rules = self.core.header().rules;
+                let hint = searches.hint(self.context.owner, rules, request);
+                self.hints
+                    .push(hint.map(move |hint| (seat, decision, hint, reply)).boxed());
+            }
+            Err(error) => answer(reply, Some(Err(error))),
+        }
+    }
+
+    /// Gives a hint once it is recorded.
+    fn give_hint(&mut self, (seat, decision, hint, reply): HintEnded) {
+        match self.core.hinted(self.now, seat, decision) {
+            Ok(()) => self.releases.push(Release::Hint(reply, hint)),
+            Err(error) => answer(reply, Some(Err(error))),
+        }
+    }
+
     /// Plays a slice of a game that nobody plays, and returns the number of decisions.
     fn play_slice(mut self: Box<Self>) -> (Box<Self>, u64) {
         self.now = self.clock.now();
@@ -410,6 +461,7 @@ impl Room {
                     None => answer(reply, None),
                 }
             }
+            Message::Hint(secret, decision, reply) => self.start_hint(&secret, decision, reply),
             Message::Spectate(request, reply) => {
                 self.releases.push(Release::Spectate(request, reply));
             }
@@ -728,6 +780,7 @@ impl Room {
                 }
             }
             Release::Acted(reply, acted) => answer(reply, Some(acted)),
+            Release::Hint(reply, hint) => answer(reply, Some(Ok(hint))),
             Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
             Release::Left(reply, left) => {
                 answer(reply, Some(left.map(|()| convert::describe(&self.core))));

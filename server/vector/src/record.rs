@@ -33,6 +33,7 @@ pub fn simulation_policy(
         clocks: Vec::new(),
         one_seat_per_client: false,
         visibility: v1::Visibility::Unspecified.into(),
+        hints: false,
     }
 }
 

@@ -2,9 +2,13 @@
 
 use chefshat_client::Client;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
-use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_update::Update};
 use chefshat_record::replay::replay;
-use chefshat_tests::{Launch, TestServer, one_shift, patiently};
+use chefshat_tests::{
+    Launch, TestServer, attach_all, first_legal, first_update, is_legal, one_shift, patiently,
+    play_on, room_of_four,
+};
+use futures::future::join_all;
 
 use crate::played::{built_in, ended, until_over};
 use crate::tournaments;
@@ -147,5 +151,64 @@ async fn budgets_that_are_too_large_are_refused_with_their_bounds() {
     };
     let error = client.create_room(real).await.expect_err("real cards");
     assert!(error.to_string().contains("choose trained"), "{error}");
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn a_seat_is_given_hints_and_the_record_says_so() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let policy = v1::RoomPolicy {
+        hints: true,
+        ..tournaments::unhurried()
+    };
+    let (created, tickets) = room_of_four(&client, one_shift(), policy).await;
+    let mut seats = attach_all(&server, &tickets).await;
+    let (update, seat) = first_update(&mut seats).await;
+    let Update::Decision(decision) = update else {
+        panic!("not a decision, but {update:?}");
+    };
+    let (own, other) = (&tickets[seat], &tickets[(seat + 1) % 4]);
+    let refused = client.hint(other, decision.decision_id).await;
+    assert_eq!(
+        refused.expect_err("another seat").reason(),
+        Some("DECISION_CLOSED")
+    );
+    for _ in 0..3 {
+        let hint = client
+            .hint(own, decision.decision_id)
+            .await
+            .expect("a hint");
+        assert!(is_legal(&decision, hint.action));
+        // None of them are estimated if the machine has too much to do.
+        for estimate in &hint.actions {
+            assert!(is_legal(&decision, estimate.action) && estimate.rollouts > 0);
+        }
+    }
+    let refused = client.hint(own, decision.decision_id).await;
+    assert_eq!(
+        refused.expect_err("the fourth").reason(),
+        Some("TOO_MANY_HINTS")
+    );
+    let first = seat;
+    seats[seat]
+        .answer(decision.decision_id, first_legal(&decision))
+        .await;
+    join_all(seats.iter_mut().map(play_on)).await;
+    let room = created.room.expect("a room");
+    let record = client.record(&room.game_id).await.expect("a record");
+    replay(&record).expect("a valid record");
+    let hinted: Vec<(u32, u64, u32)> = (record.iter())
+        .filter_map(|line| match &line.line {
+            Some(Line::Decision(it)) if it.hints > 0 => Some((it.seat, it.decision_id, it.hints)),
+            _ => None,
+        })
+        .collect();
+    let first = u32::try_from(first).expect("a seat");
+    assert_eq!(hinted, [(first, decision.decision_id, 3)]);
+
+    let (_, tickets) = room_of_four(&client, one_shift(), tournaments::unhurried()).await;
+    let refused = client.hint(&tickets[0], 1).await;
+    assert_eq!(refused.expect_err("no hints").reason(), Some("HINTS_OFF"));
     server.stop().await;
 }

@@ -171,6 +171,12 @@ export function WatchFields(props: GameProps) {
   const words = t().lobby.make.watch;
   return (
     <div class={css.fields}>
+      <CheckField
+        label={words.playersHints}
+        hint={words.playersHintsHint}
+        checked={form.hints}
+        onCheck={(hints) => change({ hints })}
+      />
       <CheckField label={words.allowed} checked={form.spectators} onCheck={(spectators) => change({ spectators })} />
       {form.spectators && (
         <>

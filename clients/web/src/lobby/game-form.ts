@@ -49,6 +49,7 @@ export interface GameForm {
   spectators: boolean;
   spectatorDelay: string;
   spectatorsSeeHands: boolean;
+  hints: boolean;
   visibility: VisibilityChoice;
 }
 
@@ -81,6 +82,7 @@ export function newGame(): GameForm {
     spectators: true,
     spectatorDelay: "0",
     spectatorsSeeHands: false,
+    hints: false,
     visibility: "public",
   };
 }
@@ -181,6 +183,7 @@ export function policyOf(form: GameForm) {
     spectators: form.spectators,
     spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
     spectatorsSeeHands: form.spectators && form.spectatorsSeeHands,
+    hints: form.hints,
     visibility: VISIBILITIES[form.visibility],
   } satisfies MessageInitShape<typeof RoomPolicySchema>;
 }

@@ -42,6 +42,8 @@ export function Seated({ acting, banner, tools, onward, below }: SeatedProps) {
       tools={tools}
       onward={onward}
       caption={table.roomName}
+      hint={acting.hint.value}
+      onHint={table.policy?.hints ? acting.askHint : undefined}
       onAnswer={acting.answer}
       onExpress={(label) => acting.express(gesture(label))}
     />

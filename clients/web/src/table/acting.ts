@@ -5,7 +5,7 @@
 import { batch, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS, playApi } from "../api/client";
 import { faultOf, inWords, isPassing } from "../api/faults";
-import type { SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
+import type { Hint, SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
 import { recall } from "../store";
 import type { Gesture } from "./expressions";
 import { applyUpdate, type LiveState, startLive } from "./model/live";
@@ -30,16 +30,27 @@ export function asksForTimes(id: string): boolean {
 const MAX_ATTEMPTS = 5;
 const RETRY_MS = 400;
 
+/** A hint for a decision. */
+export interface GivenHint {
+  readonly decision: bigint;
+  /** Undefined while it is being computed. */
+  readonly hint: Hint | undefined;
+}
+
 export interface Acting {
   readonly live: Signal<LiveState>;
   /** The action being sent; undefined if none is. */
   readonly sending: Signal<number | undefined>;
   /** The last error in words; empty if there is none. */
   readonly trouble: Signal<string>;
+  /** The last hint. */
+  readonly hint: Signal<GivenHint | undefined>;
   /** Applies updates of the seat. */
   apply(updates: readonly SeatUpdate[]): void;
   /** Answers the open decision. */
   answer(action: number): void;
+  /** Asks for a hint for the open decision. */
+  askHint(): void;
   /** Shows an expression to the table. */
   express(gesture: Gesture): void;
   /** Takes the seat back from a substitute. */
@@ -51,6 +62,7 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
   const live = signal(startLive(table, seat));
   const sending = signal<number | undefined>(undefined);
   const trouble = signal("");
+  const hint = signal<GivenHint | undefined>(undefined);
   /** The open decision and when it was first rendered. */
   let shown = { id: 0n, atMs: 0 };
 
@@ -98,6 +110,22 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
     }
   };
 
+  const askHint = async () => {
+    const { decision } = live.peek();
+    const last = hint.peek();
+    if (!decision || (last?.decision === decision.id && !last.hint)) return;
+    trouble.value = "";
+    hint.value = { decision: decision.id, hint: undefined };
+    try {
+      const command = { case: "hint" as const, value: { decisionId: decision.id } };
+      const reply = await playApi.act({ ticket, command }, { timeoutMs: CALL_LIMIT_MS });
+      hint.value = { decision: decision.id, hint: reply.hint };
+    } catch (thrown) {
+      hint.value = last;
+      trouble.value = inWords(thrown);
+    }
+  };
+
   const tell = async (command: Parameters<typeof playApi.act>[0]["command"]) => {
     if (!command) return;
     try {
@@ -112,8 +140,10 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
     live,
     sending,
     trouble,
+    hint,
     apply,
     answer: (action) => void answer(action),
+    askHint: () => void askHint(),
     express: (gesture) => void tell({ case: "express", value: gesture }),
     resume: () => void tell({ case: "resume", value: {} }),
   };

@@ -70,6 +70,9 @@ pub(super) struct Create {
     /// addresses. By default one client may take several seats with the join code.
     #[arg(long, help_heading = "Times and limits")]
     one_seat_per_client: bool,
+    /// Let seats ask for hints; records say which decisions had one.
+    #[arg(long)]
+    hints: bool,
 }
 
 impl Create {
@@ -182,6 +185,7 @@ impl Create {
             policy: Some(v1::RoomPolicy {
                 waiting_time_ms: self.waiting_time_ms,
                 one_seat_per_client: self.one_seat_per_client,
+                hints: self.hints,
                 ..self.policy.message()
             }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),

@@ -469,5 +469,6 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         clocks: Vec::new(),
         one_seat_per_client: false,
         visibility: v1::Visibility::Unspecified.into(),
+        hints: false,
     }
 }

@@ -1,6 +1,8 @@
 //! Checks a decision against the game before it: seat, legality, source and time.
 
-use chefshat_engine::limits::{MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS};
+use chefshat_engine::limits::{
+    MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_HINTS,
+};
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Game, Mask, Seat};
 use chefshat_proto::v1::{self, DecisionSource as Source};
 use prost::Message;
@@ -100,6 +102,7 @@ impl OpenDecision<'_> {
         self.check_source(record, action)?;
         self.check_times(record)?;
         self.check_annotations(record.annotations.as_ref())?;
+        self.check_hints(record)?;
         Ok(action)
     }
 
@@ -151,6 +154,20 @@ impl OpenDecision<'_> {
             shown(record.invalid_reward),
             shown(expected),
         ))
+    }
+
+    fn check_hints(&self, record: &v1::DecisionRecord) -> Result<(), String> {
+        let most = match self.setup.hints && !self.clock.built_in {
+            true => MAX_HINTS,
+            false => 0,
+        };
+        if record.hints > most {
+            return Err(format!(
+                "hints is {} and must be at most {most}",
+                record.hints
+            ));
+        }
+        Ok(())
     }
 
     fn check_source(&self, record: &v1::DecisionRecord, action: ActionId) -> Result<(), String> {

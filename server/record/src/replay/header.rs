@@ -29,6 +29,8 @@ pub(super) struct Setup {
     pub(super) origin: v1::GameOrigin,
     /// Invalid attempts per decision before the default decision; 0: unlimited.
     pub(super) max_invalid_attempts: u32,
+    /// Whether seats may ask for hints.
+    pub(super) hints: bool,
     /// The first Shift, if its hands were given.
     pub(super) script: Option<Script>,
     /// The start of a game with real cards.
@@ -93,6 +95,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         scheme: reward_scheme_from_proto(policy.reward_scheme()),
         origin,
         max_invalid_attempts: policy.max_invalid_attempts(),
+        hints: policy.hints,
         script,
         physical,
         taken_over,

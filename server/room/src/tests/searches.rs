@@ -3,8 +3,8 @@
 use chefshat_agents::{AgentKind, Budget, BuiltInAgent, MonteCarlo, NamedAgent};
 use chefshat_engine::{ActionId, DecisionKind, Event, Viewer};
 
-use crate::SearchRequest;
 use crate::tests::*;
+use crate::{HintError, MAX_HINTS, SearchRequest};
 
 const SEARCHER: Fill = Fill::BuiltIn(NamedAgent::MonteCarlo(MonteCarlo {
     budget: Budget::Rollouts(1),
@@ -179,4 +179,58 @@ fn a_seat_that_returns_from_a_substitute_is_not_played_by_its_search() {
     table.core.tick(table.now, None);
     assert_eq!(table.core.decisions(), decisions, "the seat decides itself");
     assert_eq!(table.play_one(), seat);
+}
+
+#[test]
+fn a_hint_is_recorded_and_bounded() {
+    let policy = Policy {
+        hints: true,
+        ..Policy::default()
+    };
+    let mut table = Table::playing(policy);
+    let (seat, decision) = table.open();
+    let other = table
+        .core
+        .all_seats()
+        .find(|it| *it != seat)
+        .expect("another seat");
+    let ask = |table: &mut Table, seat, decision| {
+        let started = table.core.start_hint(seat, decision, MonteCarlo::default());
+        started.map(|request| (request.seat, request.decision))
+    };
+    assert_eq!(ask(&mut table, other, 1), Err(HintError::Closed));
+    assert_eq!(ask(&mut table, seat, decision + 1), Err(HintError::Closed));
+    for number in 1..=MAX_HINTS {
+        assert_eq!(ask(&mut table, seat, decision), Ok((seat, decision)));
+        assert_eq!(ask(&mut table, seat, decision), Err(HintError::TooMany));
+        assert_eq!(table.core.hinted(table.now, seat, decision), Ok(()));
+        table.commit();
+        if number == 2 {
+            table.restart(ms(10));
+            table.attach(seat);
+        }
+    }
+    assert_eq!(ask(&mut table, seat, decision), Err(HintError::TooMany));
+    let hints = |table: &Table| {
+        let entries = table.journal.iter();
+        let hinted =
+            entries.filter(|entry| matches!(entry.change, Change::Hinted(it) if it == seat));
+        hinted.count()
+    };
+    assert_eq!(u32::try_from(hints(&table)), Ok(MAX_HINTS));
+    table.play_one();
+    assert_eq!(ask(&mut table, seat, decision), Err(HintError::Closed));
+    assert_eq!(
+        table.core.hinted(table.now, seat, decision),
+        Err(HintError::Closed)
+    );
+    table.assert_replays();
+}
+
+#[test]
+fn a_room_gives_no_hints_unless_its_policy_says_so() {
+    let mut table = Table::playing(Policy::default());
+    let (seat, decision) = table.open();
+    let started = table.core.start_hint(seat, decision, MonteCarlo::default());
+    assert_eq!(started.map(|_| ()), Err(HintError::Off));
 }

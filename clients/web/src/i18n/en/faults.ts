@@ -37,6 +37,9 @@ export const faults = {
     TICKET_UNKNOWN: "This seat was given up. Join again with the code.",
     SPECTATORS_NOT_ADMITTED: "This room does not allow spectators.",
     TOO_MANY_SPECTATORS: "This room already has as many spectators as it allows.",
+    DECISION_CLOSED: "This decision is not open any more.",
+    HINTS_OFF: "There are no hints in this room.",
+    TOO_MANY_HINTS: "You have had all hints for this decision.",
     TOO_MANY_EXPRESSIONS: "Too many expressions at once. Wait a moment.",
     TOO_MANY_ROOMS:
       "No more rooms can be created now. Close a room that you no longer need, or wait until one is over.",

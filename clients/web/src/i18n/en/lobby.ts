@@ -206,6 +206,8 @@ export const lobby = {
       },
     },
     watch: {
+      playersHints: "Players may ask for hints",
+      playersHintsHint: "The record says which decisions had one.",
       allowed: "Spectators may watch",
       delay: "Delay in decisions",
       delayHint: "Spectators see the game this many decisions late.",

@@ -38,6 +38,9 @@ export const faults: Texts["faults"] = {
     TICKET_UNKNOWN: "Il posto è stato liberato. Entra di nuovo con il codice.",
     SPECTATORS_NOT_ADMITTED: "Questa stanza non ammette spettatori.",
     TOO_MANY_SPECTATORS: "Questa stanza ha già il numero massimo di spettatori.",
+    DECISION_CLOSED: "Questa decisione non è più aperta.",
+    HINTS_OFF: "In questa stanza non ci sono suggerimenti.",
+    TOO_MANY_HINTS: "Hai già avuto tutti i suggerimenti per questa decisione.",
     TOO_MANY_EXPRESSIONS: "Troppe espressioni in poco tempo. Aspetta un momento.",
     TOO_MANY_ROOMS:
       "Ora non si possono creare altre stanze. Chiudine una che non ti serve più, o aspetta che una partita finisca.",

@@ -211,6 +211,8 @@ export const lobby: Texts["lobby"] = {
       },
     },
     watch: {
+      playersHints: "I giocatori possono chiedere suggerimenti",
+      playersHintsHint: "La registrazione dice per quali decisioni.",
       allowed: "Gli spettatori possono guardare",
       delay: "Ritardo in decisioni",
       delayHint: "Gli spettatori vedono la partita con questo ritardo.",

@@ -3,11 +3,13 @@
 
 import type { ComponentChildren } from "preact";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import type { Hint } from "../../gen/chefshat/v1/play_service_pb";
 import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
-import { t } from "../../i18n";
+import { decimal, t } from "../../i18n";
 import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
-import { actionOf, type Move } from "../model/actions";
+import type { GivenHint } from "../acting";
+import { actionOf, type Move, moveOf } from "../model/actions";
 import type { OpenDecision } from "../model/live";
 import { missing, type Picked } from "../model/picking";
 import { isOpening } from "../model/requirement";
@@ -15,6 +17,9 @@ import type { TableState } from "../model/state";
 import { cardWord, moveWords } from "../words";
 import css from "./ActionBar.module.css";
 import { giftWords } from "./Now";
+
+/** Actions that a hint names. */
+const MAX_HINTED = 4;
 
 interface ActionBarProps {
   table: TableState;
@@ -32,12 +37,15 @@ interface ActionBarProps {
   taught: boolean;
   /** Milliseconds of a full decision; 0 for no clock. */
   wholeMs: number;
+  /** The hint for this decision, if the reader asked for one. */
+  given?: GivenHint | undefined;
+  onHint?: (() => void) | undefined;
   onAnswer: (action: number) => void;
   onPutBack: () => void;
 }
 
 export function ActionBar(props: ActionBarProps) {
-  const { table, decision, moves, move, remark, sending } = props;
+  const { table, decision, moves, move, remark, sending, given } = props;
   const words = t().table.actions;
   const answer = (chosen: Move) => props.onAnswer(actionOf(chosen, table.faces));
   const kind = decision?.kind;
@@ -48,6 +56,11 @@ export function ActionBar(props: ActionBarProps) {
       <p class={`${css.hint} ${remark ? css.remark : ""}`} role="note">
         {remark || hint(props)}
       </p>
+      {given && (
+        <p class={css.hint} role="status" data-part="hint">
+          {given.hint ? hintWords(given.hint, table.faces) : words.hintComes}
+        </p>
+      )}
       {decision && props.wholeMs > 0 && (
         <Clock
           key={String(decision.id)}
@@ -74,6 +87,11 @@ export function ActionBar(props: ActionBarProps) {
             </Act>
           </>
         )}
+        {props.onHint && decision && (
+          <Act ready={!sending && (!given || given.hint !== undefined)} quiet onClick={props.onHint} id="hint">
+            {words.hint}
+          </Act>
+        )}
         {props.picked.size > 0 && (
           <Act ready quiet onClick={props.onPutBack} id="put-back">
             {words.putBack}
@@ -82,6 +100,24 @@ export function ActionBar(props: ActionBarProps) {
       </div>
     </section>
   );
+}
+
+/** The suggested action first, then the others by their points. */
+function hintWords({ action, actions }: Hint, faces: number): string {
+  const words = t().table.actions;
+  const sorted = [...actions].sort(
+    (a, b) => Number(b.action === action) - Number(a.action === action) || b.points - a.points,
+  );
+  const named = (number: number) => {
+    const move = moveOf(number, faces);
+    return move ? moveWords(move) : "";
+  };
+  const [first, ...others] = sorted.slice(0, MAX_HINTED);
+  if (!first) return words.suggested(named(action));
+  const points = (of: { points: number; standardError: number }) =>
+    words.points(decimal(of.points, 1), decimal(of.standardError, 1));
+  const rest = others.map((other) => `${named(other.action)}: ${points(other)}`);
+  return [`${words.suggested(named(first.action))}: ${points(first)}`, ...rest].join(" · ");
 }
 
 /** The card that will be given. */

@@ -8,11 +8,12 @@ import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import { clockOfPeople } from "../../lobby/rooms";
 import { Notice } from "../../parts/Notice";
+import type { GivenHint } from "../acting";
 import type { Label } from "../expressions";
-import { actionOf } from "../model/actions";
+import { actionOf, moveOf } from "../model/actions";
 import type { Card } from "../model/cards";
 import type { OpenDecision } from "../model/live";
-import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
+import { canPick, legalMoves, type Picked, pickedMove, picksOf, reasonAgainst, toggle } from "../model/picking";
 import { awaitsHand, type TableState } from "../model/state";
 import { headingWords, nameOf, reasonWords, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
@@ -56,6 +57,10 @@ interface TableViewProps {
   tools?: ComponentChildren;
   /** Below the table: the controls of a replay. */
   children?: ComponentChildren;
+  /** The last hint. */
+  hint?: GivenHint | undefined;
+  /** Asks for a hint; undefined if the room gives none. */
+  onHint?: (() => void) | undefined;
   onAnswer?: (action: number) => void;
   onExpress?: (label: Label) => void;
 }
@@ -75,6 +80,12 @@ export function TableView(props: TableViewProps) {
   const [remark, setRemark] = useState("");
   const lastTurn = useRef<ShownTurn | undefined>(undefined);
   useEffect(() => setRemark(""), [decision?.id]);
+  const given = decision && props.hint?.decision === decision.id ? props.hint : undefined;
+  // The suggested cards are picked, so that one click plays them.
+  useEffect(() => {
+    const suggested = given?.hint && moveOf(given.hint.action, table.faces);
+    if (decision && suggested) setPicked(picksOf(decision.hand, suggested));
+  }, [given?.hint]);
   if (decision?.requirement) lastTurn.current = { table, decision: { ...decision, requirement: decision.requirement } };
   const row = useRef<HTMLDivElement>(null);
   const keepFocus = useKeptFocus(row);
@@ -210,6 +221,8 @@ export function TableView(props: TableViewProps) {
               sending={sending}
               remark={remark || props.trouble || ""}
               taught={props.refusal !== undefined}
+              given={given}
+              onHint={props.onHint}
               wholeMs={wholeMs}
               onAnswer={answer}
               onPutBack={putBack}

@@ -19,7 +19,10 @@ struct EntryForm {
     /// Microseconds since the room was created.
     #[prost(uint64, tag = "1")]
     at_us: u64,
-    #[prost(oneof = "ChangeForm", tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13")]
+    #[prost(
+        oneof = "ChangeForm",
+        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14"
+    )]
     change: Option<ChangeForm>,
 }
 
@@ -49,6 +52,8 @@ enum ChangeForm {
     ServerRestarted(bool),
     #[prost(message, tag = "13")]
     Reported(ReportedForm),
+    #[prost(uint32, tag = "14")]
+    Hinted(u32),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -167,6 +172,7 @@ pub(in crate::store::sqlite) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         Change::Disconnected(seat) => ChangeForm::Disconnected(seat_number(*seat)),
         Change::Returned(seat) => ChangeForm::Returned(seat_number(*seat)),
         Change::Substituted(seat) => ChangeForm::Substituted(seat_number(*seat)),
+        Change::Hinted(seat) => ChangeForm::Hinted(seat_number(*seat)),
         Change::Attempted { seat, action } => ChangeForm::Attempted(AttemptedForm {
             seat: seat_number(*seat),
             action: *action,
@@ -241,6 +247,7 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
         ChangeForm::Disconnected(number) => Change::Disconnected(seat(number)?),
         ChangeForm::Returned(number) => Change::Returned(seat(number)?),
         ChangeForm::Substituted(number) => Change::Substituted(seat(number)?),
+        ChangeForm::Hinted(number) => Change::Hinted(seat(number)?),
         ChangeForm::Attempted(form) => Change::Attempted {
             seat: seat(form.seat)?,
             action: form.action,

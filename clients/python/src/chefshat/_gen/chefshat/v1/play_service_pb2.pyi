@@ -3,6 +3,7 @@
 isort:skip_file
 Playing: seats attach to a stream, receive events and decisions, and answer."""
 
+from chefshat._gen.chefshat.v1 import analysis_service_pb2 as _analysis_service_pb2
 from chefshat._gen.chefshat.v1 import decision_pb2 as _decision_pb2
 from chefshat._gen.chefshat.v1 import event_pb2 as _event_pb2
 from collections import abc as _abc
@@ -642,6 +643,7 @@ class ActRequest(_message.Message):
     ANSWER_FIELD_NUMBER: _builtins.int
     EXPRESS_FIELD_NUMBER: _builtins.int
     RESUME_FIELD_NUMBER: _builtins.int
+    HINT_FIELD_NUMBER: _builtins.int
     ticket: _builtins.str
     """The seat's ticket."""
     @_builtins.property
@@ -656,6 +658,10 @@ class ActRequest(_message.Message):
     def resume(self) -> Global___ResumeSeat:
         """End a substitution."""
 
+    @_builtins.property
+    def hint(self) -> Global___AskHint:
+        """Ask for a hint."""
+
     def __init__(
         self,
         *,
@@ -663,16 +669,74 @@ class ActRequest(_message.Message):
         answer: _decision_pb2.Answer | None = ...,
         express: _decision_pb2.Expression | None = ...,
         resume: Global___ResumeSeat | None = ...,
+        hint: Global___AskHint | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "command", b"command", "express", b"express", "resume", b"resume"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "command", b"command", "express", b"express", "hint", b"hint", "resume", b"resume"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "command", b"command", "express", b"express", "resume", b"resume", "ticket", b"ticket"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "command", b"command", "express", b"express", "hint", b"hint", "resume", b"resume", "ticket", b"ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_command: _TypeAlias = _typing.Literal["answer", "express", "resume"]  # noqa: Y015
+    _WhichOneofReturnType_command: _TypeAlias = _typing.Literal["answer", "express", "resume", "hint"]  # noqa: Y015
     _WhichOneofArgType_command: _TypeAlias = _typing.Literal["command", b"command"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_command) -> _WhichOneofReturnType_command | None: ...
 
 Global___ActRequest: _TypeAlias = ActRequest  # noqa: Y015
+
+@_typing.final
+class AskHint(_message.Message):
+    """Asks for a hint for the open decision of the seat, where RoomPolicy.hints allows it: at most three
+    times for a decision, once at a time. It takes about half a second of the seat's time.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    DECISION_ID_FIELD_NUMBER: _builtins.int
+    decision_id: _builtins.int
+    """The decision."""
+    def __init__(
+        self,
+        *,
+        decision_id: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_id", b"decision_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___AskHint: _TypeAlias = AskHint  # noqa: Y015
+
+@_typing.final
+class Hint(_message.Message):
+    """A hint, from what the seat knows alone. The record says that it was given
+    (DecisionRecord.hints); no other participant learns of it during the game.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ACTION_FIELD_NUMBER: _builtins.int
+    ACTIONS_FIELD_NUMBER: _builtins.int
+    action: _builtins.int
+    """Index of the suggested action."""
+    @_builtins.property
+    def actions(self) -> _containers.RepeatedCompositeFieldContainer[_analysis_service_pb2.ActionEstimate]:
+        """Estimates of all legal actions, played on by the agent "trained" on all seats. Empty if the
+        server has too much to compute, or if too many deals are possible; the suggestion is then what
+        "trained" plays.
+        """
+
+    def __init__(
+        self,
+        *,
+        action: _builtins.int = ...,
+        actions: _abc.Iterable[_analysis_service_pb2.ActionEstimate] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["action", b"action", "actions", b"actions"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Hint: _TypeAlias = Hint  # noqa: Y015
 
 @_typing.final
 class ActResponse(_message.Message):
@@ -681,18 +745,24 @@ class ActResponse(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     RESULT_FIELD_NUMBER: _builtins.int
+    HINT_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def result(self) -> _decision_pb2.AnswerResult:
         """For an answer: its outcome."""
+
+    @_builtins.property
+    def hint(self) -> Global___Hint:
+        """For a request for a hint: the hint."""
 
     def __init__(
         self,
         *,
         result: _decision_pb2.AnswerResult | None = ...,
+        hint: Global___Hint | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["result", b"result"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["hint", b"hint", "result", b"result"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["result", b"result"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["hint", b"hint", "result", b"result"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

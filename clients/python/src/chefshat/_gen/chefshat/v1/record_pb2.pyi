@@ -249,6 +249,7 @@ class DecisionRecord(_message.Message):
     ACTION_MASK_FIELD_NUMBER: _builtins.int
     INVALID_REWARD_FIELD_NUMBER: _builtins.int
     ELAPSED_MS_FIELD_NUMBER: _builtins.int
+    HINTS_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat that decided."""
     decision_id: _builtins.int
@@ -275,6 +276,8 @@ class DecisionRecord(_message.Message):
     """
     elapsed_ms: _builtins.int
     """Milliseconds since the room was created."""
+    hints: _builtins.int
+    """Number of hints that the seat was given for it."""
     @_builtins.property
     def invalid_attempts(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Indices of the invalid actions answered before, in order."""
@@ -299,10 +302,11 @@ class DecisionRecord(_message.Message):
         action_mask: _builtins.bytes = ...,
         invalid_reward: _builtins.float | None = ...,
         elapsed_ms: _builtins.int = ...,
+        hints: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_invalid_reward", b"_invalid_reward", "annotations", b"annotations", "invalid_reward", b"invalid_reward"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_invalid_reward", b"_invalid_reward", "action", b"action", "action_mask", b"action_mask", "annotations", b"annotations", "bank_left_ms", b"bank_left_ms", "decision_id", b"decision_id", "decision_time_us", b"decision_time_us", "elapsed_ms", b"elapsed_ms", "invalid_attempts", b"invalid_attempts", "invalid_reward", b"invalid_reward", "kind", b"kind", "seat", b"seat", "source", b"source", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_invalid_reward", b"_invalid_reward", "action", b"action", "action_mask", b"action_mask", "annotations", b"annotations", "bank_left_ms", b"bank_left_ms", "decision_id", b"decision_id", "decision_time_us", b"decision_time_us", "elapsed_ms", b"elapsed_ms", "hints", b"hints", "invalid_attempts", b"invalid_attempts", "invalid_reward", b"invalid_reward", "kind", b"kind", "seat", b"seat", "source", b"source", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__invalid_reward: _TypeAlias = _typing.Literal["invalid_reward"]  # noqa: Y015
     _WhichOneofArgType__invalid_reward: _TypeAlias = _typing.Literal["_invalid_reward", b"_invalid_reward"]  # noqa: Y015

@@ -1,0 +1,88 @@
+// The hint at the table: asked for by a button, it picks the suggested cards and shows the points.
+
+import { create } from "@bufbuild/protobuf";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test } from "vitest";
+import { tableOf } from "../src/attend/words";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { HintSchema } from "../src/gen/chefshat/v1/play_service_pb";
+import { startLanguage } from "../src/i18n";
+import type { GivenHint } from "../src/table/acting";
+import { actionOf } from "../src/table/model/actions";
+import { cardsFromNumbers } from "../src/table/model/cards";
+import type { OpenDecision } from "../src/table/model/live";
+import { TableView } from "../src/table/view/TableView";
+import { DEALT, stateOf } from "./table-state";
+
+let root: HTMLElement;
+
+beforeEach(async () => {
+  await startLanguage();
+  root = document.createElement("div");
+  document.body.append(root);
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  root.remove();
+});
+
+const FACES = 11;
+const PASS = actionOf({ kind: "pass" }, FACES);
+const NINES = actionOf({ kind: "play", face: 9, quantity: 2, jokers: 0 }, FACES);
+const decision = {
+  id: 7n,
+  kind: DecisionKind.TURN,
+  hand: cardsFromNumbers([3, 9, 9], false, FACES),
+  legal: [NINES, PASS],
+  timeLeftMs: 0,
+  bankLeftMs: 0,
+  receivedAtMs: 0,
+} as unknown as OpenDecision;
+
+const show = (hint: GivenHint | undefined, onHint?: () => void) => {
+  const table = { ...tableOf(stateOf({ observation: DEALT })), phase: "pizza" as const, faces: FACES };
+  const props = { table, own: 2, decision, hint, onHint, untimed: true, onAnswer: () => {} };
+  return act(() => render(<TableView {...props} />, root));
+};
+const button = (id: string) => root.querySelector<HTMLButtonElement>(`[data-action="${id}"]`);
+const text = () => root.querySelector('[data-part~="hint"]')?.textContent;
+
+test("there is a button only where the room gives hints", async () => {
+  await show(undefined);
+  expect(button("hint")).toBeNull();
+  let asked = 0;
+  await show(undefined, () => {
+    asked += 1;
+  });
+  button("hint")?.click();
+  expect(asked).toBe(1);
+  // One at a time.
+  await show({ decision: 7n, hint: undefined }, () => {
+    asked += 1;
+  });
+  button("hint")?.click();
+  expect([asked, text()]).toEqual([1, "The hint is being computed…"]);
+});
+
+test("a hint picks the suggested cards and shows points", async () => {
+  const hint = create(HintSchema, {
+    action: NINES,
+    actions: [
+      { action: PASS, points: 1.25, standardError: 0.1, rollouts: 40n },
+      { action: NINES, points: 3, standardError: 0.2, rollouts: 40n },
+    ],
+  });
+  await show({ decision: 7n, hint }, () => {});
+  expect(text()).toBe("Suggested: 2 × 9: 3.0 ± 0.2 points · Pass: 1.3 ± 0.1 points");
+  expect(button("play")?.textContent).toBe("Play 2 × 9");
+  expect(button("play")?.getAttribute("aria-disabled")).toBe("false");
+});
+
+test("a hint without estimates, and one for an earlier decision", async () => {
+  await show({ decision: 7n, hint: create(HintSchema, { action: PASS }) }, () => {});
+  expect(text()).toBe("Suggested: Pass");
+  await show({ decision: 6n, hint: create(HintSchema, { action: PASS }) }, () => {});
+  expect(text()).toBeUndefined();
+});
