@@ -30,6 +30,7 @@ fn request(position: Position) -> v1::EvaluateRequest {
         time_ms: 10_000,
         agent: "random".into(),
         seed: 5,
+        ..v1::EvaluateRequest::default()
     }
 }
 
