@@ -718,7 +718,7 @@ class VectorStarted(_message.Message):
 
     @_builtins.property
     def built_in_agents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """Names of the built-in agents, index = seat; empty for client seats."""
+        """Names of the built-in agents, index = seat; "network" for a network file; empty for client seats."""
 
     def __init__(
         self,
