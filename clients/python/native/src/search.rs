@@ -1,7 +1,7 @@
 //! Search from what one seat knows. A state has the cards of all seats; what its seat may not know is
 //! dropped when a [`Position`] is created, and `chefshat_search` gets the rest.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use chefshat_agents::Network;
@@ -40,9 +40,8 @@ impl Position {
     #[staticmethod]
     fn of_state(py: Python<'_>, state: &[u8], max_steps: u64) -> PyResult<Self> {
         Position::new(py, max_steps, || {
-            let problem = |error| RequestError::from(error);
-            let seen = SavedGame::from_bytes(state).map_err(problem)?;
-            let seen = seen.seen().map_err(problem)?;
+            let saved = SavedGame::from_bytes(state).map_err(RequestError::from)?;
+            let seen = saved.seen().map_err(RequestError::from)?;
             Ok((seen.rules, seen.observation, seen.events))
         })
     }
@@ -143,7 +142,7 @@ impl Position {
     /// network file. `rollouts` and `time_ms`: 0 for no limit; one of them has to be set. The other
     /// agents' random choices and the deals follow from the seed.
     #[pyo3(signature = (actions, policy, *, rollouts, time_ms, halving, threads, seed))]
-    #[expect(clippy::too_many_arguments, reason = "Python names them")]
+    #[allow(clippy::too_many_arguments, reason = "Python names them")]
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -255,13 +254,13 @@ impl Position {
 
 /// Interrupts of the program, which Python notices only if it is asked.
 struct Interrupts {
-    looked: std::sync::Mutex<(Instant, PyResult<()>)>,
+    looked: Mutex<(Instant, PyResult<()>)>,
 }
 
 impl Interrupts {
     fn new() -> Self {
         Interrupts {
-            looked: std::sync::Mutex::new((Instant::now(), Ok(()))),
+            looked: Mutex::new((Instant::now(), Ok(()))),
         }
     }
 
@@ -281,6 +280,9 @@ impl Interrupts {
     }
 }
 
+/// A number of an estimate.
+type Number = fn(&Estimate) -> f64;
+
 /// The columns of estimates by name.
 fn estimates<'py>(py: Python<'py>, found: &[Estimate]) -> PyResult<Bound<'py, PyDict>> {
     let columns = PyDict::new(py);
@@ -288,7 +290,7 @@ fn estimates<'py>(py: Python<'py>, found: &[Estimate]) -> PyResult<Bound<'py, Py
     columns.set_item("actions", PyArray1::from_iter(py, actions))?;
     let rollouts = found.iter().map(|estimate| estimate.rollouts);
     columns.set_item("rollouts", PyArray1::from_iter(py, rollouts))?;
-    let numbers: [(&str, fn(&Estimate) -> f64); 5] = [
+    let numbers: [(&str, Number); 5] = [
         ("points", Estimate::points),
         ("standard_errors", Estimate::standard_error),
         ("gains", Estimate::gain),

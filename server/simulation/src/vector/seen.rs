@@ -80,10 +80,12 @@ fn events(game: &Game, seat: Seat, seen: &Observation, entries: &[Known]) -> Opt
                 giver: actor,
                 receiver,
                 count: u8::try_from(entries.iter().filter(of_actor).count()).ok()?,
-                cards: match seat {
-                    _ if seat == actor => Some(seen.gave),
-                    _ if seat == receiver => Some(seen.received),
-                    _ => None,
+                cards: if seat == actor {
+                    Some(seen.gave)
+                } else if seat == receiver {
+                    Some(seen.received)
+                } else {
+                    None
                 },
             });
             continue;
@@ -167,10 +169,8 @@ fn dealt(rules: &RuleSet, seat: Seat, seen: &Observation, entries: &[Known]) -> 
         seen.gave.count_array(faces),
         seen.received.count_array(faces),
     );
-    for kind in 0..=joker {
-        counts[kind] = counts[kind]
-            .checked_add(gave[kind])?
-            .checked_sub(received[kind])?;
+    for ((count, gave), received) in counts.iter_mut().zip(gave).zip(received) {
+        *count = count.checked_add(gave)?.checked_sub(received)?;
     }
     // By the Golden opening the first seat to act held the Golden card, and has played it if it does
     // not hold it. By the other one the card is like any of its face.
