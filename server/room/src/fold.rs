@@ -6,11 +6,10 @@ use std::time::Duration;
 use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 
 use super::{
-    Answered, Core, LastAnswer, MAX_GAME_CHANGES, MAX_REPORTS, OpenDecision, State, Verdict,
+    Answered, Core, LastAnswer, MAX_GAME_CHANGES, MAX_REPORTS, OpenDecision, Search, State, Verdict,
 };
 use crate::journal::{Change, Decided, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
-use crate::search::Search;
 use crate::table::{PhysicalTable, RoomGame, micros};
 
 impl Core {

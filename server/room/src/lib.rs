@@ -47,7 +47,6 @@ pub use search::SearchRequest;
 pub use table::{Made, PhysicalTable};
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
-use search::Search;
 
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
@@ -135,6 +134,27 @@ struct LastAnswer {
     decision_id: u64,
     action: u32,
     answered: Answered,
+}
+
+/// The search for an open decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Search {
+    /// Not started.
+    NotStarted,
+    /// Started, and not ended.
+    Running,
+    /// Ended. Without an action, the agent plays as if it did not search.
+    Ended(Option<ActionId>),
+}
+
+impl Search {
+    /// The action that was found.
+    fn found(self) -> Option<ActionId> {
+        match self {
+            Self::NotStarted | Self::Running => None,
+            Self::Ended(found) => found,
+        }
+    }
 }
 
 /// An open decision.

@@ -7,30 +7,9 @@ use std::time::Duration;
 use chefshat_agents::MonteCarlo;
 use chefshat_engine::{ActionId, Event, Mask, Observation, Seat, Viewer};
 
-use super::{Core, HintError, MAX_HINTS, OpenDecision, State};
+use super::{Core, HintError, MAX_HINTS, OpenDecision, Search, State};
 use crate::journal::{Change, Fill};
 use crate::log::RoomEvent;
-
-/// The search for an open decision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Search {
-    /// Not started.
-    NotStarted,
-    /// Started, and not ended.
-    Running,
-    /// Ended. Without an action, the agent plays as if it did not search.
-    Ended(Option<ActionId>),
-}
-
-impl Search {
-    /// The action that was found.
-    pub(super) fn found(self) -> Option<ActionId> {
-        match self {
-            Self::NotStarted | Self::Running => None,
-            Self::Ended(found) => found,
-        }
-    }
-}
 
 /// What to search, from what the seat knows alone.
 #[derive(Debug, Clone)]
