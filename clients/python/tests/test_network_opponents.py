@@ -65,11 +65,13 @@ def test_files_that_cannot_play_are_refused_with_their_name(anywhere: str | None
         return str(caught.value)
 
     message = refused(["greedy", SMALL, "greedy"])
-    assert f"{SMALL}: it is for 3 players" in message
+    assert f"{SMALL.name}: it is for 3 players" in message
+    # A server need not know where files are.
+    assert str(SMALL.parent) not in message
     assert "use one that was trained under such rules" in message
     broken = tmp_path / "broken.safetensors"
     broken.write_bytes(b"no network")
-    assert f"{broken}: not a safetensors file" in refused(str(broken))
+    assert f"{broken.name}: not a safetensors file" in refused(str(broken))
     assert "file 0: not a safetensors file" in refused(b"no network")
     with pytest.raises(FileNotFoundError, match=r"missing\.safetensors"):
         VectorEnv(anywhere, 2, client_seats=[0], opponents="missing.safetensors")

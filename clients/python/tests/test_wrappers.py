@@ -204,6 +204,21 @@ def test_decisions_left_open_come_again(anywhere: str | None, transitions: bool)
         assert env.batch.totals.client_decisions == 60
 
 
+@pytest.mark.parametrize(
+    "leave_open", [[True, False, True], [[True], [False], [True], [False]], [1, 0, 1, 0], np.array([0, 1, 0, 1], np.uint8), True]
+)
+def test_what_is_left_open_is_checked_before_anything_is_played(anywhere: str | None, leave_open: Any) -> None:
+    with VectorEnv(anywhere, 4, client_seats=[0], opponents="greedy", seed=3, transitions=True) as env:
+        before = env.batch
+        actions = before.masks.argmax(axis=1)
+        with pytest.raises(ValueError, match=r"leave_open: give one boolean for each row of the batch, of the shape \(4,\)"):
+            env.step(actions, leave_open=leave_open)
+        assert env.batch is before
+        after = env.step(actions, leave_open=[True, False, True, False])
+        assert set(after.transitions.games.tolist()) == {1, 3}
+        assert after.totals.client_decisions == 2
+
+
 def test_a_mode_that_does_not_exist_is_named() -> None:
     with pytest.raises(ValueError, match='choose "same_step" or "next_step"'):
         chefshat.make("gymnasium_vector", autoreset_mode="disabled")

@@ -73,3 +73,12 @@ def checked(actions: ArrayLike, batch: Batch) -> NDArray[np.uint16]:
         if not 0 <= array[wrong] < size:
             raise ValueError(f"row {wrong} has the action {array[wrong]}; actions are 0..={size - 1}")
     return array.astype("<u2", copy=False)
+
+
+def checked_rows(argument: str, rows: ArrayLike, batch: Batch) -> NDArray[np.bool_]:
+    """Checks an argument that selects rows of a batch by booleans."""
+    array = np.asarray(rows)
+    if array.shape != (len(batch),) or (len(batch) and array.dtype != np.bool_):
+        given = f"{array.dtype} of the shape {array.shape}"
+        raise ValueError(f"{argument}: give one boolean for each row of the batch, of the shape ({len(batch)},), not {given}")
+    return array.astype(np.bool_, copy=False)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import local_server, pb
-from chefshat._games import LEAVE_OPEN, MAX_MESSAGE_BYTES, MAX_STATES_BYTES, Games, checked
+from chefshat._games import LEAVE_OPEN, MAX_MESSAGE_BYTES, MAX_STATES_BYTES, Games, checked, checked_rows
 from chefshat.address import ServerAddress, server_address
 from chefshat.batch import Batch, GameRecord
 from chefshat.columns import Beginnings, Endings, Observations, ShiftStatistics, Situations, Sizes, Table, Totals
@@ -165,7 +165,7 @@ class VectorEnv:
     def __reduce__(self) -> NoReturn:
         raise TypeError("a VectorEnv cannot be pickled or copied: copy its games with fork(), or save() and restore() their states")
 
-    def step(self, actions: ArrayLike, *, leave_open: NDArray[np.bool_] | None = None) -> Batch:
+    def step(self, actions: ArrayLike, *, leave_open: ArrayLike | None = None) -> Batch:
         """Takes the decisions of the latest batch and returns the next batch.
 
         Args:
@@ -177,18 +177,19 @@ class VectorEnv:
         batch = self.batch
         if batch.done:
             raise ChefsHatError("GAMES_OVER", "all games are over; call reset(seed) to start new ones")
-        taken = batch
         if self._memory is not None or leave_open is not None:
             actions = checked(actions, batch)
+        taken, chosen = batch, actions
+        left = None if leave_open is None else checked_rows("leave_open", leave_open, batch)
+        if self._memory is not None and left is not None:
+            taken, chosen = batch.take(~left), np.asarray(actions)[~left]
         try:
-            if leave_open is None:
+            if left is None:
                 stepped = self._games.step(actions, batch)
             else:
-                stepped = self._games.take(np.where(leave_open, np.uint16(LEAVE_OPEN), actions))
-                if self._memory is not None:
-                    taken, actions = batch.take(~leave_open), np.asarray(actions)[~leave_open]
+                stepped = self._games.take(np.where(left, np.uint16(LEAVE_OPEN), actions))
             if self._memory is not None:
-                self._memory.remember(taken.games, taken.attempts, taken, np.asarray(actions))
+                self._memory.remember(taken.games, taken.attempts, taken, np.asarray(chosen))
         except (TypeError, ValueError):
             # Wrong arguments: nothing has changed.
             raise

@@ -148,7 +148,7 @@ def _put_opponents(setup: pb.VectorSetup, opponents: Opponent | Sequence[Opponen
             # Files of other kinds may be huge.
             if path.stat().st_size > MAX_NETWORK_BYTES:
                 raise ValueError(f"{path} is larger than {MAX_NETWORK_BYTES >> 20} MiB, which no network for this game needs")
-            name, content = str(path), path.read_bytes()
+            name, content = path.name, path.read_bytes()
         else:
             setup.opponents.append(opponent)
             continue
