@@ -95,7 +95,7 @@ pub enum StateError {
     NoDecision,
     /// The history does not reach back to the start of the Shift.
     #[error(
-        "the state does not have all actions of the Shift: give the games a history that is wide enough, for instance of 512 actions"
+        "the state does not have all actions of the Shift: give the games a history that is wide enough, for instance of 512 actions; games that begin within a Shift have it from the next Shift on"
     )]
     HistoryTooShort,
 }

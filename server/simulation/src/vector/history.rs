@@ -6,7 +6,9 @@
 
 use std::collections::VecDeque;
 
-use chefshat_engine::{Action, ActionId, ActionSpace, Cards, Event, Face, Requirement, Seat};
+use chefshat_engine::{
+    Action, ActionId, ActionSpace, Cards, Event, Face, GameState, Requirement, Seat,
+};
 
 /// The most entries of a history column.
 pub const MAX_HISTORY: u16 = 1024;
@@ -188,10 +190,18 @@ impl History {
     }
 
     /// The entries of the Shift that a seat may know, gifts only once the exchange is complete.
-    /// `None` if some of them are not kept any more.
-    pub(super) fn complete(&self, viewer: Seat) -> Option<Vec<Known>> {
+    /// `None` if it has not all that led to this state: some are not kept any more, or the game
+    /// began within the Shift.
+    pub(super) fn complete(&self, viewer: Seat, state: &GameState) -> Option<Vec<Known>> {
+        let count = |of: fn(Seen) -> bool| self.entries.iter().filter(|it| of(it.seen)).count();
+        let gifts = count(|seen| matches!(seen, Seen::Gift(_)));
+        let given: usize = (state.gave.values())
+            .map(|cards| usize::from(cards.len()))
+            .sum();
+        let public = count(|seen| seen == Seen::Public);
+        let done = state.turns as usize + usize::from(state.special.is_some());
         let due = |known: &Known| self.exchanged || known.receiver.is_none();
-        (self.dropped == 0).then(|| self.known(viewer).filter(due).collect())
+        ((gifts, public) == (given, done)).then(|| self.known(viewer).filter(due).collect())
     }
 
     /// Writes the latest entries that a seat may know, the most recent last, after zeros. Returns

@@ -32,7 +32,8 @@ impl SavedGame {
         let open = running.open.as_ref().ok_or(StateError::NoDecision)?;
         let seat = open.decision.seat;
         let history = running.history.as_ref();
-        let entries = history.and_then(|history| history.complete(seat));
+        let state = running.game.state();
+        let entries = history.and_then(|history| history.complete(seat, &state));
         let entries = entries.ok_or(StateError::HistoryTooShort)?;
         let observation = running.game.observe(Viewer::Seat(seat));
         Ok(SeenShift {

@@ -4,7 +4,9 @@ use std::cell::Cell;
 
 use chefshat_agents::game_seed;
 use chefshat_engine::{Action, BySeat, Cards, Game, Script, Seat, SeatOrder};
-use chefshat_simulation::vector::{MAX_HISTORY, SetupError, Start, VectorGames, VectorSetup};
+use chefshat_simulation::vector::{
+    MAX_HISTORY, SetupError, Start, StateError, VectorGames, VectorSetup,
+};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
@@ -269,4 +271,46 @@ fn a_history_counts_all_actions_of_the_shift() {
         }
         batch = games.step(&some_actions(&batch)).unwrap();
     }
+}
+
+#[test]
+fn a_state_has_all_actions_of_its_shift_or_says_that_it_has_not() {
+    let seen = |games: &VectorGames| games.save(&[0]).unwrap()[0].seen();
+    let decline = rules().actions().encode(Action::Decline).unwrap();
+    let mut within = 0;
+    for seed in 0..4 {
+        let setup = VectorSetup::new(rules(), 1, &[None; 4], Seeds::Base(seed)).unwrap();
+        let (mut dealt, mut batch) = VectorGames::new(setup.clone().with_history(512).unwrap());
+        let (mut narrow, _) = VectorGames::new(setup.with_history(1).unwrap());
+        let mut game = Game::new(rules(), game_seed(seed, 0), |_| {});
+        let (mut shift, mut done) = (0, 0);
+        while game.shift() < 4 && batch.rows > 0 {
+            if game.shift() != shift {
+                (shift, done) = (game.shift(), 0);
+            }
+            assert!(seen(&dealt).is_ok());
+            // Some entries are always kept.
+            assert!(done < 100 || seen(&narrow).is_err());
+            let start = Start::Point {
+                game: Box::new(game.clone()),
+                same_deals: true,
+            };
+            let setup = all_client(1).with_history(512).unwrap();
+            let (branch, _) = VectorGames::new(setup.with_start(start).unwrap());
+            match seen(&branch) {
+                Ok(_) => assert_eq!(done, 0),
+                Err(error) => {
+                    assert_eq!(error, StateError::HistoryTooShort);
+                    assert!(done > 0);
+                    within += 1;
+                }
+            }
+            let actions = some_actions(&batch);
+            done += u32::from(actions[0] != decline);
+            game.apply(actions[0], |_| {}).unwrap();
+            batch = dealt.step(&actions).unwrap();
+            narrow.step(&actions).unwrap();
+        }
+    }
+    assert!(within > 200, "{within}");
 }
