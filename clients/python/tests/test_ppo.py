@@ -1,6 +1,7 @@
 """PPO: legal samples, learning, and resuming from a file."""
 
 import dataclasses
+import json
 from pathlib import Path
 
 import jax
@@ -12,7 +13,7 @@ from hand_made import hand_made
 from chefshat import pb
 from chefshat.learn import features, network, ppo, ppo_checkpoint
 from chefshat.learn.ppo import Hyperparameters, Rates, Samples
-from chefshat.learn.ppo_checkpoint import Plan, Progress
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress
 from chefshat.learn.training_file import TrainingFileError
 
 HYPER = Hyperparameters(policy_widths=(16,), value_widths=(16,), minibatches=4)
@@ -137,6 +138,7 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
     """The files were written before the networks were modules of flax: a training, and its network one epoch later."""
     old = ppo_checkpoint.load(DATA / "ppo-1.training")
     assert (old.plan.gae_lambda, old.plan.hyper.policy_widths, old.progress.decisions) == (0.9, (4, 4), 128)
+    assert old.plan.opponents == (Opponent("greedy"),)
     case = hand_made(16, seed=4, players=2, faces=4, jokers=2)
     size = features.dealt(2, 4, 2)
     inputs = jnp.asarray(features.table(case, case.seats, case.kinds, case.mask_bits, players=2, faces=4, hand_size=size))
@@ -151,6 +153,31 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
     ppo_checkpoint.save(tmp_path / "t", learned)
     again = ppo_checkpoint.load(tmp_path / "t")
     jax.tree.map(np.testing.assert_array_equal, again.learner.params, learned.learner.params)
+
+
+def test_a_plan_keeps_the_digests_of_its_opponents(tmp_path: Path) -> None:
+    file = tmp_path / "one, two.safetensors"
+    file.write_bytes(b"weights")
+    plan = Plan(opponent_games=8, opponents=(Opponent(str(file)), Opponent("greedy"))).checked()
+    assert [len(opponent.sha256) for opponent in plan.opponents] == [64, 0]
+    restored = Plan.of(json.loads(json.dumps(dataclasses.asdict(plan))))
+    assert restored == plan == restored.checked()
+    file.write_bytes(b"others")
+    with pytest.raises(ValueError, match="is not the network that this training played against so far"):
+        restored.checked()
+    file.unlink()
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        restored.checked()
+
+
+def test_plans_of_older_versions_name_their_opponents_in_one_text() -> None:
+    plain = {**dataclasses.asdict(Plan()), "opponents": "past.safetensors,trained,greedy"}
+    assert Plan.of(plain).opponents == (Opponent("past.safetensors"), Opponent("trained"), Opponent("greedy"))
+
+
+def test_a_plan_cannot_show_hands_of_opponents() -> None:
+    with pytest.raises(ValueError, match="hands of opponents are not shown"):
+        Plan(opponent_games=1, hyper=Hyperparameters(all_hands=True))
 
 
 def test_other_files_are_refused_with_a_reason(tmp_path: Path) -> None:

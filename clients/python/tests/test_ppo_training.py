@@ -1,5 +1,6 @@
 """Training by self-play against the real server: learning a small game, and the command with its files."""
 
+import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from chefshat.learn import __main__ as command
 from chefshat.learn import network, ppo_checkpoint
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyperparameters
-from chefshat.learn.ppo_checkpoint import Plan
+from chefshat.learn.ppo_checkpoint import Opponent, Plan
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.runs import full_rules
 
@@ -42,7 +43,7 @@ def test_a_small_game_is_learned(real_address: str) -> None:
 
 
 def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
-    plan = replace(PLAN, games=8, opponent_games=8, opponents="random", steps=16)
+    plan = replace(PLAN, games=8, opponent_games=8, opponents=(Opponent("random"),), steps=16)
     with Trainer(ppo_checkpoint.begin(plan, 1, full_rules(SMALL, real_address), "a test"), address=real_address) as trainer:
         trainer.update(0.0)
         assert trainer.training.progress.decisions == 16 * 16
@@ -53,13 +54,44 @@ def test_some_games_may_be_against_a_past_self(real_address: str, tmp_path: Path
     past = ppo_checkpoint.begin(PLAN, 1, rules, "a test").network("past")
     file = tmp_path / "past.safetensors"
     network.save(file, past.layers, past.info, dtype=np.float16)
-    plan = replace(PLAN, games=0, opponent_games=8, opponents=f"{file},greedy", steps=16)
+    plan = replace(PLAN, games=0, opponent_games=8, opponents=(Opponent(str(file)), Opponent("greedy")), steps=16)
     with Trainer(ppo_checkpoint.begin(plan, 1, rules, "a test"), address=real_address) as trainer:
         trainer.update(0.0)
         # A game may have no decision within two Shifts, and then no row.
         assert 8 * 14 < trainer.training.progress.decisions <= 8 * 16
+        assert trainer.training.plan == plan.checked() != plan
         found = evaluate(trainer.training.network("now"), [str(file), "greedy"], games=3, seed=2, rules=rules, address=real_address)
     assert found.opponents == (str(file), "greedy")
+
+
+def test_a_training_resumes_against_the_same_file_only(
+    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    past, out = tmp_path / "past.safetensors", tmp_path / "out.safetensors"
+    games = ["--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "1", "--evaluation-games", "2"]
+    common = ["--address", real_address, "--decisions", "128"]
+    assert command.main(["ppo", "--out", str(past), "--games", "8", *games, *common]) == 0
+    first = past.read_bytes()
+    against = ["--games", "0", "--opponent-games", "8", "--opponents", str(past), "greedy", "random"]
+    assert command.main(["ppo", "--out", str(out), *against, *games, *common]) == 0
+    setup = json.loads((tmp_path / "out.jsonl").read_text().splitlines()[0])
+    digest = hashlib.sha256(first).hexdigest()
+    assert [opponent["sha256"] for opponent in setup["plan"]["opponents"]] == [digest, "", ""]
+    capsys.readouterr()
+
+    resume = ["ppo", "--out", str(out), "--resume", "--address", real_address, "--decisions", "256"]
+    past.write_bytes(out.read_bytes())
+    assert command.main(resume) == 1
+    assert f"past.safetensors is not the network that this training played against so far: put that back (SHA-256 {digest}" in (
+        capsys.readouterr().err
+    )
+    past.unlink()
+    assert command.main(resume) == 1
+    assert "there is no file" in capsys.readouterr().err
+    past.write_bytes(first)
+    assert command.main([*resume, "--opponents", "greedy"]) == 1
+    assert "opponents [" in capsys.readouterr().err
+    assert command.main([*resume, "--opponents", str(past), "greedy", "random"]) == 0
 
 
 def test_the_value_network_may_see_all_hands_and_learn_first(real_address: str, tmp_path: Path) -> None:

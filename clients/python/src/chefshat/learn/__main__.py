@@ -110,10 +110,11 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--opponent-games", type=_natural, default=0, help="further games with one seat against built-in agents")
     plan.add_argument(
         "--opponents",
-        default="greedy",
-        metavar="NAMES",
-        help="who plays the other seats of these: a built-in agent or a network file, or several, separated by commas, one for "
-        "each seat; for instance past.safetensors,trained,greedy",
+        nargs="+",
+        default=["greedy"],
+        metavar="NAME",
+        help="who plays the other seats of these: built-in agents or network files, one or one for each seat; for instance "
+        "past.safetensors trained greedy",
     )
     plan.add_argument("--steps", type=_count, default=128, help="decisions in each game between two updates")
     plan.add_argument("--epochs", type=_count, default=2, help="passes over them in an update")

@@ -4,6 +4,7 @@ The file format is in `training_file`, the training loop in `ppo_training`.
 """
 
 import dataclasses
+import hashlib
 import json
 import os
 from dataclasses import dataclass, field
@@ -12,16 +13,48 @@ from typing import Any, Self
 import jax
 
 from chefshat import pb
+from chefshat.files import check_readable
 from chefshat.learn import all_hands, mlp, ppo, training_file
 from chefshat.learn.features import num_actions, table_width
 from chefshat.learn.mlp import Params
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters, Learner
 from chefshat.learn.training_file import network_info, opened
+from chefshat.vector_setup import NETWORK_SUFFIX
 
 FORMAT = "chefshat-ppo-training-2"
 # With weights as (out, in), and with older names in the plan.
 OLD_FORMAT = "chefshat-ppo-training-1"
+
+
+@dataclass(frozen=True)
+class Opponent:
+    """An opponent of a training.
+
+    Attributes:
+        name: a built-in agent, or the path of a network file.
+        sha256: the SHA-256 of the file in hexadecimal; empty: not known yet, or a built-in agent.
+    """
+
+    name: str
+    sha256: str = ""
+
+    def checked(self) -> Self:
+        """Returns the opponent with the digest of its file.
+
+        Raises OSError if the file cannot be read, ValueError if it is another file than before.
+        """
+        if not self.name.endswith(NETWORK_SUFFIX):
+            return self
+        check_readable(self.name, "network", "this training plays against")
+        with open(self.name, "rb") as file:
+            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+        if self.sha256 not in ("", sha256):
+            raise ValueError(
+                f"{self.name} is not the network that this training played against so far: put that back (SHA-256 {self.sha256}), "
+                "or start another training"
+            )
+        return dataclasses.replace(self, sha256=sha256)
 
 
 @dataclass(frozen=True)
@@ -31,7 +64,7 @@ class Plan:
     Attributes:
         games: parallel games of self-play; 0: only those against the opponents, for a best response to them.
         opponent_games: further games, in which the policy plays only seat 0.
-        opponents: who plays the other seats of these, a built-in agent or a network file, or one for each, separated by commas.
+        opponents: who plays the other seats of these, one for all or one for each.
         value_updates: first updates, which learn only the value network.
         steps: decisions in each game between two updates.
         epochs: passes over the samples of an update.
@@ -46,7 +79,7 @@ class Plan:
 
     games: int = 256
     opponent_games: int = 0
-    opponents: str = "greedy"
+    opponents: tuple[Opponent, ...] = (Opponent("greedy"),)
     value_updates: int = 0
     steps: int = 128
     epochs: int = 2
@@ -58,12 +91,26 @@ class Plan:
     evaluation_games: int = 400
     hyper: Hyperparameters = field(default_factory=Hyperparameters)
 
+    def __post_init__(self) -> None:
+        if self.hyper.all_hands and self.opponent_games:
+            raise ValueError("hands of opponents are not shown: leave out --all-hands or --opponent-games")
+
+    def checked(self) -> Self:
+        """Returns the plan with the digests of its network files. Raises OSError and ValueError as `Opponent.checked`."""
+        if not self.opponent_games:
+            return self
+        return dataclasses.replace(self, opponents=tuple(opponent.checked() for opponent in self.opponents))
+
     @classmethod
     def of(cls, plain: dict[str, Any]) -> Self:
         """Restores a plan from the JSON of `dataclasses.asdict`, also of older versions."""
+        opponents = plain["opponents"]
+        # In older versions they were names, separated by commas.
+        listed = [{"name": name} for name in opponents.split(",")] if isinstance(opponents, str) else opponents
         hyper: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in plain["hyper"].items()}
         renamed = {"trace": "gae_lambda"}
-        return cls(**{renamed.get(key, key): value for key, value in plain.items()} | {"hyper": Hyperparameters(**hyper)})
+        restored = {"opponents": tuple(Opponent(**opponent) for opponent in listed), "hyper": Hyperparameters(**hyper)}
+        return cls(**{renamed.get(key, key): value for key, value in plain.items()} | restored)
 
 
 @dataclass(frozen=True)

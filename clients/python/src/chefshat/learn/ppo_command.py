@@ -25,7 +25,7 @@ from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters
-from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
@@ -67,7 +67,7 @@ def _start(options: argparse.Namespace) -> Training:
     plan = Plan(
         games=options.games,
         opponent_games=options.opponent_games,
-        opponents=options.opponents,
+        opponents=tuple(Opponent(name) for name in options.opponents),
         value_updates=options.value_updates,
         steps=options.steps,
         epochs=options.epochs,
@@ -84,8 +84,6 @@ def _start(options: argparse.Namespace) -> Training:
             all_hands=options.all_hands,
         ),
     )
-    if plan.hyper.all_hands and plan.opponent_games:
-        raise ValueError("hands of built-in agents are not shown: leave out --all-hands or --opponent-games")
     if plan.steps * (plan.games + plan.opponent_games) % plan.hyper.minibatches:
         raise ValueError(
             f"{plan.steps} steps of {plan.games + plan.opponent_games} games do not split into {plan.hyper.minibatches} parts"
@@ -106,7 +104,8 @@ def _policy(file: Path, rules: pb.RuleSet) -> Network:
 def _resume(state: Path, options: argparse.Namespace) -> Training:
     training = ppo_checkpoint.load(runs.existing(state))
     plan, hyper = training.plan, training.plan.hyper
-    fixed = {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
+    opponents = [opponent.name for opponent in plan.opponents]
+    fixed = {"opponents": opponents, "seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
     runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
     if "rules" in options.given:
         runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), training.rules)
@@ -121,8 +120,9 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: 
         while (done := _share_done(options, trainer.training.progress)) < 1:
             if done >= next_evaluation:
                 next_evaluation += 1 / options.evaluations
-                _evaluate(trainer, options, losses, scalars)
+                # Saves first: an evaluation may fail.
                 ppo_checkpoint.save(state, trainer.training)
+                _evaluate(trainer, options, losses, scalars)
             losses = trainer.update(done)
             scalars.add("losses", losses, trainer.training.progress.decisions)
             bar.n = round(1000 * done)
@@ -147,18 +147,20 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     began = time.monotonic()
     training = trainer.training
     current = training.network(options.name)
-    plan = training.plan
-    games = plan.evaluation_games
+    plan = training.plan.checked()
+    tables: list[tuple[str, ...]] = [(name,) for name in OPPONENTS]
+    if plan.opponent_games:
+        tables.append(tuple(opponent.name for opponent in plan.opponents))
     evaluations = [
         evaluate(
             current,
-            opponents.split(","),
-            games=games,
+            opponents,
+            games=plan.evaluation_games,
             seed=runs.EVALUATION_SEED,
             rules=training.rules,
             address=join_options.server_if_any(options),
         )
-        for opponents in dict.fromkeys((*OPPONENTS, *([plan.opponents] if plan.opponent_games else [])))
+        for opponents in dict.fromkeys(tables)
     ]
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)
     trainer.training = dataclasses.replace(training, progress=progress)

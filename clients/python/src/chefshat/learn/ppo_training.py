@@ -29,13 +29,19 @@ class Trainer:
     """A running training; a context manager that ends its games."""
 
     def __init__(self, training: Training, *, address: str | ServerAddress | None = None) -> None:
-        """Starts the games. Raises `ChefsHatError` if they are refused, or the server does not answer."""
-        plan = training.plan
+        """Starts the games.
+
+        Raises:
+            ChefsHatError: they are refused, or the server does not answer.
+            ValueError: a network file among the opponents has changed since the training began.
+            OSError: such a file cannot be read.
+        """
+        plan = training.plan.checked()
         runs = training.progress.runs + 1
-        self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
+        self.training = dataclasses.replace(training, plan=plan, progress=dataclasses.replace(training.progress, runs=runs))
         # Every resumption plays other games.
         first_seed = training.seed + SEED_STEP * runs
-        alone = {"client_seats": [0], "opponents": plan.opponents.split(",")}
+        alone = {"client_seats": [0], "opponents": [opponent.name for opponent in plan.opponents]}
         kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
         self._envs: list[VectorEnv] = []
         self._collectors: list[Collector] = []
