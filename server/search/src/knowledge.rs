@@ -248,12 +248,12 @@ impl Knowledge {
     fn replay(&self, world: &World, later: Seed, on_action: impl FnMut(ActionId)) -> Option<Game> {
         self.played(world, later, on_action).filter(|game| {
             let seen = game.observe(Viewer::Seat(self.seat));
-            let told = Observation {
+            let observed = Observation {
                 // Clients and servers of earlier versions do not say who played the board.
                 board_owner: self.observation.board_owner.or(seen.board_owner),
                 ..self.observation
             };
-            without_golden_gifts(seen) == without_golden_gifts(told)
+            without_golden_gifts(seen) == without_golden_gifts(observed)
         })
     }
 

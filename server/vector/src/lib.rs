@@ -1,6 +1,7 @@
 //! Vector environments as messages: what `VectorService` and the Python package in one process
-//! share. `setup` reads setups, `opponents` the agents in them, `request` later requests, `batch` writes batches, `record` records
-//! of finished games, `states` saves games. `chefshat_simulation::vector` plays the games.
+//! share. `setup` reads setups, `opponents` the agents in them, `request` later requests, `batch`
+//! writes batches, `record` records of finished games, `states` saves games.
+//! `chefshat_simulation::vector` plays the games.
 
 mod batch;
 mod error;

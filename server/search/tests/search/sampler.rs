@@ -127,9 +127,9 @@ fn the_owner_of_the_board_may_be_missing_but_not_wrong() {
             let knowledge = Knowledge::new(scenario.rules, &observation, &moment.history)?;
             Sampler::new(knowledge, MAX_STEPS).map(|sampler| sampler.ways())
         };
-        let told = ways(moment.observation.board_owner);
-        assert!(told.is_ok());
-        assert_eq!(ways(None), told);
+        let with_owner = ways(moment.observation.board_owner);
+        assert!(with_owner.is_ok());
+        assert_eq!(ways(None), with_owner);
         // The seat that has the turn never played the board.
         assert_eq!(ways(Some(moment.seat)), Err(KnowledgeError::Inconsistent));
     }
