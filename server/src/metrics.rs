@@ -100,14 +100,16 @@ impl Outcome {
     }
 }
 
-/// How a search of a built-in agent in a room ended. Unless it was searched, the agent plays as it
-/// would without a search.
+/// How a search in a room ended. Unless it was searched, the agent plays as it would without a
+/// search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchOutcome {
     /// Searched.
     Searched,
-    /// Too many searches waited or ran.
+    /// No thread was free in time, or it got too little time.
     Busy,
+    /// Within its budget, no action was tried in enough deals to show a gain.
+    TooFewDeals,
     /// The possible deals are too many to count.
     Impossible,
     /// It panicked.
@@ -115,7 +117,12 @@ pub enum SearchOutcome {
 }
 
 impl SearchOutcome {
-    const LABELS: [&str; 4] = ["searched", "busy", "impossible", "failed"];
+    const LABELS: [&str; 5] = ["searched", "busy", "too_few_deals", "impossible", "failed"];
+
+    /// The value of the label.
+    pub fn label(self) -> &'static str {
+        Self::LABELS[self as usize]
+    }
 }
 
 /// What a stream is for.
@@ -147,7 +154,7 @@ pub struct Metrics {
     streams: [Gauge; 5],
     connections: Gauge,
     decisions: [Counter; 7],
-    searches: [Counter; 4],
+    searches: [Counter; 5],
     invalid_answers: Counter,
     thinking: Histogram,
     answers: Histogram,
@@ -193,7 +200,7 @@ impl Default for Metrics {
             searches: labelled(
                 all,
                 "searches",
-                "Searches of built-in agents in rooms",
+                "Searches in rooms, for built-in agents and hints",
                 "outcome",
                 SearchOutcome::LABELS,
             ),
@@ -308,7 +315,13 @@ impl Metrics {
         }
     }
 
-    /// Counts a search of a built-in agent.
+    /// Number of searches that ended in this way.
+    #[cfg(test)]
+    pub fn searches(&self, outcome: SearchOutcome) -> u64 {
+        self.searches[outcome as usize].get()
+    }
+
+    /// Counts a search.
     pub fn searched(&self, outcome: SearchOutcome) {
         self.searches[outcome as usize].inc();
     }

@@ -7,8 +7,8 @@ use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, Seat, Viewer};
 
 use super::{
-    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, MAX_IDLE, OpenDecision, RECALL_TIME,
-    RECHECK_INTERVAL, REPLAY_COST, State,
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_ANNOTATION_BYTES_PER_GAME, MAX_HANDOVER, MAX_IDLE,
+    OpenDecision, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST, State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
@@ -37,11 +37,8 @@ impl Core {
             return Some(open.released);
         }
         let seat = open.decision.seat;
-        if self.awaits_search() {
-            return None;
-        }
         Some(if self.is_automatic(seat) {
-            open.released + self.wait_of(open)
+            self.decided_at(open)
         } else {
             let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
             deadline.max(open.recheck_at)
@@ -111,8 +108,7 @@ impl Core {
                 budget -= 1;
                 continue;
             }
-            let waits = !self.is_automatic(open.decision.seat) || self.awaits_search();
-            if waits || open.released + self.wait_of(open) > now {
+            if !self.is_automatic(open.decision.seat) || self.decided_at(open) > now {
                 return;
             }
             budget = budget.saturating_sub(self.cost_of_open());
@@ -151,7 +147,7 @@ impl Core {
 
     /// How long a built-in agent or substitute waits before it takes this decision. It takes a
     /// silent one at once: otherwise the time of the next event would reveal it.
-    fn wait_of(&self, open: &OpenDecision) -> Duration {
+    pub(super) fn wait_of(&self, open: &OpenDecision) -> Duration {
         match open.is_silent() {
             true => Duration::ZERO,
             false => self.pace(),
@@ -402,7 +398,7 @@ impl Core {
         let Some(open) = &self.open else { return };
         let seat = open.decision.seat;
         let attempts = open.attempts;
-        let found = open.search.found();
+        let searched = open.search.found();
         let observation = self.observe(Viewer::Seat(seat));
         let observation = observation.expect("a decision is open");
         let legal = self.legal_actions();
@@ -411,15 +407,17 @@ impl Core {
             .agent
             .as_mut()
             .expect("an automatic seat has its agent");
-        let action = found.unwrap_or_else(|| agent.decide(&observation, &legal));
+        let action = (searched.action).unwrap_or_else(|| agent.decide(&observation, &legal));
         let bank_left = state.bank_left;
+        let bytes_left = MAX_ANNOTATION_BYTES_PER_GAME.saturating_sub(state.annotation_bytes);
         if legal.contains(action) {
             let source = if state.substituted {
                 Source::Substitute
             } else {
                 Source::Agent
             };
-            let decided = self.decided(seat, action, source, Duration::ZERO, bank_left);
+            let mut decided = self.decided(seat, action, source, Duration::ZERO, bank_left);
+            decided.annotations = (searched.annotations).filter(|it| it.len() <= bytes_left);
             self.commit(now, Change::Decided(decided));
         } else {
             self.commit(

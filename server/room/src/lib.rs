@@ -40,10 +40,11 @@ pub use answers::{
 pub use limits::{
     BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
     MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_HINTS,
-    MAX_IDLE, MAX_REPORTS, MAX_SEATINGS, RECALL_TIME,
+    MAX_IDLE, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME, SEARCH_PATIENCE,
+    SEARCH_PATIENCE_UNATTENDED,
 };
 pub use revive::BadJournal;
-pub use search::SearchRequest;
+pub use search::{SearchRequest, Searched};
 pub use table::{Made, PhysicalTable};
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
@@ -137,22 +138,22 @@ struct LastAnswer {
 }
 
 /// The search for an open decision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum Search {
     /// Not started.
     NotStarted,
     /// Started, and not ended.
     Running,
-    /// Ended. Without an action, the agent plays as if it did not search.
-    Ended(Option<ActionId>),
+    /// Ended.
+    Ended(Searched),
 }
 
 impl Search {
-    /// The action that was found.
-    fn found(self) -> Option<ActionId> {
+    /// What was found, if it has ended.
+    fn found(&self) -> Searched {
         match self {
-            Self::NotStarted | Self::Running => None,
-            Self::Ended(found) => found,
+            Self::NotStarted | Self::Running => Searched::default(),
+            Self::Ended(searched) => searched.clone(),
         }
     }
 }

@@ -7,6 +7,12 @@ pub use chefshat_engine::limits::{
     MAX_HINTS,
 };
 
+/// How long the search for a decision may wait for a thread.
+pub const SEARCH_PATIENCE: Duration = Duration::from_secs(2);
+/// The same in a game that nobody plays.
+pub const SEARCH_PATIENCE_UNATTENDED: Duration = Duration::from_secs(300);
+/// The decision is taken without a search that has not ended this long after its patience.
+pub const MAX_SEARCH_TIME: Duration = Duration::from_secs(10);
 /// Before the game starts, a seat becomes free again if its ticket is not attached within this
 /// time.
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);

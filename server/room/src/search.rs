@@ -7,7 +7,10 @@ use std::time::Duration;
 use chefshat_agents::MonteCarlo;
 use chefshat_engine::{ActionId, Event, Mask, Observation, Seat, Viewer};
 
-use super::{Core, HintError, MAX_HINTS, OpenDecision, Search, State};
+use super::{
+    Core, HintError, MAX_HINTS, MAX_SEARCH_TIME, OpenDecision, SEARCH_PATIENCE,
+    SEARCH_PATIENCE_UNATTENDED, Search, State,
+};
 use crate::journal::{Change, Fill};
 use crate::log::RoomEvent;
 
@@ -28,6 +31,19 @@ pub struct SearchRequest {
     pub history: Vec<Event>,
     /// The seed of the agent, the same for all its decisions.
     pub seed: [u8; 32],
+    /// Hints that the seat was given for the decision.
+    pub hints: u32,
+    /// How long it may wait for a thread.
+    pub patience: Duration,
+}
+
+/// How a search ended.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Searched {
+    /// What was found. Without it, the agent plays as if it did not search.
+    pub action: Option<ActionId>,
+    /// Recorded with the decision: the message `chefshat.v1.Annotations`, encoded.
+    pub annotations: Option<Box<[u8]>>,
 }
 
 impl Core {
@@ -56,7 +72,23 @@ impl Core {
             legal: self.legal_actions(),
             history: self.shift_seen_by(seat),
             seed: self.header.seed.agent_seed(seat.index()),
+            hints: open.hints,
+            patience: self.search_patience(),
         }
+    }
+
+    fn search_patience(&self) -> Duration {
+        match self.is_unattended() {
+            true => SEARCH_PATIENCE_UNATTENDED,
+            false => SEARCH_PATIENCE,
+        }
+    }
+
+    /// When the agent of the open decision takes it at the latest.
+    pub(super) fn decided_at(&self, open: &OpenDecision) -> Duration {
+        let search = self.search_patience() + MAX_SEARCH_TIME;
+        let search = self.awaits_search().then_some(search);
+        open.released + self.wait_of(open).max(search.unwrap_or_default())
     }
 
     /// Starts a hint for the open decision of a seat. [`Core::hinted`] takes its end.
@@ -102,19 +134,20 @@ impl Core {
         Ok(())
     }
 
-    /// Takes the result of a search; `None` if nothing was searched. The decision is then due like that of any
-    /// built-in agent. Does nothing if another decision is open.
-    pub fn searched(&mut self, seat: Seat, decision: u64, found: Option<ActionId>) {
+    /// Takes the end of a search. The decision is then due like that of any built-in agent. Does
+    /// nothing if another decision is open.
+    pub fn searched(&mut self, seat: Seat, decision: u64, mut searched: Searched) {
         let legal = self.legal_actions();
+        searched.action = searched.action.filter(|action| legal.contains(*action));
         if let Some(open) = &mut self.open
             && (open.decision.seat, open.id) == (seat, decision)
         {
-            open.search = Search::Ended(found.filter(|action| legal.contains(*action)));
+            open.search = Search::Ended(searched);
         }
     }
 
     /// Whether the open decision waits for the end of a search.
-    pub(super) fn awaits_search(&self) -> bool {
+    pub fn awaits_search(&self) -> bool {
         self.to_be_searched()
             .is_some_and(|(open, _)| !matches!(open.search, Search::Ended(_)))
     }

@@ -112,6 +112,11 @@ fn surely_better(estimates: &[Estimate], margin: f64) -> Option<ActionId> {
         .map(|(_, action)| action)
 }
 
+/// Whether every action was tried in too few deals to show a gain.
+pub fn show_nothing(estimates: &[Estimate]) -> bool {
+    estimates.iter().all(|it| it.rollouts < MIN_DEALS)
+}
+
 /// A decision of a seat, and what the seat saw of the Shift.
 #[derive(Clone, Debug)]
 pub struct Choice<'a> {
@@ -278,6 +283,7 @@ mod tests {
                 [0, 1].map(|action| estimate(action, &[1 + u32::from(action); 40][..deals]));
             let found = surely_better(&estimates, 3.0);
             assert_eq!(found, expected.map(ActionId::new), "{deals}");
+            assert_eq!(show_nothing(&estimates), expected.is_none(), "{deals}");
         };
         check(4, None);
         check(15, None);

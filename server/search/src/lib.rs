@@ -11,7 +11,7 @@ mod rollout;
 mod sampler;
 mod table;
 
-pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, suggested};
+pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, show_nothing, suggested};
 pub use evaluate::{Allocation, Estimate, Method, evaluate, evaluate_watched, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};

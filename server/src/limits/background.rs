@@ -15,6 +15,8 @@ use super::{Held, Key, Places, Rate, Shares};
 pub(super) const MAX_GAMES: usize = 32;
 /// 1/N of the cores play them.
 const CORES: usize = 4;
+/// How much the threads give way to others: as much as the system allows.
+const NICENESS: i32 = 19;
 /// Longest time for which decisions may be made faster than the rate.
 pub(super) const BURST: Duration = Duration::from_secs(60);
 
@@ -43,19 +45,15 @@ impl Background {
     pub fn new(shares: Shares, decisions_per_second: u64) -> Result<Self, ThreadPoolBuildError> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = (cores / CORES).max(1);
-        // A caller alone may use all threads: those of others come next.
-        let everything = Shares {
-            local: 100,
-            remote: 100,
-        };
         Ok(Self {
             games: Places::new(MAX_GAMES, shares),
-            slices: Places::new(threads, everything),
+            // A caller alone may use all threads: those of others come next.
+            slices: Places::new(threads, Shares::ALL),
             rate: Arc::new(Rate::new(
                 decisions_per_second,
                 decisions_per_second.saturating_mul(BURST.as_secs()),
             )),
-            threads: Threads::new("background", threads)?,
+            threads: Threads::new("background", threads, NICENESS)?,
         })
     }
 

@@ -85,6 +85,12 @@ impl Default for Shares {
 }
 
 impl Shares {
+    /// Everything: for what is only shared in turns.
+    pub const ALL: Self = Self {
+        local: 100,
+        remote: 100,
+    };
+
     /// How much of `total` a caller may use: at least one.
     pub fn of(self, key: Key, total: usize) -> usize {
         let percent = match key {

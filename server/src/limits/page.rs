@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Duration;
 
-use super::{background, calls, frames, searches};
+use super::{background, calls, frames};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
     MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_SEARCH_BUDGET,
@@ -13,6 +13,7 @@ use crate::config::{
 };
 use crate::connections::STALLED_LIMIT;
 use crate::room::MAX_SPECTATORS;
+use chefshat_room::{SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED};
 
 /// A number with commas between thousands.
 fn number(number: impl Display) -> String {
@@ -131,13 +132,13 @@ fn of_all() -> String {
             "",
         ),
         (
-            "searches of built-in agents in rooms at a time",
+            "searches in rooms",
             format!(
-                "{}, for {} or {} rollouts at most each; those that wait for a thread longer than {} are given up",
-                number(searches::MAX_SEARCHES),
+                "{} or {} rollouts at most each; those that wait for a thread longer than {}, in games of built-in agents alone {}, are given up",
                 seconds(MAX_SEARCH_BUDGET),
                 number(MAX_SEARCH_ROLLOUTS),
-                seconds(searches::MAX_SEARCH_WAIT)
+                seconds(SEARCH_PATIENCE),
+                seconds(SEARCH_PATIENCE_UNATTENDED)
             ),
             "",
         ),

@@ -1,35 +1,40 @@
-//! The searches of built-in agents in rooms, on threads of their own. A decision never waits long: if
-//! too many searches wait or run, the agent plays as it would without a search.
+//! The searches of built-in agents in rooms, on threads of their own, those of each caller in turns
+//! with those of others. A decision never waits without end: if no thread is free in time, the agent
+//! plays as it would without a search.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, RuleSet};
-use chefshat_room::SearchRequest;
+use chefshat_proto::v1;
+use chefshat_room::{SearchRequest, Searched};
 use chefshat_search::{
-    Allocation, Chance, Choice, Estimate, KnowledgeError, ShiftHistory, suggested,
+    Allocation, Chance, Choice, Estimate, ShiftHistory, show_nothing, suggested,
 };
+use prost::Message as _;
 use rayon::ThreadPoolBuildError;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use super::threads::Threads;
 use super::{Key, Places, Shares};
 use crate::metrics::{Metrics, SearchOutcome};
 
-/// Most searches of built-in agents in rooms at a time, those waiting for a thread included.
-pub(super) const MAX_SEARCHES: usize = 64;
-/// How long a search may wait for a thread.
-pub(super) const MAX_SEARCH_WAIT: Duration = Duration::from_secs(1);
 /// When a search ends, even if its rollouts are not done.
 const MAX_SEARCH_TIME: Duration = Duration::from_secs(5);
+/// When a search is given up whose thread is not even given the time to notice that.
+const GIVEN_UP_AFTER: Duration = Duration::from_secs(7);
 /// 1/N of the cores search.
 const CORES: usize = 2;
+/// How much the threads give way to others: participants and spectators wait for what they find.
+const NICENESS: i32 = 5;
 
 /// Runs the searches.
 #[derive(Debug)]
 pub struct Searches {
-    places: Arc<Places>,
+    /// One for each thread.
+    turns: Arc<Places>,
     threads: Threads,
     metrics: Arc<Metrics>,
 }
@@ -39,38 +44,54 @@ impl Searches {
     ///
     /// # Errors
     /// The operating system cannot start the threads.
-    pub fn new(shares: Shares, metrics: Arc<Metrics>) -> Result<Self, ThreadPoolBuildError> {
+    pub fn new(metrics: Arc<Metrics>) -> Result<Self, ThreadPoolBuildError> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = (cores / CORES).max(1);
         Ok(Self {
-            places: Places::new(MAX_SEARCHES, shares),
-            threads: Threads::new("search", (cores / CORES).max(1))?,
+            // A caller alone may use all threads: those of others come next.
+            turns: Places::new(threads, Shares::ALL),
+            threads: Threads::new("search", threads, NICENESS)?,
             metrics,
         })
     }
 
-    /// Searches for a room that `key` is charged for; `None` if there was no time or place for it, or if
-    /// the possible deals are too many. Ends when the future is dropped.
+    /// Searches for a room that `key` is charged for. Ends when the future is dropped. A decision that
+    /// is not searched has a note that says why.
     pub async fn search(
         self: Arc<Self>,
         key: Key,
         rules: RuleSet,
         request: SearchRequest,
-    ) -> Option<ActionId> {
-        self.run(key, move |stopped| searched(rules, &request, stopped))
-            .await
+    ) -> Searched {
+        let patience = request.patience;
+        let work = move |stopped: &dyn Fn() -> bool| {
+            let estimates = estimated(rules, &request, Allocation::Halving, stopped)?;
+            match show_nothing(&estimates) {
+                true => Err(SearchOutcome::TooFewDeals),
+                false => Ok(suggested(&estimates)),
+            }
+        };
+        let found = self.run(key, patience, work).await;
+        Searched {
+            action: found.ok(),
+            annotations: found.err().map(note),
+        }
     }
 
-    /// Estimates the actions of a decision for a hint. Without a place or time for it, suggests what is
+    /// Estimates the actions of a decision for a hint. Without a thread for it, suggests what is
     /// played without a search.
     pub async fn hint(self: Arc<Self>, key: Key, rules: RuleSet, request: SearchRequest) -> Hint {
-        let prior = prior_of(&request);
-        let estimates = self.run(key, move |stopped| estimated(rules, &request, stopped));
-        let estimates = estimates.await.unwrap_or_default();
+        let request = Arc::new(request);
+        let searched = Arc::clone(&request);
+        let work = move |stopped: &dyn Fn() -> bool| {
+            // In the order of the actions.
+            let estimates = estimated(rules, &searched, Allocation::Uniform, stopped)?;
+            Ok((suggested(&estimates), estimates))
+        };
+        let found = self.run(key, request.patience, work).await;
+        let (suggested, estimates) = found.unwrap_or_else(|_| (prior_of(&request), Vec::new()));
         Hint {
-            suggested: match estimates.is_empty() {
-                true => prior,
-                false => suggested(&estimates),
-            },
+            suggested,
             estimates,
         }
     }
@@ -78,31 +99,31 @@ impl Searches {
     async fn run<T: Send + 'static>(
         &self,
         key: Key,
+        patience: Duration,
         work: impl FnOnce(&dyn Fn() -> bool) -> Result<T, SearchOutcome> + Send + 'static,
-    ) -> Option<T> {
-        let asked = Instant::now();
-        let ended = match self.places.try_take(key) {
-            None => Err(SearchOutcome::Busy),
-            Some(place) => {
+    ) -> Result<T, SearchOutcome> {
+        let ended = match timeout(patience, self.turns.take(key)).await {
+            Err(_) => Err(SearchOutcome::Busy),
+            Ok(turn) => {
                 let gone = CancellationToken::new();
                 let _gone = gone.clone().drop_guard();
                 let work = move || {
-                    // Work that was given up keeps its place until it ends.
-                    let _place = place;
-                    if gone.is_cancelled() || asked.elapsed() > MAX_SEARCH_WAIT {
-                        return Err(SearchOutcome::Busy);
-                    }
+                    // Work that was given up keeps its turn until it ends.
+                    let _turn = turn;
                     let start = Instant::now();
                     work(&|| gone.is_cancelled() || start.elapsed() > MAX_SEARCH_TIME)
                 };
-                let ended = self.threads.run(work).await;
-                ended.unwrap_or(Err(SearchOutcome::Failed))
+                match timeout(GIVEN_UP_AFTER, self.threads.run(work)).await {
+                    Err(_) => Err(SearchOutcome::Busy),
+                    Ok(None) => Err(SearchOutcome::Failed),
+                    Ok(Some(ended)) => ended,
+                }
             }
         };
         let outcome = ended.as_ref().err().copied();
         self.metrics
             .searched(outcome.unwrap_or(SearchOutcome::Searched));
-        ended.ok()
+        ended
     }
 }
 
@@ -115,33 +136,13 @@ pub struct Hint {
     pub estimates: Vec<Estimate>,
 }
 
-/// Searches on the calling thread.
-fn searched(
-    rules: RuleSet,
-    request: &SearchRequest,
-    stopped: &dyn Fn() -> bool,
-) -> Result<ActionId, SearchOutcome> {
-    choosing(rules, request, |choice, seed| {
-        choice.search(request.plays, seed, None, stopped)
-    })
-}
-
-/// Estimates all legal actions on the calling thread, in their order.
+/// Estimates all legal actions on the calling thread.
 fn estimated(
     rules: RuleSet,
     request: &SearchRequest,
+    allocation: Allocation,
     stopped: &dyn Fn() -> bool,
 ) -> Result<Vec<Estimate>, SearchOutcome> {
-    choosing(rules, request, |choice, seed| {
-        choice.estimates(request.plays, Allocation::Uniform, seed, None, stopped)
-    })
-}
-
-fn choosing<T>(
-    rules: RuleSet,
-    request: &SearchRequest,
-    work: impl FnOnce(&Choice<'_>, [u8; 32]) -> Result<T, KnowledgeError>,
-) -> Result<T, SearchOutcome> {
     let mut history = ShiftHistory::new(request.seat);
     (request.history.iter()).for_each(|event| history.on_event(event));
     let choice = Choice {
@@ -151,9 +152,22 @@ fn choosing<T>(
         history: &history,
         prior: prior_of(request),
     };
-    // Each decision has its own numbers, so that a game that resumes is repeatable, too.
-    let seed = Chance::stream(request.seed, request.decision).seed();
-    work(&choice, seed).map_err(|_| SearchOutcome::Impossible)
+    // Each decision and each hint has its own numbers, so that a game that resumes is repeatable,
+    // too.
+    let decision = Chance::stream(request.seed, request.decision).seed();
+    let seed = Chance::stream(decision, request.hints.into()).seed();
+    choice
+        .estimates(request.plays, allocation, seed, None, stopped)
+        .map_err(|_| SearchOutcome::Impossible)
+}
+
+/// The annotations of a decision whose search ended in this way, encoded.
+fn note(outcome: SearchOutcome) -> Box<[u8]> {
+    let annotations = v1::Annotations {
+        extra: [("search".to_owned(), outcome.label().to_owned())].into(),
+        ..v1::Annotations::default()
+    };
+    annotations.encode_to_vec().into()
 }
 
 /// What is played without a search.
@@ -161,3 +175,6 @@ fn prior_of(request: &SearchRequest) -> ActionId {
     let mut prior = BuiltInAgent::new(request.plays.prior, request.seed);
     prior.decide(&request.observation, &request.legal)
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,23 +6,24 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::oneshot;
 use tracing::error;
 
-/// How much the threads give way to others: as much as the system allows.
-const NICENESS: i32 = 19;
-
 /// A pool of threads. Work starts in the order in which it comes.
 #[derive(Debug)]
 pub(super) struct Threads(ThreadPool);
 
 impl Threads {
-    /// Starts this number of threads, named after `name`.
+    /// Starts this number of threads, named after `name`, which give way to others by `niceness`.
     ///
     /// # Errors
     /// The operating system cannot start the threads.
-    pub(super) fn new(name: &'static str, number: usize) -> Result<Self, ThreadPoolBuildError> {
+    pub(super) fn new(
+        name: &'static str,
+        number: usize,
+        niceness: i32,
+    ) -> Result<Self, ThreadPoolBuildError> {
         let pool = ThreadPoolBuilder::new()
             .num_threads(number)
             .thread_name(move |index| format!("{name}-{index}"))
-            .start_handler(|_| give_way())
+            .start_handler(move |_| give_way(niceness))
             .build()?;
         Ok(Self(pool))
     }
@@ -46,8 +47,8 @@ impl Threads {
 }
 
 /// Lets the calling thread give way to all others.
-fn give_way() {
-    if let Err(error) = rustix::process::nice(NICENESS) {
+fn give_way(niceness: i32) {
+    if let Err(error) = rustix::process::nice(niceness) {
         error!(%error, "a thread in the background does not give way to others");
     }
 }

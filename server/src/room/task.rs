@@ -3,7 +3,7 @@
 //! task waits, the reader of a stream may handle an answer in the same way. The core makes all
 //! decisions.
 
-use std::future::{Future as _, poll_fn};
+use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,17 +11,19 @@ use std::task::Poll;
 use std::time::Duration;
 
 use chefshat_agents::{Budget, MonteCarlo};
-use chefshat_engine::{ActionId, Seat};
+use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind, SeatedParticipant};
-use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, State};
+use chefshat_room::{
+    Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, Searched, State,
+};
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
 use futures::{FutureExt as _, StreamExt as _};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
-use tokio_util::task::TaskTracker;
+use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tracing::{Instrument as _, debug, error, info};
 
 use super::clients::Clients;
@@ -178,7 +180,7 @@ pub(super) struct Room {
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
     /// The hints that are being computed.
-    hints: FuturesUnordered<BoxFuture<'static, HintEnded>>,
+    hints: FuturesUnordered<BoxFuture<'static, Option<HintEnded>>>,
     public: PublicEvents,
     /// Length of the log at the last delivery.
     delivered: usize,
@@ -202,8 +204,8 @@ pub(super) struct Room {
     context: TaskContext,
 }
 
-/// The seat and number of a decision, and what a search found for it.
-type Found = (Seat, u64, Option<ActionId>);
+/// The seat and number of a decision, and how the search for it ended.
+type Found = (Seat, u64, Searched);
 
 /// A hint for a decision of a seat, and who asked for it.
 type HintEnded = (Seat, u64, Hint, oneshot::Sender<Option<Hinted>>);
@@ -216,8 +218,8 @@ enum Next {
     Turn(Turn),
     /// Takes the result of a search.
     Searched(Found),
-    /// Gives a hint.
-    Hint(HintEnded),
+    /// Gives a hint; `None` if computing it panicked.
+    Hint(Option<HintEnded>),
     /// Does what is due.
     Timer,
 }
@@ -250,6 +252,8 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
         }
         if let Some(started) = room.start_search() {
             search = Some(started);
+        } else if !room.core.awaits_search() {
+            search = None;
         }
         room.set_timer(timer.as_mut(), turn.is_some());
         room.answers_in_place = room.core.awaits_participants_only();
@@ -258,13 +262,7 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
         let (room_or_none, next) = poll_fn(|context| {
             // Under the lock, so that no answer in place overtakes a message.
             let mut resting = resting.lock();
-            let received = inbox.poll_recv_many(context, &mut messages, INPUTS_PER_COMMIT);
-            if let Poll::Ready(count) = received {
-                return Poll::Ready((resting.take(), Next::Messages(count)));
-            }
-            if let Some(Poll::Ready(granted)) = turn.as_mut().map(|turn| turn.poll_unpin(context)) {
-                return Poll::Ready((resting.take(), Next::Turn(granted)));
-            }
+            // Before the mailbox, which may never be empty: a decision has few of these.
             if let Some(Poll::Ready(found)) = search.as_mut().map(|it| it.poll_unpin(context)) {
                 return Poll::Ready((resting.take(), Next::Searched(found)));
             }
@@ -273,6 +271,13 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
                 && let Poll::Ready(Some(hint)) = hints.poll_next_unpin(context)
             {
                 return Poll::Ready((resting.take(), Next::Hint(hint)));
+            }
+            let received = inbox.poll_recv_many(context, &mut messages, INPUTS_PER_COMMIT);
+            if let Poll::Ready(count) = received {
+                return Poll::Ready((resting.take(), Next::Messages(count)));
+            }
+            if let Some(Poll::Ready(granted)) = turn.as_mut().map(|turn| turn.poll_unpin(context)) {
+                return Poll::Ready((resting.take(), Next::Turn(granted)));
             }
             let fired = armed && timer.as_mut().poll(context).is_ready();
             if fired {
@@ -304,7 +309,7 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
                 search = None;
                 room.core.searched(seat, decision, found);
             }
-            Next::Hint(hint) => room.give_hint(hint),
+            Next::Hint(Some(hint)) => room.give_hint(hint),
             _ => {}
         }
         for message in messages.drain(..) {
@@ -370,8 +375,9 @@ impl Room {
         let (seat, decision) = (request.seat, request.decision);
         let searches = Arc::clone(&self.context.searches);
         let (owner, rules) = (self.context.owner, self.core.header().rules);
-        let found = searches.search(owner, rules, request);
-        Some(found.map(move |found| (seat, decision, found)).boxed())
+        let found = spawned(searches.search(owner, rules, request));
+        let ended = found.map(move |found| (seat, decision, found.unwrap_or_default()));
+        Some(ended.boxed())
     }
 
     /// Starts to compute a hint.
@@ -387,9 +393,9 @@ impl Room {
             Ok(request) => {
                 let searches = Arc::clone(&self.context.searches);
                 let rules = self.core.header().rules;
-                let hint = searches.hint(self.context.owner, rules, request);
-                self.hints
-                    .push(hint.map(move |hint| (seat, decision, hint, reply)).boxed());
+                let hint = spawned(searches.hint(self.context.owner, rules, request));
+                let ended = hint.map(move |hint| Some((seat, decision, hint?, reply)));
+                self.hints.push(ended.boxed());
             }
             Err(error) => answer(reply, Some(Err(error))),
         }
@@ -937,6 +943,14 @@ impl Drop for Room {
 
 fn is_connection(subscriber: &Subscriber, connection: ConnectionId) -> bool {
     (subscriber.connection()).is_some_and(|attached| attached.id == connection)
+}
+
+/// Starts work that does not wait until somebody polls it, and ends it when dropped. `None` if it
+/// panicked.
+fn spawned<T: Send + 'static>(
+    work: impl Future<Output = T> + Send + 'static,
+) -> impl Future<Output = Option<T>> + Send {
+    AbortOnDropHandle::new(tokio::spawn(work)).map(Result::ok)
 }
 
 /// Answers a caller, which may have gone.

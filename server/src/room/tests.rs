@@ -23,7 +23,7 @@ use super::{
 };
 use crate::clock::RoomClock;
 use crate::limits::{Background, Key, Searches, Shares};
-use crate::metrics::Metrics;
+use crate::metrics::{Metrics, SearchOutcome};
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
@@ -41,6 +41,9 @@ impl RoomWatcher for NullWatcher {
     fn gone(&self, _room: Id) {}
 }
 
+/// A seat that anybody may take.
+const FREE: Fill = Fill::Open { reserved_for: None };
+
 async fn room(policy: Policy, shifts: u32) -> Handle {
     room_with(policy, shifts, |journal| journal).await
 }
@@ -49,6 +52,16 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
 async fn room_with(
     policy: Policy,
     shifts: u32,
+    change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
+) -> Handle {
+    room_of(vec![FREE; 4], policy, shifts, Arc::default(), change).await
+}
+
+async fn room_of(
+    fills: Vec<Fill>,
+    policy: Policy,
+    shifts: u32,
+    metrics: Arc<Metrics>,
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
     let header = Arc::new(GameHeader {
@@ -66,7 +79,7 @@ async fn room_with(
         display_names: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
-        fills: vec![Fill::Open { reserved_for: None }; 4],
+        fills,
         seed: SeedPlan::Fixed { game_seed: [3; 32] },
         created_at_ms: 0,
         join_code: "CODE".into(),
@@ -81,8 +94,7 @@ async fn room_with(
         .expect("a memory store");
     let background = Background::new(Shares::default(), 1_000_000).expect("threads");
     let background = Arc::new(background);
-    let metrics: Arc<Metrics> = Arc::default();
-    let searches = Searches::new(Shares::default(), Arc::clone(&metrics)).expect("threads");
+    let searches = Searches::new(Arc::clone(&metrics)).expect("threads");
     spawn_room(
         Core::new(header),
         RoomClock::of_age(Duration::ZERO),
@@ -254,7 +266,7 @@ async fn deadlines_fire_without_any_input() {
 }
 
 #[tokio::test]
-async fn a_flood_does_not_stop_the_clock() {
+async fn a_flood_stops_neither_the_clock_nor_searches() {
     let policy = Policy {
         decision_time: Duration::from_millis(50),
         bank: Duration::ZERO,
@@ -262,9 +274,12 @@ async fn a_flood_does_not_stop_the_clock() {
         max_timeouts: 1,
         ..Policy::default()
     };
-    let room = room(policy, 1).await;
+    let searcher = "monte_carlo:200:random".parse().expect("an agent");
+    let fills = vec![FREE, FREE, FREE, Fill::BuiltIn(searcher)];
+    let metrics: Arc<Metrics> = Arc::default();
+    let room = room_of(fills, policy, 1, Arc::clone(&metrics), |journal| journal).await;
     let mut seats = Vec::new();
-    for _ in 0..4 {
+    for _ in 0..3 {
         seats.push(take_seat(&room).await);
     }
     // No decision is answered; several clients send requests endlessly, so the mailbox is never
@@ -293,6 +308,7 @@ async fn a_flood_does_not_stop_the_clock() {
         flood.abort();
     }
     assert!(numbers.expect("the game ends")[0].len() > 12);
+    assert!(metrics.searches(SearchOutcome::Searched) > 0);
 }
 
 #[tokio::test(start_paused = true)]

@@ -126,7 +126,7 @@ impl Rooms {
         }
         let background = Background::new(config.shares, config.built_in_decisions_per_second)?;
         let background = Arc::new(background);
-        let searches = Arc::new(Searches::new(config.shares, Arc::clone(&metrics))?);
+        let searches = Arc::new(Searches::new(Arc::clone(&metrics))?);
         Ok(Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
             closed: Mutex::default(),

@@ -4,13 +4,19 @@ use chefshat_agents::{AgentKind, Budget, BuiltInAgent, MonteCarlo, NamedAgent};
 use chefshat_engine::{ActionId, DecisionKind, Event, Viewer};
 
 use crate::tests::*;
-use crate::{HintError, MAX_HINTS, SearchRequest};
+use crate::{
+    HintError, MAX_HINTS, MAX_SEARCH_TIME, SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED,
+    SearchRequest, Searched,
+};
 
 const SEARCHER: Fill = Fill::BuiltIn(NamedAgent::MonteCarlo(MonteCarlo {
     budget: Budget::Rollouts(1),
     rollouts: AgentKind::Trained,
     prior: AgentKind::Trained,
 }));
+
+/// Annotations.
+const NOTE: [u8; 3] = [1, 2, 3];
 
 fn searching(pace: u64) -> Table {
     let policy = Policy {
@@ -40,18 +46,24 @@ fn next_search(table: &mut Table) -> Option<SearchRequest> {
     None
 }
 
-fn last_legal(request: &SearchRequest) -> Option<ActionId> {
-    request.legal.iter().last()
+fn found(action: Option<ActionId>) -> Searched {
+    Searched {
+        action,
+        annotations: action.is_none().then(|| NOTE.into()),
+    }
+}
+
+fn last_legal(request: &SearchRequest) -> Searched {
+    found(request.legal.iter().last())
 }
 
 #[test]
 fn a_decision_waits_for_the_search_and_takes_what_it_found() {
     let mut table = searching(0);
-    let (mut found, mut without) = (0, 0);
+    let (mut with, mut without) = (0, 0);
     while let Some(request) = next_search(&mut table) {
         let decisions = table.core.decisions();
-        assert_eq!(table.core.deadline(), None, "nothing is due");
-        table.pass_time(Duration::from_secs(3_600));
+        table.pass_time(SEARCH_PATIENCE_UNATTENDED);
         assert_eq!(table.core.decisions(), decisions, "it waits");
         assert!(table.core.start_search().is_none(), "it is started once");
         assert!(
@@ -60,12 +72,19 @@ fn a_decision_waits_for_the_search_and_takes_what_it_found() {
         );
 
         let action = last_legal(&request);
-        let given = action.filter(|_| decisions.is_multiple_of(2));
+        let given = action.action.filter(|_| decisions.is_multiple_of(2));
         table
             .core
             .searched(request.seat, request.decision + 1, action);
-        assert_eq!(table.core.deadline(), None, "that was for another decision");
-        table.core.searched(request.seat, request.decision, given);
+        table.pass_time(ms(1));
+        assert_eq!(
+            table.core.decisions(),
+            decisions,
+            "that was for another decision"
+        );
+        table
+            .core
+            .searched(request.seat, request.decision, found(given));
         let mut prior = BuiltInAgent::new(AgentKind::Trained, [0; 32]);
         let expected = given.unwrap_or_else(|| prior.decide(&request.observation, &request.legal));
         let length = table.journal.len();
@@ -73,15 +92,37 @@ fn a_decision_waits_for_the_search_and_takes_what_it_found() {
         let taken = table.journal[length..]
             .iter()
             .find_map(|entry| match &entry.change {
-                Change::Decided(decided) => Some((decided.seat, decided.action, decided.source)),
+                Change::Decided(decided) => Some(decided.clone()),
                 _ => None,
             });
-        assert_eq!(taken, Some((request.seat, expected, Source::Agent)));
-        found += usize::from(given.is_some());
+        let taken = taken.expect("a decision");
+        let who = (taken.seat, taken.action, taken.source);
+        assert_eq!(who, (request.seat, expected, Source::Agent));
+        let note = given.is_none().then(|| NOTE.into());
+        assert_eq!(taken.annotations, note);
+        with += usize::from(given.is_some());
         without += usize::from(given.is_none());
     }
     assert_eq!(table.core.state(), State::Finished);
-    assert!(found > 5 && without > 5, "{found} {without}");
+    assert!(with > 5 && without > 5, "{with} {without}");
+    table.assert_replays();
+}
+
+#[test]
+fn a_search_without_end_is_given_up() {
+    let mut table = searching(0);
+    let longest = SEARCH_PATIENCE_UNATTENDED + MAX_SEARCH_TIME;
+    for _ in 0..10 {
+        let request = next_search(&mut table).expect("a search");
+        assert_eq!(request.patience, SEARCH_PATIENCE_UNATTENDED);
+        let (decisions, start) = (table.core.decisions(), table.now);
+        let deadline = table.core.deadline().expect("it ends");
+        assert!(deadline <= start + longest && deadline + ms(1_000) >= start + longest);
+        table.pass_time(deadline - start - ms(1));
+        assert_eq!(table.core.decisions(), decisions, "it waits");
+        table.pass_time(ms(1));
+        assert!(table.core.decisions() > decisions);
+    }
     table.assert_replays();
 }
 
@@ -92,7 +133,9 @@ fn an_illegal_result_counts_as_none() {
     let illegal = (0..u16::MAX)
         .map(ActionId::new)
         .find(|action| !request.legal.contains(*action));
-    table.core.searched(request.seat, request.decision, illegal);
+    table
+        .core
+        .searched(request.seat, request.decision, found(illegal));
     table.pass_time(ms(0));
     assert!(table.core.decisions() > 0);
     table.assert_replays();
@@ -171,6 +214,7 @@ fn a_seat_that_returns_from_a_substitute_is_not_played_by_its_search() {
         };
     };
     assert_eq!(request.seat, seat);
+    assert_eq!(request.patience, SEARCH_PATIENCE, "others wait");
     table.attach(seat);
     let decisions = table.core.decisions();
     table
