@@ -44,7 +44,7 @@ pub use limits::{
     SEARCH_PATIENCE_UNATTENDED,
 };
 pub use revive::BadJournal;
-pub use search::{SearchRequest, Searched};
+pub use search::SearchRequest;
 pub use table::{Made, PhysicalTable};
 
 use limits::{RECHECK_INTERVAL, REPLAY_COST, SLOW_STORE};
@@ -156,6 +156,15 @@ impl Search {
             Self::Ended(searched) => searched.clone(),
         }
     }
+}
+
+/// How a search ended.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Searched {
+    /// What was found. Without it, the agent plays as if it did not search.
+    pub action: Option<ActionId>,
+    /// Recorded with the decision: the message `chefshat.v1.Annotations`, encoded.
+    pub annotations: Option<Box<[u8]>>,
 }
 
 /// An open decision.

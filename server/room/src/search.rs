@@ -5,11 +5,11 @@
 use std::time::Duration;
 
 use chefshat_agents::MonteCarlo;
-use chefshat_engine::{ActionId, Event, Mask, Observation, Seat, Viewer};
+use chefshat_engine::{Event, Mask, Observation, Seat, Viewer};
 
 use super::{
     Core, HintError, MAX_HINTS, MAX_SEARCH_TIME, OpenDecision, SEARCH_PATIENCE,
-    SEARCH_PATIENCE_UNATTENDED, Search, State,
+    SEARCH_PATIENCE_UNATTENDED, Search, Searched, State,
 };
 use crate::journal::{Change, Fill};
 use crate::log::RoomEvent;
@@ -35,15 +35,6 @@ pub struct SearchRequest {
     pub hints: u32,
     /// How long it may wait for a thread.
     pub patience: Duration,
-}
-
-/// How a search ended.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Searched {
-    /// What was found. Without it, the agent plays as if it did not search.
-    pub action: Option<ActionId>,
-    /// Recorded with the decision: the message `chefshat.v1.Annotations`, encoded.
-    pub annotations: Option<Box<[u8]>>,
 }
 
 impl Core {
