@@ -74,11 +74,12 @@ test("an unrated game says why", () => {
     rated.seats.map((one) => (one.seat === seat ? { ...one, ...fields } : one));
   const why = [
     changed({ substituted: true }),
+    changed({ hinted: true }),
     changed({ added: true }),
     changed({ origin: GameOrigin.FIXED_SEED }),
     changed({ seats: seatsWith(2, { kind: ParticipantKind.HUMAN }) }),
     changed({ seats: seatsWith(0, { replay: create(RecordedPlayerSchema, { gameId: "g" }) }) }),
     changed({ state: RoomState.ABORTED }),
   ];
-  expect(why).toEqual(["substituted", "added", "notDealt", "twice", "recorded", null]);
+  expect(why).toEqual(["substituted", "hinted", "added", "notDealt", "twice", "recorded", null]);
 });

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use chefshat_agents::{AgentKind, NamedAgent};
+use chefshat_agents::{AgentKind, Budget, NamedAgent};
 use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable};
 use clap::Args;
@@ -55,7 +55,8 @@ pub(super) struct Simulate {
     /// Number of threads, at most 256 and one per game; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Write the record of every game to this directory, in the form of hosted games.
+    /// Write the record of every game to this directory, in the form of hosted games. A monte_carlo
+    /// then needs a number of rollouts.
     #[arg(long, value_name = "DIR")]
     records: Option<PathBuf>,
     /// Print one JSON object.
@@ -108,6 +109,9 @@ impl Simulate {
             let example = vec!["random"; players].join(",");
             format!("--agents: {error}, for example --agents {example}, or change --players")
         })?;
+        if self.records.is_some() {
+            check_repeatable(&agents)?;
+        }
         if let Some(scheme) = self.reward {
             batch = batch.with_rewards(scheme);
         }
@@ -122,6 +126,22 @@ impl Simulate {
             batch = batch.with_max_invalid_attempts(attempts);
         }
         Ok(batch)
+    }
+}
+
+/// Checks that games are the same when they are played again, which is how they are recorded.
+fn check_repeatable(agents: &[NamedAgent]) -> Result<(), CommandError> {
+    let timed = |agent: &&NamedAgent| {
+        let search = agent.search();
+        search.is_some_and(|plays| matches!(plays.budget, Budget::Time(_)))
+    };
+    match agents.iter().find(timed) {
+        None => Ok(()),
+        Some(agent) => Err(format!(
+            "--agents: {agent} does not play a game the same way twice, so its games cannot be recorded; \
+             give it a number of rollouts, for example monte_carlo:64, or leave out --records"
+        )
+        .into()),
     }
 }
 

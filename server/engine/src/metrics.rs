@@ -45,6 +45,8 @@ pub struct SeatStatistics {
     pub points: u64,
     /// Whether a substitute ever played for the seat.
     pub substituted: bool,
+    /// Whether the seat was given a hint.
+    pub hinted: bool,
     /// Decisions of the participant, including timeouts and invalid attempts; excludes those of a
     /// substitute or taken over from another record.
     pub decisions: u64,

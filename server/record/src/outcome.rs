@@ -111,6 +111,9 @@ pub enum Unrated {
     /// A substitute played for a participant.
     #[error("a substitute played")]
     Substituted,
+    /// The server suggested actions to a participant.
+    #[error("a participant was given hints")]
+    Hinted,
     /// One participant had several seats.
     #[error("a participant had more than one seat")]
     SameParticipant,
@@ -125,6 +128,7 @@ impl Unrated {
         match self {
             Self::NotDealt => "not_dealt",
             Self::Substituted => "substituted",
+            Self::Hinted => "hinted",
             Self::SameParticipant => "same_participant",
             Self::RecordedPlayer => "recorded_player",
         }
@@ -236,6 +240,7 @@ impl<'a> Gathered<'a> {
 
     fn decision(&mut self, decision: &v1::DecisionRecord) -> Option<()> {
         let seat = &mut self.seat(decision.seat)?.statistics;
+        seat.hinted |= decision.hints > 0;
         let source = decision.source();
         match source {
             DecisionSource::Substitute => seat.substituted = true,
@@ -297,6 +302,8 @@ fn unrated(origin: GameOrigin, seats: &[SeatOutcome]) -> Option<Unrated> {
         Some(Unrated::NotDealt)
     } else if seats.iter().any(|seat| seat.statistics.substituted) {
         Some(Unrated::Substituted)
+    } else if seats.iter().any(|seat| seat.statistics.hinted) {
+        Some(Unrated::Hinted)
     } else if seats
         .iter()
         .any(|seat| seat.built_in.as_deref() == Some(REPLAY))

@@ -31,6 +31,7 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
                     _ => {}
                 }
             }
+            Line::Decision(decision) => summary.hinted |= decision.hints > 0,
             _ => {}
         }
     }

@@ -61,7 +61,8 @@ impl Core {
                     open.attempts += 1;
                 }
             }
-            Change::Hinted(_) => {
+            Change::Hinted(seat) => {
+                self.seats[seat.index()].ever_hinted = true;
                 if let Some(open) = &mut self.open {
                     open.hints += 1;
                 }

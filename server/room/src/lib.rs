@@ -122,6 +122,7 @@ struct SeatState {
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
     ever_substituted: bool,
+    ever_hinted: bool,
     decisions: u64,
     /// Timeouts since the agent's last valid answer in time. Silent decisions do not count.
     timeouts: u32,
@@ -253,6 +254,7 @@ impl Core {
                     },
                     substituted: false,
                     ever_substituted: false,
+                    ever_hinted: false,
                     decisions: 0,
                     timeouts: 0,
                     bank_left: header.policy.bank,
@@ -357,6 +359,11 @@ impl Core {
     /// Whether a substitute has played for any seat.
     pub fn was_substituted(&self) -> bool {
         self.seats.iter().any(|seat| seat.ever_substituted)
+    }
+
+    /// Whether any seat was given a hint.
+    pub fn was_hinted(&self) -> bool {
+        self.seats.iter().any(|seat| seat.ever_hinted)
     }
 
     /// Number of changes.

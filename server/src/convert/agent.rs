@@ -5,10 +5,11 @@ use chefshat_record::convert::FieldProblem;
 
 use crate::config::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
 
-/// The built-in agent with this name; `None` for the empty name.
+/// The built-in agent with this name; `None` for the empty name. Its budget is not checked: what is
+/// stored stays readable if the bounds of requests change.
 ///
 /// # Errors
-/// There is no such agent, or its budget is too large for a server.
+/// There is no such agent.
 pub(super) fn agent_from_proto(
     field: &'static str,
     name: &str,
@@ -16,21 +17,29 @@ pub(super) fn agent_from_proto(
     if name.is_empty() {
         return Ok(None);
     }
-    let agent: NamedAgent = (name.parse())
+    let agent = (name.parse())
         .map_err(|error: AgentNameError| FieldProblem::new(field, error.to_string()))?;
+    Ok(Some(agent))
+}
+
+/// Checks the budget of an agent that a request names.
+///
+/// # Errors
+/// It is too large for a server.
+pub fn check_budget(field: &'static str, agent: NamedAgent) -> Result<(), FieldProblem> {
     let fits = match agent.search().map(|plays| plays.budget) {
         None => true,
         Some(Budget::Time(time)) => time <= MAX_SEARCH_BUDGET,
         Some(Budget::Rollouts(rollouts)) => rollouts <= MAX_SEARCH_ROLLOUTS,
     };
-    if !fits {
-        let ms = MAX_SEARCH_BUDGET.as_millis();
-        let words = format!(
-            "{name}: on a server a search takes at most {ms}ms or {MAX_SEARCH_ROLLOUTS} rollouts"
-        );
-        return Err(FieldProblem::new(field, words));
+    if fits {
+        return Ok(());
     }
-    Ok(Some(agent))
+    let ms = MAX_SEARCH_BUDGET.as_millis();
+    let words = format!(
+        "{agent}: on a server a search takes at most {ms}ms or {MAX_SEARCH_ROLLOUTS} rollouts"
+    );
+    Err(FieldProblem::new(field, words))
 }
 
 /// Checks that an agent can play where cards are real.

@@ -19,7 +19,7 @@ mod summary;
 mod table;
 mod tournament;
 
-pub use agent::check_real_cards;
+pub use agent::{check_budget, check_real_cards};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};

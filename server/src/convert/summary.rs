@@ -65,6 +65,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         abort_reason: aborted_because(core.state()).into(),
         tournament_id: tournament_id(header),
         substituted: core.was_substituted(),
+        hinted: core.was_hinted(),
         visibility: visibility_to_proto(header.policy.visibility).into(),
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use chefshat_agents::NamedAgent;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{self, server_service_server::ServerService};
 use chefshat_record::convert::{FieldProblem, action_space, rules_to_proto};
@@ -109,6 +109,9 @@ impl ServerService for Info {
             rules_version: RULES_VERSION,
             presets,
             built_in_agents: NamedAgent::NAMES.map(str::to_owned).to_vec(),
+            quick_built_in_agents: (AgentKind::ALL.iter())
+                .map(|kind| kind.name().to_owned())
+                .collect(),
             limits: self.limits.clone(),
             open_rooms: convert::number(self.rooms.open_count()),
             shutting_down: self.rooms.is_shutting_down(),

@@ -124,7 +124,7 @@ where
         self.services.poll_ready(context)
     }
 
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+    fn call(&mut self, mut request: Request<B>) -> Self::Future {
         let key = charged(request.extensions());
         let client = own_client(request.extensions()).cloned();
         let caller: Option<&Caller> = request.extensions().get();
@@ -140,7 +140,7 @@ where
             admitted: None,
         };
         if let Some(admitted) = self.limits.admit_now(key, is_stream) {
-            place.admit(admitted);
+            place.admit(admitted, &mut request);
             let answering = self.services.call(request);
             return Box::pin(async move { Ok(place.keep(answering.await?)) });
         }
@@ -156,7 +156,7 @@ where
             match limits.admit(key, is_stream).await {
                 Ok(admitted) => {
                     drop(waiting);
-                    place.admit(admitted);
+                    place.admit(admitted, &mut request);
                     Ok(place.keep(services.call(request).await?))
                 }
                 Err(refused) => {
@@ -180,7 +180,11 @@ struct Place {
 }
 
 impl Place {
-    fn admit(&mut self, admitted: Admitted) {
+    /// Takes the places of a call, and shows the call the one that it may give back.
+    fn admit<B>(&mut self, admitted: Admitted, request: &mut Request<B>) {
+        if let Some(executing) = admitted.executing() {
+            request.extensions_mut().insert(executing.clone());
+        }
         self.admitted = Some(admitted);
         if let Some(client) = self.client.as_ref().filter(|_| self.is_stream) {
             client.count_stream(true);
@@ -188,8 +192,8 @@ impl Place {
     }
 
     /// Keeps the place until the answer has been read.
-    fn keep(mut self, response: Response<Body>) -> Response<Body> {
-        if let Some(admitted) = &mut self.admitted {
+    fn keep(self, response: Response<Body>) -> Response<Body> {
+        if let Some(admitted) = &self.admitted {
             admitted.executed();
         }
         response.map(|body| {
@@ -250,5 +254,53 @@ impl HttpBody for KeptBody {
 
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use futures::FutureExt as _;
+    use tower::service_fn;
+
+    use super::*;
+    use crate::limits::{Executing, Shares};
+
+    /// More calls than may be executed at a time.
+    const MANY: usize = 100;
+
+    /// Answers at once, except a path that waits forever: with or without its place.
+    async fn served(request: Request<Body>) -> Result<Response<Body>, Infallible> {
+        match request.uri().path() {
+            "/at_once" => return Ok(Response::new(Body::empty())),
+            "/waits_without" => {
+                let executing: Option<&Executing> = request.extensions().get();
+                executing.expect("a call that is executed").give_back();
+            }
+            _ => {}
+        }
+        std::future::pending().await
+    }
+
+    /// Whether a call is answered at once after many to a path have begun.
+    fn answers_beside(path: &str) -> bool {
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let mut services = LimitsLayer::new(limits).layer(service_fn(served));
+        let mut call = |path: &str| {
+            let request = Request::builder().uri(path).body(Body::empty());
+            services.call(request.expect("a request"))
+        };
+        let mut waiting: Vec<_> = (0..MANY).map(|_| call(path)).collect();
+        for call in &mut waiting {
+            assert!(call.now_or_never().is_none(), "{path} waits");
+        }
+        call("/at_once").now_or_never().is_some()
+    }
+
+    #[tokio::test]
+    async fn calls_that_only_wait_hold_up_no_others() {
+        assert!(answers_beside("/waits_without"));
+        assert!(!answers_beside("/waits_with"));
     }
 }

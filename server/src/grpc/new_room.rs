@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use chefshat_agents::RecordedPlayer;
+use chefshat_agents::{NamedAgent, RecordedPlayer};
 use chefshat_engine::{RuleSet, Stop};
 use chefshat_proto::v1::{self, create_room_request::Start};
 use chefshat_record::branch::{BranchError, branch_of};
@@ -70,6 +70,9 @@ pub(super) async fn new_room(
     let refused = |problem: FieldProblem| field("SEATS_REFUSED", &problem);
     let fills = convert::fills_from_proto(&request.seats, &beginning.rules).map_err(refused)?;
     check_table(&request, &fills, &beginning.rules)?;
+    for agent in built_in(&fills) {
+        convert::check_budget("seats", agent).map_err(refused)?;
+    }
     if request.physical {
         check_agents(&policy, &fills)?;
         if policy.hints {
@@ -138,21 +141,28 @@ fn check_table(
 fn check_agents(policy: &Policy, fills: &[Fill]) -> Result<(), Status> {
     convert::check_real_cards("substitute", policy.substitute)
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
-    for fill in fills {
-        if let Fill::BuiltIn(agent) = fill {
-            convert::check_real_cards("seats", *agent)
-                .map_err(|problem| field("SEATS_REFUSED", &problem))?;
-        }
+    for agent in built_in(fills) {
+        convert::check_real_cards("seats", agent)
+            .map_err(|problem| field("SEATS_REFUSED", &problem))?;
     }
     Ok(())
 }
 
-/// A policy that promises no more than the server's store supports.
+fn built_in(fills: &[Fill]) -> impl Iterator<Item = NamedAgent> {
+    fills.iter().filter_map(|fill| match fill {
+        Fill::BuiltIn(agent) => Some(*agent),
+        _ => None,
+    })
+}
+
+/// A policy that promises no more than the server's store supports, with a substitute that a server
+/// has time for.
 pub(super) fn supported_policy(
     recorded: &Recorded,
     message: &v1::RoomPolicy,
 ) -> Result<Policy, FieldProblem> {
     let mut policy = convert::policy_from_proto(message)?;
+    convert::check_budget("substitute", policy.substitute)?;
     if !recorded.rooms().store().outlives_server() {
         if message.durability() == v1::Durability::Durable {
             let problem = "this server stores games in memory only; leave it unset";

@@ -20,7 +20,7 @@ use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
-use crate::limits::Hint;
+use crate::limits::{Executing, Hint};
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
@@ -145,6 +145,7 @@ impl PlayService for Play {
     ) -> Result<Response<v1::ActResponse>, Status> {
         let arrived = Instant::now();
         let caller = Caller::of(request.extensions());
+        let executing: Option<Executing> = request.extensions().get().cloned();
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
         let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown)?;
@@ -156,6 +157,10 @@ impl PlayService for Play {
                 .map_err(|problem| field("EXPRESSION_REFUSED", &problem))?,
             Some(act_request::Command::Resume(_)) => SeatAction::Resume,
             Some(act_request::Command::Hint(ask)) => {
+                // The answers of others do not wait for its search.
+                if let Some(executing) = executing {
+                    executing.give_back();
+                }
                 let hint = room.hint(token.secret, ask.decision_id).await;
                 let hint = hint
                     .map_err(Refusal::from)?
@@ -224,4 +229,64 @@ pub(super) fn with_heartbeats(
                 .map_err(stream_ended)
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use chefshat_engine::RuleSetSpec;
+    use chefshat_room::journal::{Fill, GameStart};
+    use chefshat_room::policy::Policy;
+    use tokio_util::task::TaskTracker;
+
+    use super::*;
+    use crate::config::ServerConfig;
+    use crate::limits::{CallLimits, Key, Shares};
+    use crate::rooms::NewRoom;
+    use crate::store::MemoryStore;
+
+    /// Whether another call may be executed while this one waits for its room.
+    async fn makes_way(command: act_request::Command) -> bool {
+        let store = Arc::new(MemoryStore::default());
+        let rooms =
+            Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+        let created = rooms.create(NewRoom {
+            name: "hints".into(),
+            rules: RuleSetSpec::default().validate().expect("the standard"),
+            policy: Policy::default(),
+            fills: vec![Fill::Open { reserved_for: None }; 4],
+            display_names: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: None,
+            physical: false,
+            seating: None,
+            request: None,
+            charged: Key::Local,
+        });
+        let room = created.await.expect("a room").handle.id();
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        let play = Play::new(rooms, tournaments, CancellationToken::new());
+        let mut request = Request::new(v1::ActRequest {
+            ticket: Token::random(room).to_text(),
+            command: Some(command),
+        });
+        let limits = CallLimits::new(Shares::default());
+        let admitted = limits.admit_now(Key::Local, false).expect("the first");
+        let executing = admitted.executing().expect("its place").clone();
+        request.extensions_mut().insert(executing);
+        let _others: Vec<_> = std::iter::from_fn(|| limits.admit_now(Key::Local, false)).collect();
+        // The room runs on the same thread, and does not until this test waits.
+        assert!(futures::poll!(play.act(request)).is_pending());
+        limits.admit_now(Key::Local, false).is_some()
+    }
+
+    #[tokio::test]
+    async fn a_hint_makes_way_for_answers() {
+        let hint = act_request::Command::Hint(v1::AskHint { decision_id: 1 });
+        assert!(makes_way(hint).await);
+        let answer = act_request::Command::Answer(v1::Answer::default());
+        assert!(!makes_way(answer).await);
+    }
 }

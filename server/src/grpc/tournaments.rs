@@ -150,6 +150,11 @@ impl TournamentService for TournamentCalls {
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
             .map_err(|problem| refused(&problem))?;
+        convert::check_budget("filler", plan.core.filler).map_err(|problem| refused(&problem))?;
+        for agent in &plan.built_in {
+            convert::check_budget("built_in_agents", *agent)
+                .map_err(|problem| refused(&problem))?;
+        }
         if let Some(problem) = too_long(&plan.rules) {
             return Err(refused_within("rules", &problem));
         }

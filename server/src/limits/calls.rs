@@ -1,7 +1,7 @@
 //! What the calls of one caller may take: how many calls, how many answers that it has not read,
 //! how many streams, and how many wrong join codes.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::{Held, Key, Places, Rate, Refused, Shares};
@@ -58,14 +58,45 @@ pub struct CallLimits {
 /// A call that may be executed. Keeps its places until it is dropped.
 #[derive(Debug)]
 pub struct Admitted {
-    executed: Option<Held>,
+    /// `None` for a stream: it may wait for a long time before it begins.
+    executing: Option<Executing>,
     _kept: Held,
 }
 
 impl Admitted {
+    /// The place of a call that is being executed.
+    pub fn executing(&self) -> Option<&Executing> {
+        self.executing.as_ref()
+    }
+
     /// The answer is ready: others may be executed.
-    pub fn executed(&mut self) {
-        self.executed = None;
+    pub fn executed(&self) {
+        if let Some(executing) = &self.executing {
+            executing.give_back();
+        }
+    }
+}
+
+impl Drop for Admitted {
+    fn drop(&mut self) {
+        self.executed();
+    }
+}
+
+/// The place of a call among those that are executed. The call finds it in the extensions of its
+/// request.
+#[derive(Debug, Clone)]
+pub struct Executing(Arc<Mutex<Option<Held>>>);
+
+impl Executing {
+    fn new(place: Held) -> Self {
+        Self(Arc::new(Mutex::new(Some(place))))
+    }
+
+    /// Lets others be executed, because this call only waits from now on.
+    pub fn give_back(&self) {
+        let place = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        drop(place);
     }
 }
 
@@ -103,14 +134,13 @@ impl CallLimits {
             true => self.streams.try_take(key)?,
             false => self.answers.try_take(key)?,
         };
-        // A stream may wait for a long time before it begins.
-        let executed = match is_stream {
+        let executing = match is_stream {
             true => None,
-            false => Some(self.executed.try_take(key)?),
+            false => Some(Executing::new(self.executed.try_take(key)?)),
         };
         self.calls.charge(key, cost(is_stream));
         Some(Admitted {
-            executed,
+            executing,
             _kept: kept,
         })
     }
@@ -147,7 +177,7 @@ impl CallLimits {
         };
         if is_stream {
             return Ok(Admitted {
-                executed: None,
+                executing: None,
                 _kept: kept,
             });
         }
@@ -158,7 +188,7 @@ impl CallLimits {
             retry_after: MAX_WAIT,
         })?;
         Ok(Admitted {
-            executed: Some(executed),
+            executing: Some(Executing::new(executed)),
             _kept: kept,
         })
     }
@@ -269,7 +299,7 @@ mod tests {
     async fn unread_answers_hold_back_their_caller_alone() {
         let limits = limits();
         let unread: Vec<_> = std::iter::from_fn(|| {
-            let mut admitted = limits.admit_now(key(1), false)?;
+            let admitted = limits.admit_now(key(1), false)?;
             admitted.executed();
             Some(admitted)
         })

@@ -125,7 +125,8 @@ fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
     let replayed = |seat: &v1::Participant| seat.built_in_agent == BuiltInAgent::REPLAY;
     // What is not listed elsewhere does not show here either.
     let is_public = summary.visibility() == v1::Visibility::Unspecified;
-    if !is_public || summary.substituted || summary.seats.iter().any(replayed) {
+    let helped = summary.substituted || summary.hinted;
+    if !is_public || helped || summary.seats.iter().any(replayed) {
         return None;
     }
     let places: BTreeMap<u32, u32> = (summary.standings.iter())

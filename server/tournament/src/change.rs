@@ -177,11 +177,14 @@ impl Game {
     }
 
     /// Whether it counts for ratings: it has a result, and every participant played it without a
-    /// substitute.
+    /// substitute and without hints.
     pub fn is_rated(&self) -> bool {
         self.result().is_some_and(|result| {
             let mut seats = result.seats.iter();
-            seats.all(|seat| !seat.forfeited && !seat.statistics.substituted)
+            seats.all(|seat| {
+                let played = &seat.statistics;
+                !seat.forfeited && !played.substituted && !played.hinted
+            })
         })
     }
 }

@@ -23,6 +23,8 @@ export function serverInfo(): Promise<GetServerInfoResponse> {
 export interface Offered {
   presets: RuleSet[];
   agents: string[];
+  /** Those that play where cards are real, too. */
+  quickAgents: string[];
 }
 
 /** The server's offer for a form, and the error in words; both null while loading. */
@@ -31,7 +33,8 @@ export function useOffered(): { offered: Offered | null; fault: string | null } 
   const [fault, setFault] = useState<string | null>(null);
   useEffect(() => {
     serverInfo().then(
-      ({ presets, builtInAgents }) => setOffered({ presets, agents: builtInAgents }),
+      ({ presets, builtInAgents, quickBuiltInAgents }) =>
+        setOffered({ presets, agents: builtInAgents, quickAgents: quickBuiltInAgents }),
       (error: unknown) => setFault(inWords(error)),
     );
   }, []);

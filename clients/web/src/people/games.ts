@@ -59,7 +59,7 @@ export function ownGame(record: RecordSummary, name: string): OwnGame | undefine
 }
 
 /** Why a game with a result is not rated. */
-export type Unrated = "added" | "notDealt" | "recorded" | "substituted" | "twice";
+export type Unrated = "added" | "hinted" | "notDealt" | "recorded" | "substituted" | "twice";
 
 /** Why a game is not rated, as in docs/ratings.md; null if it is, or was aborted. */
 export function unratedBecause(record: RecordSummary): Unrated | null {
@@ -68,6 +68,7 @@ export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.origin !== GameOrigin.DEALT) return "notDealt";
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
   if (record.substituted) return "substituted";
+  if (record.hinted) return "hinted";
   const participants = record.seats.map(({ kind, name, builtInAgent }) => {
     return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name}`;
   });

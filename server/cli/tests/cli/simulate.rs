@@ -149,6 +149,21 @@ fn mistakes_are_explained() {
 }
 
 #[test]
+fn games_that_cannot_be_repeated_are_not_recorded() {
+    let records = std::env::temp_dir().join("chefshat-never-recorded");
+    let simulated = |agent: &str| {
+        let to = records.display();
+        simulate(&format!(
+            "--games 1 --agents {agent},greedy,greedy,greedy --records {to}"
+        ))
+    };
+    for timed in ["monte_carlo", "monte_carlo:20ms"] {
+        simulated(timed).assert_failed("monte_carlo:64");
+        assert!(!records.exists(), "{timed}");
+    }
+}
+
+#[test]
 fn help_shows_an_example() {
     simulate("--help").assert_helps("chefshat simulate --games 2000 --seed 7");
 }

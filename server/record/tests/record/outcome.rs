@@ -245,6 +245,25 @@ fn games_that_do_not_show_skill_are_not_rated() {
 }
 
 #[test]
+fn a_game_in_which_a_hint_was_given_is_not_rated() {
+    let mut lines = dealt();
+    let decision = last(&mut lines, |line| match line {
+        Line::Decision(decision) => Some(decision),
+        _ => None,
+    });
+    decision.hints = 1;
+    let seat = decision.seat as usize;
+    let played = outcome(&lines).unwrap();
+    assert_eq!(played.unrated, Some(Unrated::Hinted));
+    let hinted = played.seats.iter().map(|it| it.statistics.hinted);
+    assert!(
+        hinted
+            .enumerate()
+            .all(|(own, hinted)| hinted == (own == seat))
+    );
+}
+
+#[test]
 fn unfinished_games_have_no_outcome() {
     let broken = |change: fn(&mut Vec<v1::RecordLine>)| {
         let mut lines = dealt();

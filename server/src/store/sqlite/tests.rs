@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
 use chefshat_proto::v1;
@@ -20,7 +20,9 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore, form};
+use crate::store::tournaments::StoredTournament;
 use crate::store::{Keep, Part, Store, StoredGame};
+use crate::tournaments::restored;
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
@@ -548,4 +550,28 @@ fn fields_added_later_are_read_back() {
     };
     let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
     assert_eq!(shown(&read), shown(&header));
+}
+
+/// The bounds of a search apply to requests alone.
+#[test]
+fn what_was_stored_with_larger_searches_is_read_back() {
+    let agent: NamedAgent = "monte_carlo:60000ms".parse().expect("an agent");
+    crate::convert::check_budget("seats", agent).expect_err("no request may name it");
+    let mut stored = header(1, Durability::Durable);
+    stored.policy.substitute = agent;
+    stored.fills[2] = Fill::BuiltIn(agent);
+    let read = form::header_from_bytes(&form::header_to_bytes(&stored)).expect("readable");
+    assert_eq!(read.policy.substitute, agent);
+    assert_eq!(shown(&read.fills[2]), shown(&stored.fills[2]));
+    let mut cup = tournaments::cup(1);
+    cup.settings.built_in_agents = vec![agent.name(); 2];
+    cup.settings.filler = agent.name();
+    let read = form::tournament_from_bytes(&form::tournament_to_bytes(&cup)).expect("readable");
+    let (plan, _) = restored(&StoredTournament {
+        header: read,
+        rows: 0,
+        entries: Vec::new(),
+    })
+    .expect("it resumes");
+    assert_eq!((plan.built_in, plan.core.filler), (vec![agent; 2], agent));
 }

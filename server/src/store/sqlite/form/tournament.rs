@@ -149,6 +149,8 @@ struct SeatForm {
     timed_decisions: u64,
     #[prost(double, tag = "12")]
     performance_score: f64,
+    #[prost(bool, tag = "13")]
+    hinted: bool,
 }
 
 /// Encodes a header.
@@ -346,6 +348,7 @@ fn seat_to_form(seat: &SeatResult) -> SeatForm {
         decision_time_us: seat.statistics.decision_time_us,
         timed_decisions: seat.statistics.timed_decisions,
         performance_score: seat.statistics.performance_score,
+        hinted: seat.statistics.hinted,
     }
 }
 
@@ -364,6 +367,7 @@ fn seat_from_form(form: SeatForm) -> Result<SeatResult, Unreadable> {
             decision_time_us: form.decision_time_us,
             timed_decisions: form.timed_decisions,
             performance_score: form.performance_score,
+            hinted: form.hinted,
         },
     })
 }

@@ -67,6 +67,7 @@ pub(super) fn every_entry() -> Vec<TournamentEntry> {
             decision_time_us: 7_000_000,
             timed_decisions: 8,
             performance_score: 1.25,
+            hinted: false,
         },
     };
     let forfeited = SeatResult {
@@ -77,6 +78,13 @@ pub(super) fn every_entry() -> Vec<TournamentEntry> {
             substituted: false,
             ..seat.statistics
         },
+    };
+    let hinted = SeatResult {
+        statistics: SeatStatistics {
+            hinted: true,
+            ..forfeited.statistics
+        },
+        ..forfeited
     };
     let change = TournamentEntry::Change;
     vec![
@@ -117,6 +125,13 @@ pub(super) fn every_entry() -> Vec<TournamentEntry> {
         change(Change::Closed),
         // Fields that are newer than the entries above.
         change(Change::Joined(at_table)),
+        change(Change::Counted {
+            game: 2,
+            result: GameResult {
+                shifts: 1,
+                seats: vec![hinted],
+            },
+        }),
     ]
 }
 

@@ -499,7 +499,9 @@ class RoomPolicy(_message.Message):
     the tournament and all its games.
     """
     hints: _builtins.bool
-    """Whether seats may ask for hints (AskHint); by default not. Not at physical tables."""
+    """Whether seats may ask for hints (AskHint); by default not. Not at physical tables. A game in
+    which one was given is not rated.
+    """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
         """Other times for some kinds of participants, each kind at most once. People have the default

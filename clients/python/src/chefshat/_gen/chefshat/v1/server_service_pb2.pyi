@@ -70,6 +70,7 @@ class GetServerInfoResponse(_message.Message):
     OPEN_ROOMS_FIELD_NUMBER: _builtins.int
     SHUTTING_DOWN_FIELD_NUMBER: _builtins.int
     SIGNING_KEY_FIELD_NUMBER: _builtins.int
+    QUICK_BUILT_IN_AGENTS_FIELD_NUMBER: _builtins.int
     server_version: _builtins.str
     """Version of the server."""
     rules_version: _builtins.int
@@ -88,12 +89,18 @@ class GetServerInfoResponse(_message.Message):
 
     @_builtins.property
     def built_in_agents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """Names of the built-in agents."""
+        """Names of the built-in agents of rooms and tournaments."""
 
     @_builtins.property
     def limits(self) -> _containers.ScalarMap[_builtins.str, _builtins.int]:
         """Limits by name: max_rooms, max_seats_per_stream, max_message_bytes, max_spectators_per_room,
         max_shifts, max_analyses (running or waiting), max_analysis_rollouts, max_analysis_ms, ...
+        """
+
+    @_builtins.property
+    def quick_built_in_agents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
+        """Those built-in agents that need no search: batches of games (VectorService), the rollouts of
+        analyses and tables with real cards take only these.
         """
 
     def __init__(
@@ -107,10 +114,11 @@ class GetServerInfoResponse(_message.Message):
         open_rooms: _builtins.int = ...,
         shutting_down: _builtins.bool = ...,
         signing_key: _builtins.str = ...,
+        quick_built_in_agents: _abc.Iterable[_builtins.str] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "limits", b"limits", "open_rooms", b"open_rooms", "presets", b"presets", "rules_version", b"rules_version", "server_version", b"server_version", "shutting_down", b"shutting_down", "signing_key", b"signing_key"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "limits", b"limits", "open_rooms", b"open_rooms", "presets", b"presets", "quick_built_in_agents", b"quick_built_in_agents", "rules_version", b"rules_version", "server_version", b"server_version", "shutting_down", b"shutting_down", "signing_key", b"signing_key"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

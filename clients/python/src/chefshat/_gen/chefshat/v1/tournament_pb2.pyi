@@ -457,7 +457,9 @@ class TournamentGame(_message.Message):
     independent deals.
     """
     rated: _builtins.bool
-    """Whether it counts for ratings: no forfeits, no substitutes, and deals chosen by the server."""
+    """Whether it counts for ratings: no forfeits, no substitutes, no hints, and deals chosen by
+    the server.
+    """
     shifts: _builtins.int
     """Number of Shifts, once it is counted."""
     physical: _builtins.bool

@@ -208,8 +208,8 @@ class TournamentServiceServicer(object):
     def GetLeaderboard(self, request, context):
         """Returns all who have played a rated game on this server, best first. A game is rated if it
         finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes. Names are not protected: participants choose them. The games of the
-        last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+        played all seats without substitutes and without hints. Names are not protected: participants
+        choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

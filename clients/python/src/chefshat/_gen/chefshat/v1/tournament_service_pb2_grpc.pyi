@@ -96,8 +96,8 @@ class TournamentServiceStub:
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
     finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes. Names are not protected: participants choose them. The games of the
-    last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+    played all seats without substitutes and without hints. Names are not protected: participants
+    choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 @_typing.type_check_only
@@ -168,8 +168,8 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
     finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes. Names are not protected: participants choose them. The games of the
-    last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+    played all seats without substitutes and without hints. Names are not protected: participants
+    choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -309,8 +309,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
         """Returns all who have played a rated game on this server, best first. A game is rated if it
         finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes. Names are not protected: participants choose them. The games of the
-        last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+        played all seats without substitutes and without hints. Names are not protected: participants
+        choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
         """
 
 def add_TournamentServiceServicer_to_server(servicer: TournamentServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
