@@ -27,6 +27,11 @@ export interface Offered {
   quickAgents: string[];
 }
 
+/** The agents to choose from; with real cards those that do not search, and the one that is chosen already. */
+export function agentsFor({ agents, quickAgents }: Offered, real: boolean, chosen: string): string[] {
+  return agents.filter((agent) => !real || quickAgents.includes(agent) || agent === chosen);
+}
+
 /** The server's offer for a form, and the error in words; both null while loading. */
 export function useOffered(): { offered: Offered | null; fault: string | null } {
   const [offered, setOffered] = useState<Offered | null>(null);

@@ -1,7 +1,7 @@
 // The page that creates a room: who plays, by which rules, how fast, what happens to late answers,
 // who may watch. The form's fields are in room-form.ts.
 
-import type { Offered } from "../api/server";
+import { agentsFor, type Offered } from "../api/server";
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
 import { navigate } from "../router";
@@ -46,7 +46,7 @@ function RoomFormView({ offered }: { offered: Offered }) {
       <h3>{words.rules}</h3>
       <RuleFields {...parts} players={form.seats.length} presets={offered.presets} />
       <h3>{words.faults}</h3>
-      <FaultFields {...parts} agents={offered.agents}>
+      <FaultFields {...parts} agents={agentsFor(offered, form.cards === "real", form.substitute)}>
         <SelectField
           label={words.fault.abort}
           value={form.abort}

@@ -1,7 +1,7 @@
 // The page that creates a tournament. The form's values are in tournament-form.ts; the fields of
 // every game are shared with new rooms (lobby/GameFields.tsx).
 
-import type { Offered } from "../api/server";
+import { agentsFor, type Offered } from "../api/server";
 import { t } from "../i18n";
 import { FormFrame, FormPage, FormPart } from "../lobby/FormPage";
 import formCss from "../lobby/FormPage.module.css";
@@ -107,6 +107,7 @@ function Folded(props: FormProps & { offered: Offered }) {
   const { form, change, offered } = props;
   const words = t().organise;
   const rooms = t().lobby.make;
+  const real = Number(form.physicalTables) > 0;
   const deals: TournamentForm["deals"][] = ["independent", "same", "rotated"];
   return (
     <>
@@ -120,12 +121,12 @@ function Folded(props: FormProps & { offered: Offered }) {
       <h3>{rooms.rules}</h3>
       <RuleFields {...props} players={Number(form.players)} presets={offered.presets} />
       <h3>{rooms.faults}</h3>
-      <FaultFields {...props} agents={offered.agents}>
+      <FaultFields {...props} agents={agentsFor(offered, real, form.substitute)}>
         <SelectField
           label={words.filler}
           hint={words.fillerHint}
           value={form.filler}
-          options={offered.agents.map((value) => ({ value, label: value }))}
+          options={agentsFor(offered, real, form.filler).map((value) => ({ value, label: value }))}
           onPick={(filler) => change({ filler })}
         />
         <Typed {...props} name="maxCalls" label={words.maxCalls} hint={words.maxCallsHint} />

@@ -89,6 +89,7 @@ fn a_standing_adds_up_the_games() {
             place: seat + 1,
             points: 20 - seat as u64,
             substituted: seat == 0,
+            hinted: false,
             decisions: 30,
             wrong_actions: 2,
             timeouts: 1,
