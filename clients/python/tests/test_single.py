@@ -19,11 +19,13 @@ from chefshat.envs.single import SingleRow
 @pytest.mark.parametrize("rules", [None, {"players": 2, "faces": 4}, {"players": 6, "faces": 12, "jokers": 1}])
 def test_rows_are_those_of_the_columns(rules: Any) -> None:
     kinds = ends = 0
+    # Special actions, which only the default game is searched for, are rare.
+    steps = 500 if rules is None else 250
     for seat in (0, 1):
         with VectorEnv(rules=rules, seed=6, rewards="winning", client_seats=[seat], invalid="ask_again") as env:
             chance = np.random.default_rng(seat)
             readers: dict[type[Table], SingleRow] = {}
-            for _ in range(500):
+            for _ in range(steps):
                 action = env.sample() if chance.random() < 0.9 else chance.integers(0, env.num_actions, 1)
                 batch = env.step(action)
                 for table in (batch, batch.endings):
