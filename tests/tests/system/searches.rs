@@ -45,6 +45,30 @@ async fn agents_search_in_rooms_and_records_name_their_budgets() {
     server.stop().await;
 }
 
+#[tokio::test]
+async fn agents_play_what_they_find_and_records_say_where_they_did_not_search() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let played = async |agent| {
+        let game = ended(&client, request([agent; 4])).await;
+        let decisions = game.decisions().into_iter();
+        let notes: Vec<String> = decisions
+            .filter_map(|it| it.annotations.as_ref()?.extra.get("search").cloned())
+            .collect();
+        (game.course(), notes)
+    };
+    let (trained, notes) = played("trained").await;
+    assert!(notes.is_empty());
+    // Too few rollouts to show a gain.
+    let (hasty, notes) = played("monte_carlo:1:random").await;
+    assert_eq!(hasty, trained);
+    assert!(notes.len() > 10 && notes.iter().all(|note| note == "too_few_deals"));
+    let (searching, notes) = played("monte_carlo:1000:random").await;
+    assert_ne!(searching, trained);
+    assert!(notes.is_empty(), "{notes:?}");
+    server.stop().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_game_of_agents_that_search_resumes_after_sigkill() {
     let folder = tempfile::tempdir().expect("a temporary folder");
