@@ -36,9 +36,11 @@ pub const MAX_VECTOR_STREAMS: usize = 128;
 /// default share of one caller is as many as one stream may have.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 163_840;
 /// Most game seeds in one message.
-pub const MAX_VECTOR_SEEDS: usize = Limits::DEFAULT.seeds;
+pub const MAX_VECTOR_SEEDS: usize = Limits::OF_SERVER.seeds;
 /// Most games of a vector stream with records.
-pub const MAX_VECTOR_RECORDED_GAMES: u32 = Limits::DEFAULT.recorded_games;
+pub const MAX_VECTOR_RECORDED_GAMES: u32 = Limits::OF_SERVER.recorded_games;
+/// Most multiplications for a decision of a network file of a vector stream.
+pub const MAX_VECTOR_NETWORK_MULTIPLICATIONS: u64 = Limits::OF_SERVER.network_multiplications;
 /// How long a client may take to send the setup of a vector stream.
 pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long a client may think about a batch.
@@ -113,7 +115,7 @@ pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and highest target in points.
-pub const MAX_HOSTED_SHIFTS: u32 = Limits::DEFAULT.recorded_shifts;
+pub const MAX_HOSTED_SHIFTS: u32 = Limits::OF_SERVER.recorded_shifts;
 /// Interval of heartbeats on an idle Watch stream.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 

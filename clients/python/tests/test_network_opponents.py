@@ -1,5 +1,6 @@
 """Network files as opponents, in this process and on the real server."""
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +44,12 @@ def test_files_mix_with_names_and_functions(anywhere: str | None) -> None:
     def first(batch: Batch) -> Any:
         return batch.masks.argmax(axis=1)
 
+    def name(file: Path) -> str:
+        return "network:" + hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+
     cases: list[tuple[list[Any], tuple[str, ...]]] = [
-        ([OTHER, "greedy", TRAINED], ("", "network", "greedy", "network")),
-        ([OTHER, first, "greedy"], ("", "network", "", "greedy")),
+        ([OTHER, "greedy", TRAINED], ("", name(OTHER), "greedy", name(TRAINED))),
+        ([OTHER, first, "greedy"], ("", name(OTHER), "", "greedy")),
     ]
     for opponents, names in cases:
         with VectorEnv(anywhere, 3, client_seats=[0], opponents=opponents, seed=1) as env:

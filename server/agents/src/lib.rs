@@ -9,6 +9,7 @@ mod participant;
 mod play;
 mod recorded;
 mod seeds;
+mod text;
 
 pub use built_in::{AgentKind, AgentMaker, BuiltInAgent, Following};
 pub use named::{AgentNameError, Budget, MonteCarlo, MonteCarloError, NamedAgent};
@@ -20,3 +21,4 @@ pub use participant::ParticipantKind;
 pub use play::{Answer, Listener, ask, is_wrong_action, play, play_agents};
 pub use recorded::{MAX_MODELS, RecordedPlayer};
 pub use seeds::{agent_seed, game_seed, seating_agent_seed};
+pub use text::shortened;

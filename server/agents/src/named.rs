@@ -8,6 +8,7 @@ use std::time::Duration;
 use thiserror::Error;
 
 use crate::AgentKind;
+use crate::text::shortened;
 
 /// The most rollouts of a decision.
 const MAX_ROLLOUTS: u64 = 1_000_000;
@@ -96,7 +97,7 @@ impl FromStr for NamedAgent {
         }
         AgentKind::from_name(text)
             .map(Self::Kind)
-            .ok_or_else(|| AgentNameError::Unknown(text.to_owned()))
+            .ok_or_else(|| AgentNameError::Unknown(shortened(text)))
     }
 }
 
@@ -171,7 +172,7 @@ impl FromStr for MonteCarlo {
             (agent.budget, agent.rollouts) = (budget, policy);
             return Ok(agent);
         }
-        Err(MonteCarloError(text.to_owned()))
+        Err(MonteCarloError(shortened(text)))
     }
 }
 

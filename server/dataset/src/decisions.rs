@@ -186,7 +186,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "built_in_agent",
         Type::Text,
-        "Name of the built-in agent; null for other players, and where `agent` is.",
+        "Name of the built-in agent; for a network file `network:` and the first 16 hexadecimal digits of the SHA-256 of the file; null for other players, and where `agent` is.",
         |row| {
             row.player()
                 .and_then(|player| player.built_in.as_ref())

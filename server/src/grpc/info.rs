@@ -15,8 +15,9 @@ use super::status::field;
 use crate::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_HOSTED_SHIFTS,
     MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION,
-    MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES, MAX_VECTOR_RECORDED_GAMES,
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
+    MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
+    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL,
+    MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
 };
 use crate::convert;
 use crate::limits::CallLimits;
@@ -49,6 +50,10 @@ impl Info {
             (
                 "max_vector_recorded_games",
                 MAX_VECTOR_RECORDED_GAMES as usize,
+            ),
+            (
+                "max_vector_network_multiplications",
+                usize::try_from(MAX_VECTOR_NETWORK_MULTIPLICATIONS).unwrap_or(usize::MAX),
             ),
             ("max_analyses", MAX_ANALYSES),
             ("max_seats_per_stream", MAX_SEATS_PER_STREAM),

@@ -224,7 +224,7 @@ impl Runner {
             Some(Some(RequestKind::Save(message))) => return Ok(Some(Command::Save(message))),
             Some(Some(RequestKind::Actions(message))) => VectorRequest::actions(&message),
             Some(Some(RequestKind::Reset(message))) => {
-                VectorRequest::reset(&message, &Limits::DEFAULT)
+                VectorRequest::reset(&message, &Limits::OF_SERVER)
             }
             Some(Some(RequestKind::Restore(message))) => Ok(VectorRequest::Restore(message)),
             Some(Some(RequestKind::Setup(_))) => {
@@ -273,7 +273,8 @@ impl Runner {
     /// Checks a setup message and reads the recorded game it names.
     async fn setup(&self, message: v1::VectorSetup) -> Result<VectorSetup, Status> {
         let drawn = || u64::from_le_bytes(random_bytes());
-        let seeds = seeds_from_setup(&message, &Limits::DEFAULT, drawn).map_err(vector_refused)?;
+        let seeds =
+            seeds_from_setup(&message, &Limits::OF_SERVER, drawn).map_err(vector_refused)?;
         let branch = match &message.start {
             Some(vector_setup::Start::Branch(point)) => {
                 Some(self.point(point, message.rules.as_ref()).await?)
@@ -287,7 +288,7 @@ impl Runner {
                 branch => branch,
             };
             let (rules, start) = start.ok_or_else(internal)?;
-            setup_from_proto(&message, rules, start, seeds, &Limits::DEFAULT)
+            setup_from_proto(&message, rules, start, seeds, &Limits::OF_SERVER)
                 .map_err(vector_refused)
         };
         self.run_on_pool(read).await?

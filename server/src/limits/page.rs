@@ -8,8 +8,9 @@ use super::{background, calls, frames};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
     MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_SEARCH_BUDGET,
-    MAX_SEARCH_ROLLOUTS, MAX_TOURNAMENTS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
-    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
+    MAX_SEARCH_ROLLOUTS, MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
+    VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
 use crate::room::MAX_SPECTATORS;
@@ -211,6 +212,10 @@ fn of_each() -> String {
         (
             "time until the setup of a vector stream",
             seconds(VECTOR_SETUP_TIMEOUT),
+        ),
+        (
+            "multiplications for a decision of a network file in vector games",
+            number(MAX_VECTOR_NETWORK_MULTIPLICATIONS),
         ),
     ];
     table(

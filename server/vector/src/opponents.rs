@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use chefshat_agents::{AgentKind, NamedAgent, Network};
+use chefshat_agents::{AgentKind, NamedAgent, Network, shortened};
 use chefshat_engine::{RuleSet, Seat};
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, seat_from_number};
@@ -88,28 +88,37 @@ fn opponent(name: &str, networks: usize) -> Result<Named, FieldProblem> {
     let number = number.parse().ok().filter(|number| *number < networks);
     number.map(Named::Network).ok_or_else(|| {
         let words = format!(
-            "{name:?} is not one of the {networks} network files: the first of `networks` is network:0"
+            "{:?} is not one of the {networks} network files: the first of `networks` is network:0",
+            shortened(name)
         );
         FieldProblem::new("opponents", words)
     })
 }
 
-/// Has network files play their seats.
+/// Has network files play their seats. A decision takes at most `most` multiplications.
 pub(crate) fn with_networks(
     mut setup: VectorSetup,
     files: &[v1::NetworkFile],
     agents: &[Option<Named>],
+    most: u64,
 ) -> Result<VectorSetup, FieldProblem> {
     for (number, file) in files.iter().enumerate() {
         let refused = |error: &dyn std::fmt::Display| {
             let name = match &*file.name {
                 "" => format!("file {number}"),
-                name => name.to_owned(),
+                name => shortened(name),
             };
             FieldProblem::new("networks", format!("{name}: {error}"))
         };
         let network = Network::from_bytes(&file.content).map_err(|error| refused(&error))?;
         let network = Arc::new(network);
+        let cost = network.multiplications();
+        if cost > most {
+            let words = format!(
+                "a decision takes {cost} multiplications, where the units of each hidden layer count up to the next multiple of 32; a server takes at most {most}: use a smaller network, or play in process"
+            );
+            return Err(refused(&words));
+        }
         if !agents.contains(&Some(Named::Network(number))) {
             let words = format!("no seat has it: name it in `opponents` as network:{number}");
             return Err(refused(&words));
@@ -144,13 +153,17 @@ pub(crate) fn agent_from_proto(
         let known = AgentKind::ALL.map(AgentKind::name).join(", ");
         FieldProblem::new(
             field,
-            format!("{name:?} is not a built-in agent; use one of {known}"),
+            format!(
+                "{:?} is not a built-in agent; use one of {known}",
+                shortened(name)
+            ),
         )
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use chefshat_agents::Network;
     use chefshat_proto::v1;
     use chefshat_simulation::vector::Seeds;
 
@@ -172,7 +185,8 @@ mod tests {
                 ..v1::VectorSetup::default()
             };
             let (rules, start) = start_from_proto(&message).unwrap().unwrap();
-            let setup = setup_from_proto(&message, rules, start, Seeds::Base(0), &Limits::DEFAULT);
+            let setup =
+                setup_from_proto(&message, rules, start, Seeds::Base(0), &Limits::OF_SERVER);
             match setup {
                 Ok(setup) => {
                     assert_eq!(started_to_proto(&setup).built_in_agents.join(","), expected)
@@ -181,9 +195,10 @@ mod tests {
             }
         };
         let good = "table-actions";
-        check(&["network:0"], &[good], ",network,network,network");
+        let name = "network:abba48c4b1cdae5c";
+        check(&["network:0"], &[good], &format!(",{name},{name},{name}"));
         let mixed = ["greedy", "network:1", "network:0"];
-        check(&mixed, &[good, good], ",greedy,network,network");
+        check(&mixed, &[good, good], &format!(",greedy,{name},{name}"));
         check(
             &["network:1"],
             &[good],
@@ -210,5 +225,55 @@ mod tests {
             &[good; 4],
             "networks: 4 files for 3 other seats",
         );
+        let long = "x".repeat(1 << 20);
+        check(
+            &["network:0"],
+            &[&long],
+            &format!("networks: {}: not a safetensors file", &long[..100]),
+        );
+        for name in [
+            long.clone(),
+            format!("network:{long}"),
+            format!("monte_carlo{long}"),
+        ] {
+            check(&[&name], &[], &format!("{:?} is not ", &name[..100]));
+        }
+    }
+
+    #[test]
+    fn networks_that_decide_slowly_play_only_in_process() {
+        let file = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/fixtures/network/table-actions.safetensors"
+        );
+        let message = v1::VectorSetup {
+            games: 1,
+            client_seats: vec![0],
+            opponents: vec!["network:0".to_owned()],
+            networks: vec![v1::NetworkFile {
+                name: "mine".to_owned(),
+                content: std::fs::read(file).unwrap(),
+            }],
+            ..v1::VectorSetup::default()
+        };
+        let cost = Network::from_bytes(&message.networks[0].content)
+            .unwrap()
+            .multiplications();
+        let with = |most| {
+            let limits = Limits {
+                network_multiplications: most,
+                ..Limits::OF_SERVER
+            };
+            let (rules, start) = start_from_proto(&message).unwrap().unwrap();
+            setup_from_proto(&message, rules, start, Seeds::Base(0), &limits)
+        };
+        assert!(with(cost).is_ok());
+        let error = with(cost - 1).unwrap_err();
+        assert_eq!(error.reason, "SETUP_REFUSED");
+        let expected = format!("networks: mine: a decision takes {cost} multiplications");
+        assert!(error.message.starts_with(&expected), "{}", error.message);
+        // `trained` and what is several times as large are accepted.
+        let trained = Network::trained().multiplications();
+        assert!(4 * trained < Limits::OF_SERVER.network_multiplications);
     }
 }

@@ -1,7 +1,7 @@
 //! Records of finished games, in parts of bounded size.
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::RewardScheme;
+use chefshat_engine::{BySeat, RewardScheme};
 use chefshat_proto::v1;
 use chefshat_record::convert::{Played, reward_scheme_to_proto};
 use chefshat_simulation::vector::{InvalidActions, Opponent, PlayedGame, VectorSetup};
@@ -43,10 +43,13 @@ pub fn record_lines(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::RecordL
         InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
         InvalidActions::Error => None,
     };
+    let names: Vec<_> = (setup.agents().values())
+        .map(|agent| agent.map(Opponent::name))
+        .collect();
     let record = Played {
         by: "vector",
         rules: setup.rules(),
-        agents: &setup.agents().map(|agent| agent.map(Opponent::name)),
+        agents: &BySeat::from_fn(names.len(), |seat| names[seat.index()].as_deref()),
         seed: played.seed,
         scheme: setup.scheme(),
         policy: &simulation_policy(limit, setup.scheme()),
@@ -75,4 +78,54 @@ pub fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorR
     let last = parts.last_mut().expect("there is a first part");
     last.last = true;
     parts
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use chefshat_agents::Network;
+    use chefshat_engine::{RuleSetSpec, Seat, Stop};
+    use chefshat_proto::v1::record_line::Line;
+    use chefshat_record::outcome::Identity;
+    use chefshat_record::replay::replay;
+    use chefshat_simulation::vector::{Seeds, VectorGames};
+
+    use crate::record::*;
+
+    #[test]
+    fn records_say_which_network_played() {
+        let rules = RuleSetSpec {
+            stop: Stop::Shifts(2),
+            ..RuleSetSpec::default()
+        };
+        let greedy = Some(AgentKind::Greedy);
+        let agents = [None, greedy, greedy, greedy];
+        let mut setup =
+            VectorSetup::new(rules.validate().unwrap(), 1, &agents, Seeds::Base(1)).unwrap();
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/network/");
+        let file = std::fs::read(format!("{folder}table-actions.safetensors")).unwrap();
+        let other = Arc::new(Network::from_bytes(&file).unwrap());
+        for (seat, network) in [(1, &other), (2, Network::trained())] {
+            let network = Arc::clone(network);
+            setup = setup.with_network(Seat::new(seat), network).unwrap();
+        }
+        let (mut games, mut batch) = VectorGames::new(setup.with_records(true));
+        while batch.played.is_empty() {
+            let mut actions = Vec::new();
+            games.sample(1, 0, |action| actions.push(action));
+            batch = games.step(&actions).unwrap();
+        }
+        let lines = record_lines(games.setup(), &batch.played[0]);
+        assert!(replay(&lines).is_ok());
+        let Some(Line::Header(header)) = &lines[0].line else {
+            panic!("a record begins with its header");
+        };
+        let players: Vec<_> = header.seats.iter().map(Identity::of).collect();
+        // The beginning of the SHA-256 of the file.
+        assert_eq!(players[1].name, "network:abba48c4b1cdae5c");
+        assert!(players[2].name.starts_with("network:") && players[2] != players[1]);
+        assert_eq!(header.seats[1].name, players[1].name);
+        assert_eq!(players[3].name, "greedy");
+    }
 }

@@ -26,14 +26,22 @@ pub struct Limits {
     pub recorded_games: u32,
     /// Most points or Shifts of a game with a record.
     pub recorded_shifts: u32,
+    /// Most multiplications for a decision of a network file.
+    pub network_multiplications: u64,
 }
 
 impl Limits {
-    /// Those of a server and of games in process: a setup that one accepts, the other does.
-    pub const DEFAULT: Limits = Limits {
+    /// Those of games in process.
+    pub const IN_PROCESS: Limits = Limits {
         seeds: 16_384,
         recorded_games: 256,
         recorded_shifts: 1_000,
+        network_multiplications: u64::MAX,
+    };
+    /// Those of a server: the same, except for networks, whose clients share its processors.
+    pub const OF_SERVER: Limits = Limits {
+        network_multiplications: 1 << 20,
+        ..Limits::IN_PROCESS
     };
 }
 
@@ -156,28 +164,33 @@ fn read(
         .map(|agent| agent.map(Named::built_in))
         .collect();
     let setup = VectorSetup::new(rules, message.games, &built_in, seeds).map_err(problem)?;
-    let setup = with_networks(setup, &message.networks, &agents)?
-        .with_rewards(
-            v1::RewardScheme::try_from(message.reward_scheme)
-                .map(reward_scheme_from_proto)
-                .map_err(|_| FieldProblem::unknown("reward_scheme", message.reward_scheme))?,
-        )
-        .with_episode(match v1::EpisodeScope::try_from(message.episode) {
-            Ok(v1::EpisodeScope::Unspecified | v1::EpisodeScope::Shift) => Episode::Shift,
-            Ok(v1::EpisodeScope::Game) => Episode::Game,
-            Err(_) => return Err(FieldProblem::unknown("episode", message.episode)),
-        })
-        .with_decisions(decisions(message)?)
-        .with_skip_forced(message.skip_forced)
-        .with_invalid_actions(invalid)
-        .with_total_games(NonZeroU64::new(message.total_games))
-        .map_err(problem)?
-        .with_statistics(message.shift_statistics)
-        .with_records(message.records)
-        .with_history(u16::try_from(message.history).unwrap_or(u16::MAX))
-        .map_err(problem)?
-        .with_start(start)
-        .map_err(problem)?;
+    let setup = with_networks(
+        setup,
+        &message.networks,
+        &agents,
+        limits.network_multiplications,
+    )?
+    .with_rewards(
+        v1::RewardScheme::try_from(message.reward_scheme)
+            .map(reward_scheme_from_proto)
+            .map_err(|_| FieldProblem::unknown("reward_scheme", message.reward_scheme))?,
+    )
+    .with_episode(match v1::EpisodeScope::try_from(message.episode) {
+        Ok(v1::EpisodeScope::Unspecified | v1::EpisodeScope::Shift) => Episode::Shift,
+        Ok(v1::EpisodeScope::Game) => Episode::Game,
+        Err(_) => return Err(FieldProblem::unknown("episode", message.episode)),
+    })
+    .with_decisions(decisions(message)?)
+    .with_skip_forced(message.skip_forced)
+    .with_invalid_actions(invalid)
+    .with_total_games(NonZeroU64::new(message.total_games))
+    .map_err(problem)?
+    .with_statistics(message.shift_statistics)
+    .with_records(message.records)
+    .with_history(u16::try_from(message.history).unwrap_or(u16::MAX))
+    .map_err(problem)?
+    .with_start(start)
+    .map_err(problem)?;
     if message.records {
         check_records(&setup, dealt, limits)?;
     }
@@ -193,7 +206,7 @@ pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
         hand_size: rules.hand_size().into(),
         client_seats: setup.client_seats().map(seat_number).collect(),
         built_in_agents: (setup.agents().values())
-            .map(|agent| agent.map_or("", Opponent::name).to_owned())
+            .map(|agent| agent.map(Opponent::name).unwrap_or_default().into_owned())
             .collect(),
         base_seed: match setup.seeds() {
             Seeds::Base(base) => Some(*base),
@@ -321,7 +334,7 @@ mod tests {
             })),
             ..v1::VectorSetup::default()
         };
-        let read = |seeds| seeds_from_setup(&setup(seeds), &Limits::DEFAULT, || 0);
+        let read = |seeds| seeds_from_setup(&setup(seeds), &Limits::OF_SERVER, || 0);
         assert!(read(16_384).is_ok());
         let error = read(16_385).unwrap_err();
         assert_eq!(error.reason, "SEED_REFUSED");

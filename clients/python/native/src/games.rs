@@ -58,9 +58,9 @@ impl Games {
         let pool = pool(threads);
         let begun = py.detach(|| {
             caught(|| {
-                let seeds = seeds_from_setup(&message, &Limits::DEFAULT, random_seed)?;
+                let seeds = seeds_from_setup(&message, &Limits::IN_PROCESS, random_seed)?;
                 let (rules, start) = start_from_proto(&message)?.ok_or_else(no_records_here)?;
-                let setup = setup_from_proto(&message, rules, start, seeds, &Limits::DEFAULT)?;
+                let setup = setup_from_proto(&message, rules, start, seeds, &Limits::IN_PROCESS)?;
                 let started = started_to_proto(&setup).encode_to_vec();
                 let (games, mut columns) = VectorGames::on(setup, pool);
                 let records = records(&games, &mut columns);
@@ -122,7 +122,7 @@ impl Games {
     fn reset(&self, py: Python<'_>, reset: &[u8]) -> PyResult<Batch> {
         let message = decode::<v1::VectorReset>("reset", reset)?;
         let request =
-            Request::reset(&message, &Limits::DEFAULT).map_err(|error| refused(py, error))?;
+            Request::reset(&message, &Limits::IN_PROCESS).map_err(|error| refused(py, error))?;
         self.execute(py, request, false)
     }
 

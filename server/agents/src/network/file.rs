@@ -16,6 +16,7 @@ use thiserror::Error;
 
 use super::layers::{Hidden, Output};
 use super::{Network, NetworkId, NetworkInfo, NetworkInput, NetworkOutput};
+use crate::text::shortened;
 
 /// The format, as named in the metadata.
 const FORMAT: &str = "chefshat-network-1";
@@ -297,11 +298,6 @@ fn number(texts: &BTreeMap<&str, &str>, key: &'static str) -> Result<u8, Network
             format!("{:?} is not a number from 0 to 255", shortened(text)),
         )
     })
-}
-
-/// The beginning of a text, for a message.
-fn shortened(text: &str) -> String {
-    text.chars().take(60).collect()
 }
 
 fn metadata(key: &'static str, problem: impl Into<String>) -> NetworkError {

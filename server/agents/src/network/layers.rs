@@ -53,6 +53,11 @@ impl Hidden {
         self.bias.as_flattened().len()
     }
 
+    /// Number of weights, with those of units that are always 0.
+    pub(super) fn weights(&self) -> usize {
+        self.weights.as_flattened().len()
+    }
+
     /// Computes the units' values for each row into `out`, replacing its content.
     ///
     /// # Panics
@@ -143,6 +148,11 @@ impl Output {
     /// Number of inputs.
     pub(super) fn inputs(&self) -> usize {
         self.weights.len() / self.bias.len()
+    }
+
+    /// Number of weights.
+    pub(super) fn weights(&self) -> usize {
+        self.weights.len()
     }
 
     /// Calls `found` with each row's number, and the index and value of each of its `wanted`

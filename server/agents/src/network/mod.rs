@@ -101,6 +101,13 @@ impl Network {
         &self.info
     }
 
+    /// The most multiplications for a decision: all weights, where the units of each hidden layer
+    /// are counted up to the next multiple of 32.
+    pub fn multiplications(&self) -> u64 {
+        let hidden: usize = self.hidden.iter().map(Hidden::weights).sum();
+        (hidden + self.output.weights()) as u64
+    }
+
     /// Whether it was trained for as many players, faces and cards dealt, whatever the jokers. In
     /// other games it plays as `greedy`.
     pub fn fits(&self, rules: &RuleSet) -> bool {

@@ -18,16 +18,19 @@ const SLOW_BLOCK: usize = 32;
 /// Fewest games that are worth several threads, if their agents decide fast.
 const MANY: usize = 256;
 /// Maximum number of decisions and invalid attempts of built-in agents within one step, over all
-/// games: about a second. Games not advanced have no row and continue with the next step.
+/// games: a few seconds of one thread at most. A decision of a network counts as several.
+/// Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
 
 /// Runs `work` for every game, advances those for which it returns true, and writes the rows.
-/// `waiting` has the buffers of the blocks.
+/// `waiting` has the buffers of the blocks. `step` is the number of the step: each begins with another
+/// game of each block, so that all advance, even if the limit is reached in every step.
 pub(super) fn run(
     slots: &mut [Slot],
     setup: &VectorSetup,
     pool: Option<&Arc<ThreadPool>>,
     waiting: &mut Vec<Waiting>,
+    step: u64,
     work: impl Fn(&mut Slot, &mut Part) -> bool + Sync,
 ) -> Part {
     let games = slots.len();
@@ -43,7 +46,9 @@ pub(super) fn run(
         // The others are appended to the first.
         let rows = if number == 0 { games } else { slots.len() };
         let mut part = Part::new(setup, rows, budget);
-        for (place, slot) in slots.iter_mut().enumerate() {
+        let first = (step % slots.len() as u64) as usize;
+        for place in (first..slots.len()).chain(0..first) {
+            let slot = &mut slots[place];
             if work(slot, &mut part) {
                 slot.advance(place, setup, &mut part, waiting);
             }

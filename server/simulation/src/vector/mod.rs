@@ -136,8 +136,8 @@ impl VectorGames {
         }
         let (setup, open) = (&self.setup, std::mem::take(&mut self.open));
         let every_game = open.len() == self.slots.len();
-        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
+        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
             let game = slot.number();
             let row = match every_game {
                 true => Some(game as usize),
@@ -254,8 +254,8 @@ impl VectorGames {
     /// Restarts some games, in ascending order, with their next indices.
     fn begin_some(&mut self, games: &[u32]) -> Batch {
         let setup = &self.setup;
-        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
+        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
             let begins = games.binary_search(&slot.number()).is_ok();
             if begins {
                 slot.begin_next(setup, part);
@@ -269,8 +269,8 @@ impl VectorGames {
         let setup = &self.setup;
         self.slots.clear();
         self.slots.extend((0..setup.games()).map(Slot::new));
-        let (pool, waiting) = (self.pool.as_ref(), &mut self.waiting);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, |slot, part| {
+        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
             slot.begin(setup, part);
             true
         });

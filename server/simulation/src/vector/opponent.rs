@@ -1,7 +1,7 @@
 //! Who plays the seats that the client does not.
 
+use std::borrow::Cow;
 use std::fmt;
-use std::fmt::Write as _;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, NetworkId};
 
@@ -15,11 +15,12 @@ pub enum Opponent {
 }
 
 impl Opponent {
-    /// The name in messages and records.
-    pub fn name(self) -> &'static str {
+    /// The name in messages and records; that of a network has the first 16 hexadecimal digits of
+    /// its id.
+    pub fn name(self) -> Cow<'static, str> {
         match self {
-            Opponent::BuiltIn(kind) => kind.name(),
-            Opponent::Network(_) => BuiltInAgent::NETWORK,
+            Opponent::BuiltIn(kind) => kind.name().into(),
+            Opponent::Network(id) => network_name(&id.0[..8]).into(),
         }
     }
 
@@ -34,14 +35,16 @@ impl Opponent {
     }
 }
 
-/// Unlike the name, it identifies a network.
+fn network_name(id: &[u8]) -> String {
+    format!("{}:{}", BuiltInAgent::NETWORK, hex::encode(id))
+}
+
+/// As the name, with the complete id of a network.
 impl fmt::Display for Opponent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())?;
-        if let Opponent::Network(id) = self {
-            f.write_char(':')?;
-            f.write_str(&hex::encode(id.0))?;
+        match self {
+            Opponent::BuiltIn(kind) => f.write_str(kind.name()),
+            Opponent::Network(id) => f.write_str(&network_name(&id.0)),
         }
-        Ok(())
     }
 }

@@ -1,9 +1,18 @@
 //! What happens in some of the games within a step. `slot` adds to it, `blocks` puts parts together.
 
+use chefshat_agents::Network;
 use chefshat_engine::{Mask, Seat};
 
 use super::columns::{Batch, Totals};
 use super::setup::VectorSetup;
+
+/// Multiplications of a network that take about as long as a decision of another agent.
+const MULTIPLICATIONS: u64 = 1024;
+
+/// What a decision of a network takes from the budget, besides 1.
+pub(super) fn cost_of(network: &Network) -> u64 {
+    network.multiplications() / MULTIPLICATIONS
+}
 
 /// An open decision of the client.
 #[derive(Debug)]
@@ -19,7 +28,8 @@ pub(super) struct Part {
     pub(super) batch: Batch,
     /// Counts of this step.
     pub(super) totals: Totals,
-    /// Decisions and attempts that built-in agents may still make.
+    /// Decisions and attempts that built-in agents may still make. Those of networks take more of it
+    /// ([`cost_of`]).
     pub(super) budget: u64,
     /// The rows of the batch.
     pub(super) open: Vec<OpenRow>,

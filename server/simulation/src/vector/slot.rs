@@ -7,7 +7,7 @@ use chefshat_engine::{
 
 use super::columns::{Ending, PlayedGame, Row, places_taken};
 use super::history::History;
-use super::part::{OpenRow, Part};
+use super::part::{OpenRow, Part, cost_of};
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
 use super::setup::{Episode, VectorSetup};
@@ -390,11 +390,16 @@ impl RunningGame {
         }
         if let Some(number) = setup.network_at(seat) {
             let legal = self.game.legal_actions();
+            let network = setup.network(number);
             let chosen = only(&legal).or_else(|| {
                 let seen = self.game.observe(Viewer::Seat(seat));
-                waiting.decide_or_wait(number, setup.network(number), place, &seen, &legal)
+                waiting.decide_or_wait(number, network, place, &seen, &legal)
             });
-            return chosen.map_or(Decided::Later, |action| Decided::Action(action, false));
+            let Some(action) = chosen else {
+                *budget = budget.saturating_sub(cost_of(network));
+                return Decided::Later;
+            };
+            return Decided::Action(action, false);
         }
         let agent = self.agents.get_mut(seat.index());
         let Some(agent) = agent.and_then(Option::as_mut) else {

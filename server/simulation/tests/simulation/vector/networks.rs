@@ -7,6 +7,8 @@ use std::sync::Arc;
 use chefshat_agents::{AgentKind, Network};
 use chefshat_engine::{Game, Seat, Viewer};
 use chefshat_simulation::vector::{SavedGame, Seeds, SetupError, VectorGames, VectorSetup};
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
 
 use super::*;
 
@@ -113,6 +115,61 @@ fn states_continue_against_the_same_network_alone() {
         .to_string();
     let expected = "another list of seats: \"client, trained, network:";
     assert!(error.contains(expected), "{error}");
+}
+
+/// A network with hidden layers of these numbers of units, whose weights are all 0.
+fn of_zeros(hidden: &[usize]) -> Arc<Network> {
+    let metadata = [
+        ("format", "chefshat-network-1"),
+        ("input", "table"),
+        ("output", "actions"),
+        ("output_activation", "none"),
+        ("masked", "true"),
+        ("players", "4"),
+        ("faces", "11"),
+        ("jokers", "2"),
+    ];
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let lengths = [&[334], hidden, &[214]].concat();
+    let zeros = vec![
+        0;
+        2 * lengths
+            .windows(2)
+            .map(|pair| pair[0] * pair[1])
+            .max()
+            .unwrap()
+    ];
+    let mut tensors = Vec::new();
+    for (layer, pair) in lengths.windows(2).enumerate() {
+        let shapes = [("weight", vec![pair[1], pair[0]]), ("bias", vec![pair[1]])];
+        for (name, shape) in shapes {
+            let bytes = &zeros[..2 * shape.iter().product::<usize>()];
+            let view = TensorView::new(Dtype::F16, shape, bytes).unwrap();
+            tensors.push((format!("layer{layer}.{name}"), view));
+        }
+    }
+    let file = serialize(tensors, Some(metadata.into())).unwrap();
+    Arc::new(Network::from_bytes(&file).unwrap())
+}
+
+#[test]
+fn large_networks_take_several_steps_in_which_all_games_advance() {
+    let network = of_zeros(&[1, 8192, 1024]);
+    // The units of a hidden layer count up to a multiple of 32.
+    let expected = 334 * 32 + 8192 + 8192 * 1024 + 1024 * 214;
+    assert_eq!(network.multiplications(), expected);
+    let (mut games, mut batch) = VectorGames::new(setup(2048, &network));
+    let mut rows = vec![0; 2048];
+    for _ in 0..16 {
+        assert!(!batch.done && u32s(&batch.games).is_sorted());
+        for game in u32s(&batch.games) {
+            rows[game as usize] += 1;
+        }
+        batch = games.step(&some_actions(&batch)).unwrap();
+    }
+    let (all, fewest) = (rows.iter().sum::<u32>(), rows.iter().min().unwrap());
+    assert!(all < 16 * 2048, "the limit was never reached");
+    assert!(*fewest > 1, "{rows:?}");
 }
 
 #[test]

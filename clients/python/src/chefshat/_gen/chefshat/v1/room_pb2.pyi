@@ -633,7 +633,10 @@ class Participant(_message.Message):
     reserved_for: Global___ParticipantKind.ValueType
     """Kind the seat is reserved for; UNSPECIFIED: any."""
     built_in_agent: _builtins.str
-    """Name of the built-in agent that fills the seat ("replay" for a recorded player), or empty."""
+    """Name of the built-in agent that fills the seat, or empty: "replay" for a recorded player, and
+    in records of vector games "network:" and the first 16 hexadecimal digits of the SHA-256 of the
+    file for a network file.
+    """
     connected: _builtins.bool
     """Whether the seat is attached to a stream now; always true for a built-in agent."""
     substituted: _builtins.bool

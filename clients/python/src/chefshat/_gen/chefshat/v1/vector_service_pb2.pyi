@@ -438,7 +438,9 @@ class VectorSetup(_message.Message):
         """Network files that `opponents` name, each at least once: at most one for each seat that the
         client does not play. Their numbers of players, faces and cards dealt are those of the games.
         Over the network, the setup with all files has at most max_vector_message_bytes: enough for two
-        of the size of "trained". A state can be restored where the same files play the same seats.
+        of the size of "trained"; and a decision takes at most max_vector_network_multiplications: as
+        many as there are weights, with the units of each hidden layer counted up to the next multiple
+        of 32. A state can be restored where the same files play the same seats.
         """
 
     def __init__(
@@ -718,7 +720,9 @@ class VectorStarted(_message.Message):
 
     @_builtins.property
     def built_in_agents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """Names of the built-in agents, index = seat; "network" for a network file; empty for client seats."""
+        """Names of the built-in agents, index = seat; for a network file "network:" and the first 16
+        hexadecimal digits of the SHA-256 of its content, as in records; empty for client seats.
+        """
 
     def __init__(
         self,
