@@ -65,7 +65,7 @@ NOT_NUMBERS = r"requires a Box action space"  # Actions are the indices of a tab
 NO_PICTURES = r"(?i)render.?mode|return a numpy array"  # The environments render as text.
 IMPOSSIBLE = {
     "AddRenderObservation": NO_PICTURES,
-    "AtariPreprocessing": r"opencv|Atari|NOOP|get_action_meanings|ale",  # For the emulator of Atari games.
+    "AtariPreprocessing": r"opencv|frame-skipping",  # For the emulator of Atari games.
     "ClipAction": NOT_NUMBERS,
     "DiscretizeAction": r"Box",
     "HumanRendering": NO_PICTURES,
