@@ -71,7 +71,7 @@ test("all invalid fields are marked at once", async () => {
   await page.waitForFunction(() => document.activeElement === document.querySelector('[aria-invalid="true"]'));
   // Errors that only the server can find are marked too: six hands cannot be dealt from so few
   // cards.
-  await page.getByLabel("Players").selectOption("6");
+  await page.getByLabel("Players", { exact: true }).selectOption("6");
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");
   await page.getByLabel("Points by place").fill("");
