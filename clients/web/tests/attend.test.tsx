@@ -2,30 +2,22 @@
 
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, describe, expect, test } from "vitest";
+import { beforeEach, describe, expect, test } from "vitest";
 import { AttendView, pictureSource } from "../src/attend/AttendView";
 import type { Outcome, ReportKind } from "../src/attend/attending";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import { TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
-import { setLanguage, startLanguage } from "../src/i18n";
+import { setLanguage } from "../src/i18n";
+import { root } from "./mounted";
 import { DEALT, OBSERVATION, stateOf } from "./table-state";
 
-let root: HTMLElement;
 let sent: ReportKind[];
 let outcome: Outcome;
 
-beforeEach(async () => {
-  await startLanguage();
-  root = document.createElement("div");
-  document.body.append(root);
+beforeEach(() => {
   sent = [];
   outcome = { kind: "accepted" };
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  root.remove();
 });
 
 const show = (state: TableState) =>

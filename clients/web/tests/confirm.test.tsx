@@ -2,17 +2,13 @@
 
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test } from "vitest";
-import { startLanguage } from "../src/i18n";
+import { beforeEach, expect, test } from "vitest";
 import { ConfirmButton } from "../src/parts/ConfirmButton";
+import { root } from "./mounted";
 
-let root: HTMLElement;
 let calls: { done: () => void; failed: (why: Error) => void }[];
 
 beforeEach(async () => {
-  await startLanguage();
-  root = document.createElement("div");
-  document.body.append(root);
   calls = [];
   const perform = () => new Promise<void>((done, failed) => calls.push({ done, failed }));
   await act(() =>
@@ -23,11 +19,6 @@ beforeEach(async () => {
       root,
     ),
   );
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  root.remove();
 });
 
 const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);

@@ -3,30 +3,17 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { HintSchema } from "../src/gen/chefshat/v1/play_service_pb";
-import { startLanguage } from "../src/i18n";
 import type { GivenHint } from "../src/table/acting";
 import { actionOf } from "../src/table/model/actions";
 import { cardsFromNumbers } from "../src/table/model/cards";
 import type { OpenDecision } from "../src/table/model/live";
 import { TableView } from "../src/table/view/TableView";
+import { root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
-
-let root: HTMLElement;
-
-beforeEach(async () => {
-  await startLanguage();
-  root = document.createElement("div");
-  document.body.append(root);
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  root.remove();
-});
 
 const FACES = 11;
 const PASS = actionOf({ kind: "pass" }, FACES);

@@ -2,27 +2,15 @@
 
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
-import { startLanguage } from "../src/i18n";
 import type { TableState } from "../src/table/model/state";
 import { TableView } from "../src/table/view/TableView";
+import { root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
 const REMOTE = 2;
-let root: HTMLElement;
-
-beforeEach(async () => {
-  await startLanguage();
-  root = document.createElement("div");
-  document.body.append(root);
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  root.remove();
-});
 
 const show = (table: TableState, own: number | undefined, replayed = false) =>
   act(() => render(<TableView table={table} own={own} replayed={replayed} />, root));

@@ -1,0 +1,19 @@
+// Where component tests render: an element in the page, new for each test. A file that imports `root` has the hooks.
+
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach } from "vitest";
+import { startLanguage } from "../src/i18n";
+
+export let root: HTMLElement;
+
+beforeEach(async () => {
+  await startLanguage();
+  root = document.createElement("div");
+  document.body.append(root);
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  root.remove();
+});
