@@ -17,6 +17,7 @@ from chefshat import pb
 from chefshat.decision import Decision
 from chefshat.errors import ChefsHatError
 from chefshat.vector import VectorEnv
+from chefshat.vector_setup import NETWORK_SUFFIX, network_content
 
 if TYPE_CHECKING:
     import chefshat_native
@@ -166,8 +167,8 @@ class Position:
         """
         if not (rollouts or time_ms) or (rollouts or 0) < 0 or (time_ms or 0) < 0:
             raise ValueError("give a budget: a number of rollouts, time_ms, or both, above 0")
-        is_file = isinstance(agent, Path) or agent.endswith(".safetensors")
-        policy = Path(agent).read_bytes() if is_file else str(agent)
+        is_file = isinstance(agent, Path) or agent.endswith(NETWORK_SUFFIX)
+        policy = network_content(agent) if is_file else str(agent)
         chosen = self.legal_actions if actions is None else np.asarray(actions)
         import chefshat_native
 

@@ -137,6 +137,14 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     return setup
 
 
+def network_content(file: str | PathLike[str]) -> bytes:
+    """Returns the content of a network file. Raises ValueError if it is too large for one: files of other kinds may be huge."""
+    path = Path(file)
+    if path.stat().st_size > MAX_NETWORK_BYTES:
+        raise ValueError(f"{path} is larger than {MAX_NETWORK_BYTES >> 20} MiB, which no network for this game needs")
+    return path.read_bytes()
+
+
 def _put_opponents(setup: pb.VectorSetup, opponents: Opponent | Sequence[Opponent]) -> None:
     """Sets the opponents of a request, with the network files among them, each once."""
     numbers: dict[bytes, int] = {}
@@ -144,11 +152,7 @@ def _put_opponents(setup: pb.VectorSetup, opponents: Opponent | Sequence[Opponen
         if isinstance(opponent, bytes):
             name, content = "", opponent
         elif isinstance(opponent, PathLike) or opponent.endswith(NETWORK_SUFFIX):
-            path = Path(opponent)
-            # Files of other kinds may be huge.
-            if path.stat().st_size > MAX_NETWORK_BYTES:
-                raise ValueError(f"{path} is larger than {MAX_NETWORK_BYTES >> 20} MiB, which no network for this game needs")
-            name, content = path.name, path.read_bytes()
+            name, content = Path(opponent).name, network_content(opponent)
         else:
             setup.opponents.append(opponent)
             continue
