@@ -23,6 +23,7 @@ pub mod scrape;
 pub mod serve;
 pub mod signing;
 pub mod store;
+mod threads;
 pub mod tls;
 pub mod tournaments;
 pub mod web;

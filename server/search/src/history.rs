@@ -19,6 +19,13 @@ impl ShiftHistory {
         }
     }
 
+    /// What a seat has seen of these events, from which on it is complete as above.
+    pub fn of<'a>(seat: Seat, events: impl IntoIterator<Item = &'a Event>) -> ShiftHistory {
+        let mut history = ShiftHistory::new(seat);
+        events.into_iter().for_each(|event| history.on_event(event));
+        history
+    }
+
     /// Adds an event, redacted for the seat. The start of a Shift clears what came before.
     pub fn on_event(&mut self, event: &Event) {
         if matches!(event, Event::ShiftStarted { .. }) {

@@ -18,14 +18,14 @@ use chefshat_search::{
     Allocation, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler, ShiftHistory,
     evaluate_watched, likely_hands,
 };
-use rayon::{ThreadPool, ThreadPoolBuildError};
+use rayon::ThreadPoolBuildError;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
 use super::limits::charged;
-use super::pool::{on_pool, pool};
+use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
 use crate::access::Caller;
@@ -34,6 +34,7 @@ use crate::config::{
     MIN_ANALYSIS_UPDATE,
 };
 use crate::limits::{Places, Refused};
+use crate::threads::Threads;
 
 /// Most deals from which the likely hands are averaged.
 const DEALS_FOR_HANDS: u64 = 500;
@@ -43,7 +44,7 @@ const DEALS_FOR_HANDS: u64 = 500;
 pub struct Analyses {
     recorded: Recorded,
     /// Each analysis takes one thread.
-    pool: Arc<ThreadPool>,
+    pool: Arc<Threads>,
     places: Arc<Places>,
     closing: CancellationToken,
 }
@@ -72,7 +73,7 @@ impl Analyses {
         let places = Places::new(MAX_ANALYSES, recorded.rooms().shares());
         Ok(Self {
             recorded,
-            pool: pool("analysis", threads)?,
+            pool: Arc::new(Threads::new("analysis", threads, 0)?),
             places,
             closing,
         })
@@ -282,8 +283,7 @@ fn recorded_knowledge(branch: Branch) -> Option<Knowledge> {
         shift.push(event);
     })?;
     let seat = game.decision()?.seat;
-    let mut history = ShiftHistory::new(seat);
-    shift.iter().for_each(|event| history.on_event(event));
+    let history = ShiftHistory::of(seat, &shift);
     Knowledge::new(branch.rules, &game.observe(Viewer::Seat(seat)), &history).ok()
 }
 
@@ -294,8 +294,7 @@ fn situation_knowledge(situation: &v1::Situation) -> Result<Knowledge, Status> {
             .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
     let (observation, events) = situation_from_proto(situation, &rules)
         .map_err(|problem| field("ANALYSIS_REFUSED", &problem))?;
-    let mut history = ShiftHistory::new(observation.seat.ok_or_else(internal)?);
-    events.iter().for_each(|event| history.on_event(event));
+    let history = ShiftHistory::of(observation.seat.ok_or_else(internal)?, &events);
     Knowledge::new(rules, &observation, &history)
         .map_err(|error| refused("situation", error.to_string()))
 }

@@ -17,7 +17,7 @@ use chefshat_vector::{
     Limits, Request as VectorRequest, batch_to_proto, record_parts, saved_to_proto,
     seeds_from_setup, setup_from_proto, start_from_proto, started_to_proto,
 };
-use rayon::{ThreadPool, ThreadPoolBuildError};
+use rayon::ThreadPoolBuildError;
 use tokio::sync::mpsc;
 use tokio::sync::mpsc::error::SendTimeoutError;
 use tokio::time::timeout;
@@ -27,7 +27,7 @@ use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::limits::charged;
 use super::new_room::branch_refused;
-use super::pool::{caught, on_pool, pool};
+use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use crate::access::Caller;
@@ -37,6 +37,7 @@ use crate::config::{
 };
 use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
+use crate::threads::{Threads, caught};
 use chefshat_room::ids::random_bytes;
 
 /// Messages queued for a slow client. At most one is a batch; the others are parts of records.
@@ -50,7 +51,7 @@ const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
 #[derive(Debug, Clone)]
 pub struct Vectors {
     recorded: Recorded,
-    pool: Arc<ThreadPool>,
+    pool: Arc<Threads>,
     streams: Arc<Places>,
     /// Places for games times seats that clients play.
     seats: Arc<Places>,
@@ -71,7 +72,7 @@ impl Vectors {
         let shares = recorded.rooms().shares();
         Ok(Self {
             recorded,
-            pool: pool("vector", threads)?,
+            pool: Arc::new(Threads::new("vector", threads, 0)?),
             streams: Places::new(MAX_VECTOR_STREAMS, shares),
             seats: Places::new(MAX_VECTOR_SEATS_IN_ALL, shares),
             closing,

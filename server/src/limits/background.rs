@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use rayon::ThreadPoolBuildError;
 
-use super::threads::Threads;
 use super::{Held, Key, Places, Rate, Shares};
+use crate::threads::Threads;
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
 pub(super) const MAX_GAMES: usize = 32;

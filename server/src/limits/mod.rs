@@ -12,7 +12,6 @@ mod page;
 mod places;
 mod rate;
 mod searches;
-mod threads;
 
 use std::time::Duration;
 

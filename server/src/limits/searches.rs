@@ -17,9 +17,9 @@ use rayon::ThreadPoolBuildError;
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
-use super::threads::Threads;
 use super::{Key, Places, Shares};
 use crate::metrics::{Metrics, SearchOutcome};
+use crate::threads::Threads;
 
 /// When a search ends, even if its rollouts are not done.
 const MAX_SEARCH_TIME: Duration = Duration::from_secs(5);
@@ -143,8 +143,7 @@ fn estimated(
     allocation: Allocation,
     stopped: &dyn Fn() -> bool,
 ) -> Result<Vec<Estimate>, SearchOutcome> {
-    let mut history = ShiftHistory::new(request.seat);
-    (request.history.iter()).for_each(|event| history.on_event(event));
+    let history = ShiftHistory::of(request.seat, &request.history);
     let choice = Choice {
         rules,
         observation: &request.observation,

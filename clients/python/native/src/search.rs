@@ -212,8 +212,7 @@ impl Position {
             caught(|| {
                 let (rules, observation, events) = read()?;
                 let seat = observation.seat.unwrap_or(Seat::new(0));
-                let mut history = ShiftHistory::new(seat);
-                events.iter().for_each(|event| history.on_event(event));
+                let history = ShiftHistory::of(seat, &events);
                 Knowledge::new(rules, &observation, &history)
                     .and_then(|knowledge| Sampler::new(knowledge, max_steps))
                     .map_err(unknown)
