@@ -204,8 +204,10 @@ impl Seats {
         self.check_occupants(header)?;
         let expected = game_started(header, rules);
         self.begun = true;
-        for clock in &mut self.clocks {
-            clock.connected.get_or_insert(true);
+        // A game starts when every open seat is attached, also to a server that was restarted
+        // before. Whether it is lost later is not recorded after too many events.
+        for (clock, events) in self.clocks.iter_mut().zip(&self.connection_events) {
+            clock.connected = (*events < MAX_CONNECTION_EVENTS).then_some(true);
         }
         match difference(started, &expected) {
             Some(problem) => Err(format!("gameStarted.{problem}, as in the header")),

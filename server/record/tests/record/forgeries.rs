@@ -281,6 +281,16 @@ fn a_pinned_key_catches_what_is_signed_again() {
     assert_ne!(signed_by, Some(key().public()));
 }
 
+/// A restart while the room waited: every seat was attached again before the game started, so that
+/// the timeout of line 21 stays one.
+#[test]
+fn a_restart_before_the_game_leaves_its_timeouts_valid() {
+    let mut lines = committed();
+    let restarted = Kind::ServerRestarted(v1::ServerRestarted::default());
+    with_event(&mut lines, 4, restarted);
+    replay(&lines).expect("valid");
+}
+
 #[test]
 fn a_record_without_a_participant_loses_its_signature() {
     let mut lines = signed();
