@@ -51,6 +51,11 @@ impl AgentKind {
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
+
+    /// The kind with this name that may play rollouts, in which all actions are legal.
+    pub fn of_rollouts(name: &str) -> Option<Self> {
+        Self::from_name(name).filter(|kind| *kind != Self::RandomUnmasked)
+    }
 }
 
 /// An agent of an upper crate, which follows the events of the game besides its observations.

@@ -160,9 +160,7 @@ impl FromStr for MonteCarlo {
                 .filter(|rollouts| (1..=MAX_ROLLOUTS).contains(rollouts))
                 .map(Budget::Rollouts),
         });
-        let policy = parts.next().map(|policy| {
-            AgentKind::from_name(policy).filter(|kind| *kind != AgentKind::RandomUnmasked)
-        });
+        let policy = parts.next().map(AgentKind::of_rollouts);
         if let (true, Some(budget), Some(policy), None) = (
             named,
             budget.unwrap_or(Some(agent.budget)),

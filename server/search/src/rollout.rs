@@ -17,9 +17,7 @@ pub enum RolloutPolicy {
 impl RolloutPolicy {
     /// The agent of this name: `random`, `greedy` or `trained`.
     pub fn from_name(name: &str) -> Option<RolloutPolicy> {
-        AgentKind::from_name(name)
-            .filter(|kind| *kind != AgentKind::RandomUnmasked)
-            .map(RolloutPolicy::Kind)
+        AgentKind::of_rollouts(name).map(RolloutPolicy::Kind)
     }
 
     fn agent(&self, seed: [u8; 32]) -> BuiltInAgent {

@@ -92,14 +92,13 @@ fn events(game: &Game, seat: Seat, seen: &Observation, entries: &[Known]) -> Opt
             continue;
         }
         let action = entry.action?;
-        let (face, quantity, jokers) = match space.decode(action)? {
+        match space.decode(action)? {
             Action::Declare => {
                 let special = SpecialAction::of_seat(actor, &last_order?);
                 events.push(Event::SpecialActionDeclared {
                     seat: actor,
                     special,
                 });
-                continue;
             }
             Action::Pass => {
                 let cards_left = left[actor];
@@ -107,28 +106,37 @@ fn events(game: &Game, seat: Seat, seen: &Observation, entries: &[Known]) -> Opt
                     seat: actor,
                     cards_left,
                 });
-                continue;
             }
-            Action::Play {
-                face,
-                quantity,
-                jokers,
-            } => (face.get(), quantity, jokers),
-            Action::LoneJoker => (rules.faces() + 1, 0, 1),
-            Action::Decline => continue,
-            Action::Give(_) | Action::GiveJoker => return None,
-        };
-        left[actor] = left[actor].checked_sub(quantity + jokers)?;
-        events.push(Event::Played {
-            seat: actor,
-            action,
+            Action::Decline => {}
+            other => {
+                let (face, quantity, jokers) = cards_of(other, rules)?;
+                left[actor] = left[actor].checked_sub(quantity + jokers)?;
+                events.push(Event::Played {
+                    seat: actor,
+                    action,
+                    face,
+                    quantity,
+                    jokers,
+                    cards_left: left[actor],
+                });
+            }
+        }
+    }
+    Some(events)
+}
+
+/// The face that an action plays, one above all faces for a joker alone, and how many natural cards
+/// and jokers; `None` if it is not a play.
+fn cards_of(action: Action, rules: &RuleSet) -> Option<(u8, u8, u8)> {
+    match action {
+        Action::Play {
             face,
             quantity,
             jokers,
-            cards_left: left[actor],
-        });
+        } => Some((face.get(), quantity, jokers)),
+        Action::LoneJoker => Some((rules.faces() + 1, 0, 1)),
+        _ => None,
     }
-    Some(events)
 }
 
 /// The hand that the seat was dealt, from what it holds, played, gave and received.
@@ -144,26 +152,13 @@ fn dealt(rules: &RuleSet, seat: Seat, seen: &Observation, entries: &[Known]) -> 
     let mut opener = None;
     for entry in entries.iter().filter(|entry| entry.receiver.is_none()) {
         let action = space.decode(entry.action?)?;
-        match action {
-            Action::Play { .. } | Action::LoneJoker | Action::Pass => {
-                opener = opener.or(Some(entry.seat));
-            }
-            _ => {}
+        let cards = cards_of(action, rules);
+        if cards.is_some() || action == Action::Pass {
+            opener = opener.or(Some(entry.seat));
         }
-        if entry.seat != seat {
-            continue;
-        }
-        match action {
-            Action::Play {
-                face,
-                quantity,
-                jokers,
-            } => {
-                add(usize::from(face.get()) - 1, quantity)?;
-                add(joker, jokers)?;
-            }
-            Action::LoneJoker => add(joker, 1)?,
-            _ => {}
+        if let (true, Some((face, quantity, jokers))) = (entry.seat == seat, cards) {
+            add(usize::from(face) - 1, quantity)?;
+            add(joker, jokers)?;
         }
     }
     let (gave, received) = (
