@@ -121,6 +121,11 @@ impl GameHeader {
         self.tournament.and_then(|game| game.series)
     }
 
+    /// What changes hands together in a cluster: its tournament, or the room alone.
+    pub fn unit(&self) -> Id {
+        (self.tournament).map_or(self.room_id, |game| game.tournament)
+    }
+
     /// Whether the cards are real.
     pub fn is_physical(&self) -> bool {
         self.table.is_some()

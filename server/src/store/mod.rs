@@ -1,6 +1,7 @@
 //! Storage of games. The trait is asynchronous even in memory: a room publishes a change only after
 //! the store has committed it.
 
+pub mod cluster;
 mod failing;
 mod memory;
 mod sqlite;
@@ -35,6 +36,10 @@ pub enum StoreError {
     /// The id of a game or tournament is taken. Nothing was changed, and the store has not failed.
     #[error("the id {0} is taken")]
     Taken(Id),
+    /// Another node of the cluster owns the unit of this room or tournament. Nothing was changed,
+    /// and the store has not failed; the room or tournament must stop and publish nothing more.
+    #[error("another node has taken {0} over")]
+    Fenced(Id),
 }
 
 /// The signature of the record of a hosted game.

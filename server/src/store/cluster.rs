@@ -1,0 +1,168 @@
+//! What a store offers the nodes of a cluster besides [`Store`]: nodes and their leases, and who
+//! owns which rooms and tournaments. What changes hands together is a *unit*: a room without a
+//! tournament, or a tournament with all its rooms; its id is that of the room or tournament. Each
+//! change of hands raises the *epoch* of the unit, and nothing is written for it at an older epoch
+//! (`StoreError::Fenced`). A unit with nothing open is over: nobody owns or claims it.
+
+use std::time::Duration;
+
+use futures::future::BoxFuture;
+
+use super::tournaments::StoredTournament;
+use super::{ResumableGame, Store, StoreError};
+use chefshat_room::ids::Id;
+
+/// Identifies a node: one run of a server. Numbers are given by the database and never used again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub u64);
+
+/// How often a unit has been taken over, from 1, when it is created.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Epoch(pub u64);
+
+impl Epoch {
+    /// The epoch of what has just been created.
+    pub const FIRST: Self = Self(1);
+}
+
+/// What a node says about itself when it joins.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NodeInfo {
+    /// Its name for people, for example the host's; need not be unique.
+    pub name: String,
+    /// Where other nodes reach it.
+    pub peer_endpoint: String,
+    /// Where clients that care reach it directly; empty if nowhere.
+    pub client_endpoint: String,
+    /// The version of the program.
+    pub build: String,
+    /// Most units that it takes over.
+    pub capacity: u64,
+}
+
+/// A node of the cluster.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NodeStatus {
+    /// Its id.
+    pub id: NodeId,
+    /// What it said when it joined.
+    pub info: NodeInfo,
+    /// Time since its last beat, on the clock of the database.
+    pub last_beat: Duration,
+    /// Whether its lease has expired.
+    pub expired: bool,
+    /// Whether it has been asked to hand over what it owns.
+    pub drain: bool,
+    /// Rooms that it owns and that are not over.
+    pub rooms: u64,
+    /// Tournaments that it owns and that are not over.
+    pub tournaments: u64,
+}
+
+/// The answer to a beat.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Beat {
+    /// The units that the node owns, with their epochs.
+    pub owned: Vec<(Id, Epoch)>,
+    /// Whether somebody has asked the node to hand over what it owns.
+    pub drain: bool,
+}
+
+/// What an id belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A room.
+    Room,
+    /// A tournament.
+    Tournament,
+}
+
+/// Where a room or tournament is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// The room or tournament.
+    pub id: Id,
+    /// Which of both it is.
+    pub kind: Kind,
+    /// The unit it belongs to.
+    pub unit: Id,
+    /// Who owns the unit, or owned it last; `None` if nobody does at present.
+    pub node: Option<NodeId>,
+    /// The epoch of the unit.
+    pub epoch: Epoch,
+    /// Whether it is over. Then nothing is written any more, and every node may load it to show
+    /// its end.
+    pub over: bool,
+}
+
+/// A unit as its owner resumes it.
+#[derive(Default)]
+pub struct Unit {
+    /// The tournament, if the unit is one.
+    pub tournament: Option<StoredTournament>,
+    /// Its durable rooms that are not over, and those that are but have not been removed yet,
+    /// oldest first. A game that cannot be read is logged and left unchanged. The last entry of a
+    /// game that has been claimed says that the server was restarted.
+    pub games: Vec<ResumableGame>,
+}
+
+/// A store that several servers share. Everything that [`Store`] creates or changes belongs to the
+/// node that has joined through the same value.
+///
+/// Times are those of the database's clock.
+pub trait ClusterStore: Store {
+    /// Adds this server as a node, whose lease begins now. Called again, for example after the node
+    /// was removed because it was away for long, it becomes a new node.
+    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>>;
+
+    /// Renews the lease of this node, even if it has expired, and returns what it owns at the same
+    /// moment. `None`: the node is not known (any more).
+    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
+
+    /// At most `count` units that nobody owns or whose owner's lease has expired, with their
+    /// epochs; only such that this version of the program can resume. Ephemeral rooms of such nodes
+    /// are removed.
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>>;
+
+    /// Takes an orphan over if it still has the epoch that was seen: raises its epoch and adds "the
+    /// server was restarted" to the journal of each of its rooms that is not over, in one commit.
+    /// Returns the new epoch; `None` if it is not an orphan any more, or not at this epoch.
+    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>>;
+
+    /// Reads a unit that this node owns at this epoch, with journals that write at this epoch;
+    /// `None` if it does not (any more). From here on, what is written for its tournament is
+    /// written at this epoch, so what ran before at another one must have ended.
+    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>>;
+
+    /// Gives up a unit that this node owns at this epoch, so that others may claim it at once. The
+    /// last append to each of its journals must have been answered.
+    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>>;
+
+    /// Removes this node if it owns nothing. Returns whether it is removed.
+    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>>;
+
+    /// Where a room or tournament is; `None` if there is none with this id.
+    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+
+    /// Where the room or tournament with this join code, in its normal form, is.
+    fn locate_code<'a>(
+        &'a self,
+        join_code: &'a str,
+    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>>;
+
+    /// The room of a durable game that is over, to show its end, if it has not been removed yet.
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
+
+    /// Everything stored about a tournament, without becoming its owner.
+    fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>>;
+
+    /// Number of rows of a tournament's journal; 0 if it does not exist.
+    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>>;
+
+    /// All nodes, in the order in which they joined.
+    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>>;
+
+    /// Asks a node to hand over what it owns; it learns of it with its next beat. Returns whether
+    /// the node is known.
+    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>>;
+}
