@@ -4,6 +4,7 @@
 
 pub mod access;
 pub mod clock;
+pub mod cluster;
 pub mod config;
 pub mod connections;
 pub mod convert;

@@ -21,6 +21,7 @@ use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
+use crate::cluster::{Directory, SingleServer};
 use crate::config::{
     DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
     ServerConfig,
@@ -98,15 +99,28 @@ pub struct Server {
 }
 
 impl Server {
-    /// Creates a server and resumes the unfinished games of its store.
+    /// Creates a server without peers and resumes the unfinished games of its store.
     ///
     /// # Errors
     /// The store failed.
     pub async fn restored(config: ServerConfig, store: Arc<dyn Store>) -> Result<Self, ServeError> {
+        Self::of_node(config, store, Arc::new(SingleServer)).await
+    }
+
+    /// Creates a node of a cluster, whose `directory` knows what the other nodes have, and resumes
+    /// the unfinished games of its store.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub async fn of_node(
+        config: ServerConfig,
+        store: Arc<dyn Store>,
+        directory: Arc<dyn Directory>,
+    ) -> Result<Self, ServeError> {
         let access = Access::open(&config.access, config.data_dir.as_ref())?;
         let tls = config.tls.clone().map(Tls::open).transpose()?;
         let tracker = TaskTracker::new();
-        let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone())?;
+        let rooms = Rooms::of_node(&config, Arc::clone(&store), directory, tracker.clone())?;
         let games = rooms.restore().await?;
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
         tournaments.restore().await?;

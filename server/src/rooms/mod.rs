@@ -20,6 +20,7 @@ use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
+use crate::cluster::{Directory, SingleServer};
 use crate::config::ServerConfig;
 use crate::limits::{Background, Held, Key, Places, Refused, Searches, Shares};
 use crate::metrics::Metrics;
@@ -105,19 +106,34 @@ pub struct Rooms {
     /// Number of games that have ended since the server was started.
     ended: AtomicU64,
     context: TaskContext,
+    /// Where the rooms and tournaments of other nodes are.
+    directory: Arc<dyn Directory>,
     max_rooms: usize,
     places: Arc<Places>,
     shares: Shares,
 }
 
 impl Rooms {
-    /// Creates an empty set.
+    /// Creates an empty set, of a server that has no peers.
     ///
     /// # Errors
     /// The operating system cannot start the threads for games of built-in agents or their searches.
     pub fn new(
         config: &ServerConfig,
         store: Arc<dyn Store>,
+        tracker: TaskTracker,
+    ) -> Result<Arc<Self>, ThreadPoolBuildError> {
+        Self::of_node(config, store, Arc::new(SingleServer), tracker)
+    }
+
+    /// Creates an empty set, of a node of a cluster. `directory` knows the other nodes' rooms.
+    ///
+    /// # Errors
+    /// See [`Rooms::new`].
+    pub fn of_node(
+        config: &ServerConfig,
+        store: Arc<dyn Store>,
+        directory: Arc<dyn Directory>,
         tracker: TaskTracker,
     ) -> Result<Arc<Self>, ThreadPoolBuildError> {
         let metrics = Arc::new(Metrics::default());
@@ -152,6 +168,7 @@ impl Rooms {
                 owner: Key::Resumed,
                 shares: config.shares,
             },
+            directory,
             max_rooms: config.max_rooms,
             places: Places::new(config.max_rooms, config.shares),
             shares: config.shares,
@@ -299,6 +316,11 @@ impl Rooms {
     /// Whether the server accepts no new rooms.
     pub fn is_shutting_down(&self) -> bool {
         self.lock().shutting_down
+    }
+
+    /// Where the rooms and tournaments of other nodes are.
+    pub fn directory(&self) -> &Arc<dyn Directory> {
+        &self.directory
     }
 
     /// The store of games.

@@ -1,0 +1,72 @@
+//! Which node has a room or tournament. A node asks for those that it does not have in memory
+//! itself, so the directory of a single server has nothing to say and never waits.
+
+use std::fmt;
+use std::sync::Arc;
+
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+
+use chefshat_room::ids::Id;
+
+/// Another node of the cluster.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Peer {
+    /// Its name, unique in the cluster.
+    pub node: Arc<str>,
+    /// Where its peer listener is: `HOST:PORT`.
+    pub endpoint: Arc<str>,
+}
+
+/// Where a room or tournament is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Location {
+    /// This node owns it. If it is not in memory, it is about to be resumed.
+    Here,
+    /// Another node owns it.
+    Node(Peer),
+    /// No node has it.
+    Nowhere,
+    /// The directory cannot be read now.
+    Unknown,
+}
+
+/// Finds the owners of rooms and tournaments. Answers may be cached, so they may be outdated: the
+/// node that is named says so, and is then forgotten.
+pub trait Directory: Send + Sync + 'static {
+    /// The location of a room or tournament that is not in memory.
+    fn locate(&self, id: Id) -> BoxFuture<'_, Location>;
+
+    /// The location of the room or tournament with a join code in its normal form.
+    fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location>;
+
+    /// The last answer for an id was outdated: the node does not own it, or cannot be reached.
+    fn forget(&self, id: Id);
+
+    /// The last answer for a join code was outdated.
+    fn forget_code(&self, code: &str);
+}
+
+impl fmt::Debug for dyn Directory {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Directory")
+    }
+}
+
+/// The directory of a server without peers: what it does not have in memory does not exist.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SingleServer;
+
+impl Directory for SingleServer {
+    fn locate(&self, _id: Id) -> BoxFuture<'_, Location> {
+        ready(Location::Nowhere).boxed()
+    }
+
+    fn locate_code<'a>(&'a self, _code: &'a str) -> BoxFuture<'a, Location> {
+        ready(Location::Nowhere).boxed()
+    }
+
+    fn forget(&self, _id: Id) {}
+
+    fn forget_code(&self, _code: &str) {}
+}
