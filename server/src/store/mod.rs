@@ -2,7 +2,9 @@
 //! the store has committed it.
 
 pub mod cluster;
+mod codec;
 mod failing;
+mod form;
 mod memory;
 mod sqlite;
 #[cfg(test)]

@@ -13,10 +13,10 @@ use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection as _, Row as _};
 
 use super::errors::explain;
-use super::form::{self, Unreadable};
 use super::open::{self, Opened};
 use super::rows::with_own_rows;
 use crate::store::StoreError;
+use crate::store::form::{self, Unreadable};
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry};

@@ -10,10 +10,10 @@ use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
 use tracing::error;
 
-use super::codec::Codec;
-use super::form;
 use super::rows;
 use super::writer::{Pending, Row, WriteCommand};
+use crate::store::codec::Codec;
+use crate::store::form;
 use crate::store::{Journal, Signed, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 

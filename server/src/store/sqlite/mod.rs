@@ -1,11 +1,9 @@
 //! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer`
-//! write, `form` encodes, `backup` copies; this file joins them into a store.
+//! write, `backup` copies; this file joins them into a store.
 
 mod backup;
-mod codec;
 mod errors;
 mod forget;
-mod form;
 mod journals;
 mod open;
 mod reader;
@@ -31,6 +29,8 @@ pub use errors::FILE as DATABASE_FILE;
 pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::{LOCK_FILE, OpenError};
 
+use super::codec::Codec;
+use super::form;
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{DiskUsage, Journal, Part, ResumableGame, Store, StoreError, StoredGame};
 use crate::metrics::StoreMetrics;
@@ -38,7 +38,6 @@ use crate::store::Keep;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
-use codec::Codec;
 use errors::explain;
 use journals::{DurableJournal, EphemeralJournal, WriteQueue};
 use reader::Reader;

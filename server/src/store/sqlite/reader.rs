@@ -10,12 +10,12 @@ use sqlx::Row as _;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use tracing::error;
 
-use super::codec::Codec;
 use super::errors::explain;
-use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, WriteQueue};
 use super::rows::{self, Read};
 use crate::store::Keep;
+use crate::store::codec::Codec;
+use crate::store::form::{self, FORM, Unreadable};
 use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;

@@ -3,10 +3,10 @@
 use sqlx::Row as _;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 
-use super::codec::Codec;
 use super::errors::explain;
-use super::form::{self, Unreadable};
 use crate::store::StoreError;
+use crate::store::codec::Codec;
+use crate::store::form::{self, Unreadable};
 use chefshat_room::journal::Entry;
 
 /// Prefixes a statement with `own (row, game, previous)`: the rows of a journal, found from the last

@@ -19,7 +19,8 @@ use futures::FutureExt as _;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
-use super::{OpenError, SqliteStore, form};
+use super::{OpenError, SqliteStore};
+use crate::store::form;
 use crate::store::tournaments::StoredTournament;
 use crate::store::{Keep, Part, Store, StoredGame};
 use crate::tournaments::restored;

@@ -15,11 +15,11 @@ use tokio::time::Instant;
 use tracing::{error, warn};
 
 use super::errors::explain;
-use super::form::{self, FORM};
 use super::rows::with_own_rows;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
+use crate::store::form::{self, FORM};
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 

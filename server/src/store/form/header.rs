@@ -55,7 +55,7 @@ struct HeaderForm {
 }
 
 /// Encodes a header.
-pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
+pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
     let (server_seed, nonce, fixed_game_seed) = match header.seed {
         SeedPlan::Committed { server_seed, nonce } => {
             (server_seed.to_vec(), nonce.to_vec(), vec![])
@@ -93,7 +93,7 @@ pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> 
 ///
 /// # Errors
 /// An invalid field.
-pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> {
+pub(in crate::store) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
     let field = |problem: FieldProblem| Unreadable(problem.to_string());
     let rules = rules_from_proto(&form.rules.unwrap_or_default()).map_err(field)?;

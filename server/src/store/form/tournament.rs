@@ -154,7 +154,7 @@ struct SeatForm {
 }
 
 /// Encodes a header.
-pub(in crate::store::sqlite) fn tournament_to_bytes(header: &TournamentHeader) -> Vec<u8> {
+pub(in crate::store) fn tournament_to_bytes(header: &TournamentHeader) -> Vec<u8> {
     HeaderForm {
         id: header.id.0.to_vec(),
         settings: Some(header.settings.clone()),
@@ -170,7 +170,7 @@ pub(in crate::store::sqlite) fn tournament_to_bytes(header: &TournamentHeader) -
 ///
 /// # Errors
 /// An invalid field.
-pub(in crate::store::sqlite) fn tournament_from_bytes(
+pub(in crate::store) fn tournament_from_bytes(
     bytes: &[u8],
 ) -> Result<TournamentHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
@@ -185,9 +185,7 @@ pub(in crate::store::sqlite) fn tournament_from_bytes(
 }
 
 /// Encodes entries.
-pub(in crate::store::sqlite) fn tournament_entries_to_bytes(
-    entries: &[TournamentEntry],
-) -> Vec<u8> {
+pub(in crate::store) fn tournament_entries_to_bytes(entries: &[TournamentEntry]) -> Vec<u8> {
     let mut out = Vec::new();
     for entry in entries {
         let kind = Some(kind_of(entry));
@@ -200,7 +198,7 @@ pub(in crate::store::sqlite) fn tournament_entries_to_bytes(
 ///
 /// # Errors
 /// An invalid entry.
-pub(in crate::store::sqlite) fn tournament_entries_from_bytes(
+pub(in crate::store) fn tournament_entries_from_bytes(
     mut bytes: &[u8],
 ) -> Result<Vec<TournamentEntry>, Unreadable> {
     let mut entries = Vec::new();

@@ -157,7 +157,7 @@ pub(super) fn value_of<T: Copy>(
 }
 
 /// Adds an entry to a blob of entries.
-pub(in crate::store::sqlite) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
+pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
     let change = match &entry.change {
         Change::Seated { seat, participant } => ChangeForm::Seated(SeatedForm {
             seat: seat_number(*seat),
@@ -213,7 +213,7 @@ pub(in crate::store::sqlite) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
 ///
 /// # Errors
 /// The first invalid entry.
-pub(in crate::store::sqlite) fn read_entries(
+pub(in crate::store) fn read_entries(
     mut bytes: &[u8],
     entries: &mut Vec<Entry>,
 ) -> Result<(), Unreadable> {

@@ -17,7 +17,7 @@ struct SignedForm {
 }
 
 /// Encodes a signature.
-pub(in crate::store::sqlite) fn signed_to_bytes(signed: &Signed) -> Vec<u8> {
+pub(in crate::store) fn signed_to_bytes(signed: &Signed) -> Vec<u8> {
     let form = SignedForm {
         server_version: signed.server_version.clone(),
         public_key: signed.signature.public_key.clone(),
@@ -30,7 +30,7 @@ pub(in crate::store::sqlite) fn signed_to_bytes(signed: &Signed) -> Vec<u8> {
 ///
 /// # Errors
 /// Invalid bytes.
-pub(in crate::store::sqlite) fn signed_from_bytes(bytes: &[u8]) -> Result<Signed, Unreadable> {
+pub(in crate::store) fn signed_from_bytes(bytes: &[u8]) -> Result<Signed, Unreadable> {
     let form = SignedForm::decode(bytes)?;
     Ok(Signed {
         server_version: form.server_version,
