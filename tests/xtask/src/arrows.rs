@@ -22,6 +22,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-agents", &["chefshat-engine"]),
     ("chefshat-search", &["chefshat-engine", "chefshat-agents"]),
     ("chefshat-referee", &["chefshat-engine"]),
+    ("chefshat-cluster", &[]),
     (
         "chefshat-tournament",
         &["chefshat-engine", "chefshat-agents"],
@@ -76,6 +77,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-render",
             "chefshat-room",
             "chefshat-vector",
+            "chefshat-cluster",
         ],
     ),
     ("chefshat-client", &["chefshat-proto"]),

@@ -1,0 +1,360 @@
+//! What one node knows and wants: it beats, takes orphans over, hands everything over when it is drained, and serves nothing without
+//! a lease. The caller does what it puts out, one transaction each, and brings the answers in, in any order; that no answer
+//! came is brought in as well, once the caller has waited long enough.
+//!
+//! Each answer to a beat says which units the node owns according to the database. So if an answer is lost (to a claim or a
+//! release), the node learns the truth with one of its next beats.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::{Epoch, Lease, LeaseTimes, NodeId};
+
+/// Most orphans asked for at a time, so that several nodes share those of one that died.
+const ORPHANS_AT_ONCE: usize = 64;
+
+/// What a node is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// Serves and takes over.
+    Serving,
+    /// Hands over what it owns and takes nothing new.
+    Draining,
+    /// Owns nothing any more: drained, or forgotten by the database.
+    Left,
+}
+
+/// The answer to a beat.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum BeatAnswer<K> {
+    /// The lease is renewed. In the same transaction the node owned these.
+    Kept(Vec<(K, Epoch)>),
+    /// The database does not know the node: it was away for long and has been removed.
+    Unknown,
+    /// No answer came.
+    None,
+}
+
+/// The answer to a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ClaimAnswer {
+    /// The node owns it, at this epoch.
+    Won(Epoch),
+    /// It was no orphan any more.
+    Lost,
+    /// No answer came.
+    None,
+}
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Input<K> {
+    /// Time has passed.
+    Time,
+    /// A beat that was sent at this time was answered.
+    Beat {
+        /// When it was sent, on the clock of this node.
+        sent_ms: u64,
+        /// The answer.
+        answer: BeatAnswer<K>,
+    },
+    /// Orphans were found, or somebody said that there are some.
+    Orphans(Vec<(K, Epoch)>),
+    /// A claim was answered.
+    Claimed(K, ClaimAnswer),
+    /// A unit was created here.
+    Created(K),
+    /// A write was refused at this epoch: another node owns the unit.
+    Fenced(K, Epoch),
+    /// All of a unit is over, and the database knows.
+    Ended(K),
+    /// A release was answered; `false` if no answer came.
+    Released(K, bool),
+    /// The node is to hand everything over and leave.
+    Drain,
+}
+
+/// What the caller has to do.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Output<K> {
+    /// Beat, and read in the same transaction what the node owns.
+    Beat,
+    /// Look for at most so many orphans.
+    FindOrphans(usize),
+    /// Claim an orphan that was seen at this epoch.
+    Claim(K, Epoch),
+    /// Read its journals and run it.
+    Serve(K, Epoch),
+    /// Stop running it at once and publish nothing more.
+    Stop(K),
+    /// Publish nothing until `Resume`: the lease has ended.
+    Suspend,
+    /// The lease holds again, and the node still owns what still runs.
+    Resume,
+    /// Stop running it when its last writes are answered, then release it.
+    Release(K, Epoch),
+    /// Remove the node from the database, where it owns nothing.
+    Leave,
+}
+
+/// A node.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Node<K> {
+    id: NodeId,
+    lease: Lease,
+    phase: Phase,
+    /// Most units it takes over; those created here come on top.
+    capacity: usize,
+    owned: BTreeMap<K, Epoch>,
+    /// Claims without an answer, and whether the lease has held since each was sent. Otherwise its answer may be older than a
+    /// takeover by another node, and only the next beats tell who owns the unit.
+    claiming: BTreeMap<K, bool>,
+    releasing: BTreeSet<K>,
+    suspended: bool,
+    /// Whether a beat waits for its answer.
+    beating: bool,
+    beats_at_ms: u64,
+    /// What changed hands since the last beat was sent: its answer may be older.
+    changed: BTreeSet<K>,
+}
+
+impl<K: Ord + Copy> Node<K> {
+    /// A node that has just joined: it has no lease until its first beat is kept.
+    pub fn new(id: NodeId, times: LeaseTimes, capacity: usize) -> Self {
+        Self {
+            id,
+            lease: Lease::new(times),
+            phase: Phase::Serving,
+            capacity,
+            owned: BTreeMap::new(),
+            claiming: BTreeMap::new(),
+            releasing: BTreeSet::new(),
+            suspended: true,
+            beating: false,
+            beats_at_ms: 0,
+            changed: BTreeSet::new(),
+        }
+    }
+
+    /// Its id.
+    pub fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// What it is doing.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Whether it may publish what is committed, and answer for its units.
+    pub fn may_publish(&self, now_ms: u64) -> bool {
+        !self.suspended && self.lease.holds(now_ms)
+    }
+
+    /// When it must have stopped to publish, on its own clock, unless a beat is kept before. The past if it may not publish.
+    pub fn publishes_until_ms(&self) -> u64 {
+        match self.suspended {
+            true => 0,
+            false => self.lease.ends_ms(),
+        }
+    }
+
+    /// Whether it accepts new decisions for a unit.
+    pub fn serves(&self, unit: K, now_ms: u64) -> bool {
+        self.may_publish(now_ms)
+            && self.owned.contains_key(&unit)
+            && !self.releasing.contains(&unit)
+    }
+
+    /// Whether it may create a unit.
+    pub fn may_create(&self, now_ms: u64) -> bool {
+        self.phase == Phase::Serving && self.may_publish(now_ms)
+    }
+
+    /// The units that it owns, as far as it knows.
+    pub fn owned(&self) -> impl Iterator<Item = (K, Epoch)> {
+        self.owned.iter().map(|(id, epoch)| (*id, *epoch))
+    }
+
+    /// When it wants to be woken with [`Input::Time`].
+    pub fn wakes_at_ms(&self) -> u64 {
+        match self.suspended {
+            true => self.beats_at_ms,
+            false => self.beats_at_ms.min(self.lease.ends_ms()),
+        }
+    }
+
+    /// Takes in what happened and returns what has to be done, in order.
+    pub fn handle(&mut self, input: Input<K>, now_ms: u64) -> Vec<Output<K>> {
+        let mut outputs = Vec::new();
+        self.suspend_without_lease(now_ms, &mut outputs);
+        if self.phase == Phase::Left {
+            return outputs;
+        }
+        match input {
+            Input::Time => {}
+            Input::Beat { sent_ms, answer } => self.beaten(sent_ms, answer, now_ms, &mut outputs),
+            Input::Orphans(orphans) => self.claim(orphans, &mut outputs),
+            Input::Claimed(id, answer) => self.claimed(id, answer, &mut outputs),
+            Input::Created(id) => self.own(id, Epoch::FIRST),
+            Input::Fenced(id, epoch) => {
+                if self.owned.get(&id) == Some(&epoch) {
+                    self.disown(id);
+                    outputs.push(Output::Stop(id));
+                }
+            }
+            Input::Ended(id) => self.disown(id),
+            Input::Released(id, true) => self.disown(id),
+            // Whether it was released is in the answer to a later beat.
+            Input::Released(id, false) => {
+                self.changed.insert(id);
+                self.releasing.remove(&id);
+            }
+            Input::Drain => {
+                self.phase = Phase::Draining;
+                self.beats_at_ms = now_ms;
+            }
+        }
+        if self.phase == Phase::Draining {
+            self.release(&mut outputs);
+            // The next beat says whether it may leave.
+            if self.owns_nothing() && !self.changed.is_empty() {
+                self.beats_at_ms = now_ms;
+            }
+        }
+        if self.phase != Phase::Left && !self.beating && now_ms >= self.beats_at_ms {
+            self.beating = true;
+            self.beats_at_ms = now_ms + self.lease.times().beat_every_ms();
+            self.changed.clear();
+            outputs.push(Output::Beat);
+        }
+        outputs
+    }
+
+    fn suspend_without_lease(&mut self, now_ms: u64, outputs: &mut Vec<Output<K>>) {
+        if !self.suspended && !self.lease.holds(now_ms) {
+            self.suspended = true;
+            self.claiming.values_mut().for_each(|held| *held = false);
+            outputs.push(Output::Suspend);
+        }
+    }
+
+    fn own(&mut self, id: K, epoch: Epoch) {
+        self.owned.insert(id, epoch);
+        self.changed.insert(id);
+    }
+
+    fn disown(&mut self, id: K) {
+        self.owned.remove(&id);
+        self.releasing.remove(&id);
+        self.changed.insert(id);
+    }
+
+    fn owns_nothing(&self) -> bool {
+        self.owned.is_empty() && self.claiming.is_empty()
+    }
+
+    fn beaten(
+        &mut self,
+        sent_ms: u64,
+        answer: BeatAnswer<K>,
+        now_ms: u64,
+        outputs: &mut Vec<Output<K>>,
+    ) {
+        self.beating = false;
+        match answer {
+            BeatAnswer::None => {}
+            BeatAnswer::Unknown => {
+                outputs.extend(self.owned.keys().copied().map(Output::Stop));
+                self.owned.clear();
+                self.releasing.clear();
+                self.phase = Phase::Left;
+            }
+            BeatAnswer::Kept(owned) => {
+                self.lease.beaten(sent_ms);
+                if self.lease.holds(now_ms) {
+                    self.reconcile(&owned.into_iter().collect(), outputs);
+                    if self.suspended {
+                        self.suspended = false;
+                        outputs.push(Output::Resume);
+                    }
+                    self.find_orphans(outputs);
+                    let nothing_left = self.owns_nothing() && self.changed.is_empty();
+                    if self.phase == Phase::Draining && nothing_left {
+                        self.phase = Phase::Left;
+                        outputs.push(Output::Leave);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Corrects what the node believes to own by what the database says, except for what has changed hands since.
+    fn reconcile(&mut self, truth: &BTreeMap<K, Epoch>, outputs: &mut Vec<Output<K>>) {
+        let lost: Vec<K> = (self.owned.iter())
+            .filter(|(id, epoch)| truth.get(id) != Some(epoch) && !self.changed.contains(id))
+            .map(|(id, _)| *id)
+            .collect();
+        for id in lost {
+            self.owned.remove(&id);
+            self.releasing.remove(&id);
+            outputs.push(Output::Stop(id));
+        }
+        for (&id, &epoch) in truth {
+            if self.changed.contains(&id) || self.owned.contains_key(&id) {
+                continue;
+            }
+            self.owned.insert(id, epoch);
+            if self.phase == Phase::Serving {
+                outputs.push(Output::Serve(id, epoch));
+            }
+        }
+    }
+
+    fn find_orphans(&self, outputs: &mut Vec<Output<K>>) {
+        let taken = self.owned.len() + self.claiming.len();
+        let count = self.capacity.saturating_sub(taken).min(ORPHANS_AT_ONCE);
+        if self.phase == Phase::Serving && count > 0 {
+            outputs.push(Output::FindOrphans(count));
+        }
+    }
+
+    fn claim(&mut self, orphans: Vec<(K, Epoch)>, outputs: &mut Vec<Output<K>>) {
+        if self.phase != Phase::Serving || self.suspended {
+            return;
+        }
+        for (id, seen) in orphans {
+            let taken = self.owned.len() + self.claiming.len();
+            let is_new = !self.owned.contains_key(&id) && !self.claiming.contains_key(&id);
+            if taken < self.capacity && is_new {
+                self.claiming.insert(id, true);
+                outputs.push(Output::Claim(id, seen));
+            }
+        }
+    }
+
+    fn claimed(&mut self, id: K, answer: ClaimAnswer, outputs: &mut Vec<Output<K>>) {
+        let held = self.claiming.remove(&id) == Some(true);
+        let ClaimAnswer::Won(epoch) = answer else {
+            return;
+        };
+        if !held {
+            return;
+        }
+        // The answer to a beat may have told it before.
+        if self.owned.get(&id).is_some_and(|owned| *owned >= epoch) {
+            return;
+        }
+        self.own(id, epoch);
+        if self.phase == Phase::Serving {
+            outputs.push(Output::Serve(id, epoch));
+        }
+    }
+
+    fn release(&mut self, outputs: &mut Vec<Output<K>>) {
+        for (&id, &epoch) in &self.owned {
+            if self.releasing.insert(id) {
+                outputs.push(Output::Release(id, epoch));
+            }
+        }
+    }
+}

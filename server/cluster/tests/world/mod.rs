@@ -1,0 +1,686 @@
+//! The servers and the database around the core, as a model: what a server does with what its node puts out, what the
+//! database does with a request, and what may happen in between.
+
+mod property;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_cluster::{
+    BeatAnswer, ClaimAnswer, Created, Epoch, Input, Kept, LeaseTimes, Node, NodeId, Output, Phase,
+    Step, Tables, Writer,
+};
+use stateright::{Model, Property};
+
+/// The unit: a room, or a tournament that may create [`ROOM`].
+pub(crate) const UNIT: u8 = 0;
+/// The room of the tournament.
+pub(crate) const ROOM: u8 = 1;
+
+/// A mistake of the servers or the database around the core.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Fault {
+    /// The database commits rows of any epoch.
+    AppendWithoutEpoch,
+    /// Claims do not raise the epoch, so that all writers have the present one.
+    ClaimKeepsEpoch,
+    /// The database ends items for writers of any epoch.
+    FinishWithoutEpoch,
+    /// The database creates items of a unit for creators of any epoch.
+    CreationWithoutEpoch,
+    /// Leases expire by the clocks of the nodes, of which the first is two behind.
+    LocalClocks,
+    /// A node counts its lease from receiving the answer to a beat.
+    LeaseFromReceiving,
+    /// Claims take over what an owner with a lease has.
+    LeaseNotChecked,
+    /// Decisions are published when they are sent to the database.
+    PublishedEarly,
+    /// Decisions are published without a lease once they are committed.
+    PublishedWhileSuspended,
+    /// An append without an answer counts as committed.
+    UnknownIsCommitted,
+}
+
+/// What may happen, and how often.
+#[derive(Clone, Copy)]
+pub(crate) struct Bounds {
+    pub(crate) until: u64,
+    pub(crate) decisions: u8,
+    pub(crate) lost: u8,
+    pub(crate) crashes: u8,
+    pub(crate) drains: u8,
+    pub(crate) ends: u8,
+    /// How often a room is created. With any, the unit is a tournament, whose own journal gets no row when it is taken over.
+    pub(crate) creations: u8,
+    /// Beats take time, and may get lost; otherwise a node sleeps, or they arrive at once.
+    pub(crate) slow_beats: bool,
+    pub(crate) removes: bool,
+}
+
+impl Bounds {
+    /// Nothing happens.
+    pub(crate) const NONE: Self = Self {
+        until: 0,
+        decisions: 0,
+        lost: 0,
+        crashes: 0,
+        drains: 0,
+        ends: 0,
+        creations: 0,
+        slow_beats: false,
+        removes: false,
+    };
+}
+
+/// Two servers and a database.
+pub(crate) struct Cluster {
+    pub(crate) bounds: Bounds,
+    pub(crate) fault: Option<Fault>,
+}
+
+/// What is written: the server that wrote it, and the number of a decision from 1; 0 is a creation or takeover.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(crate) struct Entry {
+    pub(crate) server: usize,
+    pub(crate) decision: u8,
+}
+
+/// A request on its way to the database; its sender may have given up on it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(crate) enum Request {
+    Beat(u64),
+    FindOrphans,
+    Claim(Epoch),
+    Release(Epoch),
+    Create(Epoch),
+    Append(u8, Epoch, u64, Entry),
+    Read(u8, u64),
+    Finish(u8, Epoch, u64),
+    Leave,
+}
+
+/// An answer on its way back.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub(crate) enum Answer {
+    Beat(Option<Vec<(u8, Epoch)>>),
+    Orphans(Vec<(u8, Epoch)>),
+    Claimed(Option<Epoch>),
+    Done,
+    Created(Created),
+    Kept(Kept),
+    Read(Option<(Epoch, Entry)>, Epoch),
+}
+
+/// An item that runs on a server.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct Running {
+    writer: Writer,
+    /// The decision whose append is not answered.
+    open: Option<Entry>,
+    /// A committed decision that waits for a lease to be published.
+    unpublished: Option<Entry>,
+    ends: bool,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct Server {
+    pub(crate) node: Node<u8>,
+    pub(crate) running: BTreeMap<u8, Running>,
+    /// The epoch to release once all its writes are answered.
+    releases: Option<Epoch>,
+    creates: bool,
+    pub(crate) left: bool,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct World {
+    pub(crate) now: u64,
+    pub(crate) tables: Tables<u8, Entry>,
+    /// `None` is dead.
+    pub(crate) servers: Vec<Option<Server>>,
+    /// Requests with the server that sent them, and whether it still waits for the answer.
+    pub(crate) requests: BTreeSet<(usize, Request, bool)>,
+    pub(crate) answers: BTreeSet<(usize, Request, Answer)>,
+    pub(crate) published: BTreeMap<(u8, u64), BTreeSet<(Epoch, Entry)>>,
+    /// The server that claimed the unit at each epoch.
+    pub(crate) owners: BTreeMap<Epoch, usize>,
+    /// Something was published at an epoch that was not the present one.
+    pub(crate) published_late: bool,
+    /// The epoch at which each item was ended, and how many rows the server saw that did.
+    pub(crate) ended: BTreeMap<u8, (Epoch, u64)>,
+    decisions: u8,
+    lost: u8,
+    crashes: u8,
+    drains: u8,
+    ends: u8,
+    creations: u8,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) enum Happening {
+    Tick,
+    Wake(usize),
+    Decide(usize, u8),
+    End(usize, u8),
+    Create(usize),
+    Arrive(usize, Request, bool),
+    Answered(usize, Request, Answer),
+    /// The sender gives up; the request may still arrive.
+    GivenUp(usize, Request),
+    /// The request was carried out, but its answer is lost.
+    AnswerLost(usize, Request, Answer),
+    Crash(usize),
+    Drain(usize),
+}
+
+impl Cluster {
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
+    }
+
+    /// Hands an input to the node of a server, which does what the node puts out.
+    fn put_in(&self, world: &mut World, server: usize, input: Input<u8>) {
+        let now = world.now;
+        let Some(it) = &mut world.servers[server] else {
+            return;
+        };
+        for output in it.node.handle(input, now) {
+            self.put_out(world, server, output);
+        }
+    }
+
+    fn put_out(&self, world: &mut World, server: usize, output: Output<u8>) {
+        let it = world.servers[server].as_mut().expect("it lives");
+        match output {
+            Output::Beat => self.send(world, server, Request::Beat(world.now)),
+            Output::FindOrphans(_) => self.send(world, server, Request::FindOrphans),
+            Output::Claim(_, seen) => self.send(world, server, Request::Claim(seen)),
+            // The journals are read at once: another writer would have another epoch.
+            Output::Serve(unit, epoch) => {
+                it.running.clear();
+                for item in world.tables.open_items(unit) {
+                    let rows = world.tables.journal(item).len() as u64;
+                    it.running.insert(item, Running::new(epoch, rows));
+                }
+            }
+            Output::Stop(_) => it.stop(),
+            Output::Suspend => {}
+            Output::Resume => {
+                let mut publish = Vec::new();
+                for (id, running) in &mut it.running {
+                    let entry = running.unpublished.take();
+                    publish.extend(entry.map(|entry| (*id, running.writer.clone(), entry)));
+                }
+                for (id, writer, entry) in publish {
+                    world.publish(id, writer.position() - 1, writer.epoch(), entry);
+                }
+            }
+            Output::Release(_, epoch) => {
+                it.releases = Some(epoch);
+                self.release_if_quiet(world, server);
+            }
+            Output::Leave => {
+                it.left = true;
+                self.send(world, server, Request::Leave);
+            }
+        }
+    }
+
+    /// Releases the unit if nothing of it waits for the database.
+    fn release_if_quiet(&self, world: &mut World, server: usize) {
+        let Some(it) = &mut world.servers[server] else {
+            return;
+        };
+        let is_quiet = !it.creates && (it.running.values()).all(|it| it.open.is_none() && !it.ends);
+        if let Some(epoch) = it.releases.take_if(|_| is_quiet) {
+            it.running.clear();
+            self.send(world, server, Request::Release(epoch));
+        }
+    }
+
+    /// Sends a request. What only reads is answered at once: whatever it says may be old when it is used, as all that
+    /// is done with it is checked again.
+    fn send(&self, world: &mut World, server: usize, request: Request) {
+        let at_once = match request {
+            Request::FindOrphans | Request::Read(..) | Request::Leave => true,
+            Request::Beat(_) => !self.bounds.slow_beats,
+            _ => false,
+        };
+        if at_once {
+            let answer = self.carry_out(world, server, request);
+            self.take_in(world, server, request, Some(answer));
+        } else {
+            world.requests.insert((server, request, true));
+        }
+    }
+
+    /// The database carries a request out.
+    fn carry_out(&self, world: &mut World, server: usize, request: Request) -> Answer {
+        let node = NodeId(server as u64 + 1);
+        let now = world.now;
+        let takeover = Entry {
+            server,
+            decision: 0,
+        };
+        let tables = &mut world.tables;
+        let any_epoch = self.has(Fault::ClaimKeepsEpoch);
+        let present = |tables: &Tables<u8, Entry>, item, epoch| match tables.epoch(item) {
+            Some(present) => present,
+            None => epoch,
+        };
+        // Without takeovers that raise it, all nodes know the first epoch.
+        let shown = |epoch| if any_epoch { Epoch::FIRST } else { epoch };
+        match request {
+            Request::Beat(_) => {
+                let beat = match self.has(Fault::LocalClocks) && server == 0 {
+                    true => now.saturating_sub(2),
+                    false => now,
+                };
+                let known = tables.beat(node, beat);
+                let owned = tables.owned_by(node).into_iter();
+                Answer::Beat(known.then(|| owned.map(|(id, epoch)| (id, shown(epoch))).collect()))
+            }
+            Request::FindOrphans => {
+                if self.bounds.removes {
+                    tables.remove_expired(now);
+                }
+                match self.has(Fault::LeaseNotChecked) {
+                    true => Answer::Orphans(tables.orphans(u64::MAX, 1)),
+                    false => Answer::Orphans(tables.orphans(now, 1)),
+                }
+            }
+            Request::Claim(seen) => {
+                let now = match self.has(Fault::LeaseNotChecked) {
+                    true => u64::MAX,
+                    false => now,
+                };
+                let is_game = |item| item == ROOM || self.bounds.creations == 0;
+                let restarted = |item| is_game(item).then_some(takeover);
+                let claimed = tables.claim(UNIT, seen, node, now, restarted);
+                world.owners.extend(claimed.map(|epoch| (epoch, server)));
+                Answer::Claimed(claimed.map(shown))
+            }
+            Request::Release(epoch) => {
+                let epoch = match any_epoch {
+                    true => present(tables, UNIT, epoch),
+                    false => epoch,
+                };
+                tables.release(UNIT, epoch);
+                Answer::Done
+            }
+            Request::Create(epoch) => {
+                let epoch = match any_epoch || self.has(Fault::CreationWithoutEpoch) {
+                    true => present(tables, UNIT, epoch),
+                    false => epoch,
+                };
+                Answer::Created(tables.create_in(UNIT, epoch, ROOM, takeover))
+            }
+            Request::Append(item, epoch, position, entry) => {
+                let epoch = match any_epoch || self.has(Fault::AppendWithoutEpoch) {
+                    true => present(tables, item, epoch),
+                    false => epoch,
+                };
+                Answer::Kept(tables.append(item, epoch, position, entry))
+            }
+            Request::Read(item, position) => {
+                let row = tables.journal(item).get(position as usize);
+                let row = row.map(|row| (shown(row.epoch), row.entries));
+                let epoch = tables.epoch(item).map_or(Epoch::FIRST, shown);
+                Answer::Read(row, epoch)
+            }
+            Request::Finish(item, epoch, rows) => {
+                let checked = match any_epoch || self.has(Fault::FinishWithoutEpoch) {
+                    true => present(tables, item, epoch),
+                    false => epoch,
+                };
+                let kept = tables.finish(item, checked);
+                if kept == Kept::Kept {
+                    world.ended.entry(item).or_insert((epoch, rows));
+                }
+                Answer::Kept(kept)
+            }
+            Request::Leave => {
+                tables.leave(node);
+                Answer::Done
+            }
+        }
+    }
+
+    /// A server takes an answer in, or learns that none comes (`None`).
+    fn take_in(&self, world: &mut World, server: usize, to: Request, answer: Option<Answer>) {
+        let now = world.now;
+        let Some(it) = &mut world.servers[server] else {
+            return;
+        };
+        let input = match (to, answer) {
+            (Request::Append(item, epoch, ..), answer) => {
+                let kept = match answer {
+                    Some(Answer::Kept(kept)) => Some(kept),
+                    _ => self.has(Fault::UnknownIsCommitted).then_some(Kept::Kept),
+                };
+                let running = it.running.get_mut(&item);
+                if let Some(running) = running.filter(|it| it.writer.epoch() == epoch) {
+                    let step = running.writer.appended(kept);
+                    self.go_on(world, server, item, step);
+                }
+                return;
+            }
+            (Request::Read(item, _), Some(Answer::Read(row, present))) => {
+                if let Some(running) = it.running.get_mut(&item) {
+                    let epoch = running.writer.epoch();
+                    let ours =
+                        row.map(|(writer, entry)| writer == epoch && Some(entry) == running.open);
+                    let step = running.writer.read(ours, present != epoch);
+                    self.go_on(world, server, item, step);
+                }
+                return;
+            }
+            (Request::Finish(item, epoch, _), answer) => {
+                let running = it.running.get(&item);
+                if running.is_none_or(|it| !it.ends || it.writer.epoch() != epoch) {
+                    return;
+                }
+                match answer {
+                    Some(Answer::Kept(Kept::Kept)) => {
+                        it.running.remove(&item);
+                        if it.running.is_empty() {
+                            it.releases = None;
+                            Input::Ended(UNIT)
+                        } else {
+                            return self.release_if_quiet(world, server);
+                        }
+                    }
+                    Some(_) => Input::Fenced(UNIT, epoch),
+                    // Doing so again changes nothing.
+                    None => return self.send(world, server, to),
+                }
+            }
+            (Request::Create(epoch), answer) => {
+                if !std::mem::take(&mut it.creates) {
+                    return;
+                }
+                match answer {
+                    // It is taken if this is a repetition.
+                    Some(Answer::Created(Created::Created | Created::Taken)) => {
+                        it.running.insert(ROOM, Running::new(epoch, 1));
+                        return self.release_if_quiet(world, server);
+                    }
+                    Some(_) => Input::Fenced(UNIT, epoch),
+                    None => {
+                        it.creates = true;
+                        return self.send(world, server, to);
+                    }
+                }
+            }
+            (Request::Beat(sent_ms), answer) => Input::Beat {
+                sent_ms: match self.has(Fault::LeaseFromReceiving) {
+                    true => now,
+                    false => sent_ms,
+                },
+                answer: match answer {
+                    Some(Answer::Beat(Some(owned))) => BeatAnswer::Kept(owned),
+                    Some(_) => BeatAnswer::Unknown,
+                    None => BeatAnswer::None,
+                },
+            },
+            (Request::FindOrphans, Some(Answer::Orphans(orphans))) => Input::Orphans(orphans),
+            (Request::Claim(_), answer) => Input::Claimed(
+                UNIT,
+                match answer {
+                    Some(Answer::Claimed(Some(epoch))) => ClaimAnswer::Won(epoch),
+                    Some(_) => ClaimAnswer::Lost,
+                    None => ClaimAnswer::None,
+                },
+            ),
+            (Request::Release(_), answer) => Input::Released(UNIT, answer.is_some()),
+            _ => return,
+        };
+        self.put_in(world, server, input);
+    }
+
+    /// The writer of an item says what comes next.
+    fn go_on(&self, world: &mut World, server: usize, item: u8, step: Step) {
+        let it = world.servers[server].as_mut().expect("it lives");
+        let may_publish = it.node.may_publish(world.now);
+        let running = it.running.get_mut(&item).expect("it runs");
+        let epoch = running.writer.epoch();
+        let position = running.writer.position();
+        match step {
+            Step::Publish => {
+                let entry = running.open.take().expect("an append is open");
+                if may_publish || self.has(Fault::PublishedWhileSuspended) {
+                    world.publish(item, position - 1, epoch, entry);
+                } else {
+                    running.unpublished = Some(entry);
+                }
+                self.release_if_quiet(world, server);
+            }
+            Step::Read => self.send(world, server, Request::Read(item, position)),
+            Step::Append => {
+                let entry = running.open.expect("an append is open");
+                let append = Request::Append(item, epoch, position, entry);
+                self.send(world, server, append);
+            }
+            Step::Stop => self.put_in(world, server, Input::Fenced(UNIT, epoch)),
+        }
+    }
+}
+
+impl Running {
+    fn new(epoch: Epoch, rows: u64) -> Self {
+        Self {
+            writer: Writer::new(epoch, rows),
+            open: None,
+            unpublished: None,
+            ends: false,
+        }
+    }
+
+    fn is_idle(&self) -> bool {
+        self.open.is_none() && self.unpublished.is_none() && !self.ends
+    }
+}
+
+impl Server {
+    fn stop(&mut self) {
+        self.running.clear();
+        self.releases = None;
+        self.creates = false;
+    }
+}
+
+impl World {
+    fn publish(&mut self, item: u8, position: u64, epoch: Epoch, entry: Entry) {
+        let rows = self.published.entry((item, position)).or_default();
+        rows.insert((epoch, entry));
+        let owner = self.tables.owner(item);
+        self.published_late |= owner.is_some_and(|node| node.0 != entry.server as u64 + 1);
+    }
+
+    /// Whether the server runs the unit and accepts decisions.
+    pub(crate) fn serves(&self, server: usize) -> bool {
+        let it = self.servers[server].as_ref();
+        it.is_some_and(|it| !it.running.is_empty() && it.node.serves(UNIT, self.now))
+    }
+}
+
+impl Model for Cluster {
+    type State = World;
+    type Action = Happening;
+
+    fn init_states(&self) -> Vec<World> {
+        let times = LeaseTimes::new(1, 2, 3).expect("these are in order");
+        let mut tables = Tables::new(times);
+        let servers = (0..2).map(|_| {
+            Some(Server {
+                node: Node::new(tables.join(0), times, 1),
+                running: BTreeMap::new(),
+                releases: None,
+                creates: false,
+                left: false,
+            })
+        });
+        let servers = servers.collect();
+        let first = Entry {
+            server: 0,
+            decision: 0,
+        };
+        tables.create(UNIT, NodeId(1), first);
+        vec![World {
+            now: 0,
+            tables,
+            servers,
+            requests: BTreeSet::new(),
+            answers: BTreeSet::new(),
+            published: BTreeMap::new(),
+            owners: BTreeMap::from([(Epoch::FIRST, 0)]),
+            published_late: false,
+            ended: BTreeMap::new(),
+            decisions: 0,
+            lost: 0,
+            crashes: 0,
+            drains: 0,
+            ends: 0,
+            creations: 0,
+        }]
+    }
+
+    fn actions(&self, world: &World, actions: &mut Vec<Happening>) {
+        let bounds = &self.bounds;
+        if world.now < bounds.until {
+            actions.push(Happening::Tick);
+        }
+        for (server, it) in world.servers.iter().enumerate() {
+            let Some(it) = it.as_ref().filter(|it| !it.left) else {
+                continue;
+            };
+            if world.now >= it.node.wakes_at_ms() {
+                actions.push(Happening::Wake(server));
+            }
+            if world.serves(server) {
+                let idle = it.running.iter().filter(|(_, running)| running.is_idle());
+                for (item, _) in idle {
+                    if world.decisions < bounds.decisions {
+                        actions.push(Happening::Decide(server, *item));
+                    }
+                    if world.ends < bounds.ends {
+                        actions.push(Happening::End(server, *item));
+                    }
+                }
+                let creates = it.creates || it.running.contains_key(&ROOM);
+                if world.creations < bounds.creations && !creates {
+                    actions.push(Happening::Create(server));
+                }
+            }
+            if world.crashes < bounds.crashes {
+                actions.push(Happening::Crash(server));
+            }
+            if world.drains < bounds.drains && it.node.phase() == Phase::Serving {
+                actions.push(Happening::Drain(server));
+            }
+        }
+        for &(server, request, awaited) in &world.requests {
+            actions.push(Happening::Arrive(server, request, awaited));
+            if awaited && world.lost < bounds.lost {
+                actions.push(Happening::GivenUp(server, request));
+            }
+        }
+        for (server, request, answer) in &world.answers {
+            actions.push(Happening::Answered(*server, *request, answer.clone()));
+            if world.lost < bounds.lost {
+                actions.push(Happening::AnswerLost(*server, *request, answer.clone()));
+            }
+        }
+    }
+
+    fn next_state(&self, world: &World, happening: Happening) -> Option<World> {
+        let mut next = world.clone();
+        self.happen(&mut next, happening);
+        Some(next)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        property::all(&self.bounds)
+    }
+}
+
+impl Cluster {
+    /// Something happens.
+    fn happen(&self, next: &mut World, happening: Happening) {
+        match happening {
+            Happening::Tick => next.now += 1,
+            Happening::Wake(server) => self.put_in(next, server, Input::Time),
+            Happening::Drain(server) => {
+                next.drains += 1;
+                self.put_in(next, server, Input::Drain);
+            }
+            Happening::Crash(server) => {
+                next.crashes += 1;
+                next.servers[server] = None;
+                next.answers.retain(|(to, ..)| *to != server);
+                let requests = std::mem::take(&mut next.requests).into_iter();
+                next.requests = requests
+                    .map(|(from, request, awaited)| (from, request, awaited && from != server))
+                    .collect();
+            }
+            Happening::Decide(server, item) => {
+                next.decisions += 1;
+                let entry = Entry {
+                    server,
+                    decision: next.decisions,
+                };
+                let running = next.running(server, item);
+                running.open = Some(entry);
+                let (epoch, position) = (running.writer.epoch(), running.writer.position());
+                if self.has(Fault::PublishedEarly) {
+                    next.publish(item, position, epoch, entry);
+                }
+                let append = Request::Append(item, epoch, position, entry);
+                self.send(next, server, append);
+            }
+            Happening::End(server, item) => {
+                next.ends += 1;
+                let running = next.running(server, item);
+                running.ends = true;
+                let (epoch, rows) = (running.writer.epoch(), running.writer.position());
+                self.send(next, server, Request::Finish(item, epoch, rows));
+            }
+            Happening::Create(server) => {
+                next.creations += 1;
+                let epoch = next.running(server, UNIT).writer.epoch();
+                let it = next.servers[server].as_mut().expect("it lives");
+                it.creates = true;
+                self.send(next, server, Request::Create(epoch));
+            }
+            Happening::Arrive(server, request, awaited) => {
+                next.requests.remove(&(server, request, awaited));
+                let answer = self.carry_out(next, server, request);
+                if awaited {
+                    next.answers.insert((server, request, answer));
+                }
+            }
+            Happening::GivenUp(server, request) => {
+                next.lost += 1;
+                next.requests.remove(&(server, request, true));
+                next.requests.insert((server, request, false));
+                self.take_in(next, server, request, None);
+            }
+            Happening::Answered(server, request, answer) => {
+                next.answers.remove(&(server, request, answer.clone()));
+                self.take_in(next, server, request, Some(answer));
+            }
+            Happening::AnswerLost(server, request, answer) => {
+                next.lost += 1;
+                next.answers.remove(&(server, request, answer));
+                self.take_in(next, server, request, None);
+            }
+        }
+    }
+}
+
+impl World {
+    fn running(&mut self, server: usize, item: u8) -> &mut Running {
+        let it = self.servers[server].as_mut().expect("it lives");
+        it.running.get_mut(&item).expect("it runs")
+    }
+}
