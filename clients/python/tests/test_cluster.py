@@ -1,6 +1,6 @@
-"""The sample for Ray clusters: its runners without Ray, and the complete sample on a local cluster if Ray is installed.
+"""The sample for Ray clusters: its parts without Ray, and the complete sample on a local cluster if Ray is installed.
 
-Ray (extra `ray`) is large, so the tests do not require it.
+Ray (extra `ray`) is large, so the tests do not require it; `cargo xtask test --only python --slow` installs it.
 """
 
 import importlib.util
@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from chefshat import pb
-from chefshat.learn import network, runs
+from chefshat.learn import network, ppo_checkpoint, runs
+from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo_checkpoint import Plan
 
 SAMPLE = Path(__file__).resolve().parents[1] / "samples" / "cluster" / "rllib_ppo.py"
@@ -43,7 +44,11 @@ def sample(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         "ray.rllib.algorithms.algorithm_config": {"AlgorithmConfig": type("AlgorithmConfig", (), {})},
         "ray.rllib.env": {},
         "ray.rllib.env.env_runner": {"EnvRunner": Runner},
+        "ray.rllib.env.env_runner_group": {"EnvRunnerGroup": object},
     }
+    # The sample sets them.
+    for variable in ("NPROC", "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "RAY_USAGE_STATS_ENABLED"):
+        monkeypatch.setenv(variable, "")
     for name, contents in names.items():
         module = ModuleType(name)
         vars(module).update(contents)
@@ -71,29 +76,65 @@ def test_runners_play_different_deals_with_the_given_rules(sample: ModuleType, m
     monkeypatch.setattr(sample, "Collector", lambda env, games, steps: None)
     monkeypatch.setattr(sample, "play", play)
     rules = pb.RuleSet(players=2, faces=4)
-    setting = {"plan": Plan(games=8), "address": "an address", "rules": rules}
+    setting = {"plan": Plan(games=8), "addresses": ["one", "two"], "rules": rules}
     for seed in (1, 2):
-        for number in (1, 2):
+        for number in (1, 2, 3):
             config = SimpleNamespace(env_config=setting, seed=seed)
             runner = sample.SelfPlayRunner(config=config, worker_index=number)
-            runner.sample(None)
-            runner.sample(None)
-    assert all((one["address"], one["games"], one["rules"]) == ("an address", 8, rules) for one in asked)
+            played = [runner.sample(None, iteration) for iteration in (0, 1)]
+            assert [part.runner for part in played] == [number, number]
+    # The servers have equal shares.
+    assert [one["address"] for one in asked] == ["one", "two", "one"] * 2
+    assert all((one["games"], one["rules"]) == (8, rules) for one in asked)
     seeds = [one["seed"] for one in asked]
     # No two runners, no two trainings, and no runner and evaluation share a seed.
-    assert len({*seeds, runs.EVALUATION_SEED}) == 5
+    assert len({*seeds, runs.EVALUATION_SEED}) == 7
     assert min(seeds) >= runs.SEED_STEP > runs.EVALUATION_SEED
-    assert len(set(chances)) == 8
+    assert len(set(chances)) == 12
+
+
+def test_a_runner_plays_legally_and_a_lost_server_is_named(sample: ModuleType, anywhere: str | None) -> None:
+    plan = Plan(games=4, steps=16)
+    setting = {"plan": plan, "addresses": [anywhere] if anywhere else [], "rules": "paper"}
+    runner = sample.SelfPlayRunner(config=SimpleNamespace(env_config=setting, seed=1), worker_index=1)
+    runner.assert_healthy()
+    params = ppo_checkpoint.begin(plan, 1, runner.env.rules, "").learner.params
+    played = runner.sample(params, 0)
+    # The last features are the mask.
+    masks = np.asarray(played.samples.inputs)[:, -runner.env.num_actions :]
+    assert masks[np.arange(64), np.asarray(played.samples.actions)].all()
+    assert runner.env.batch.totals.client_decisions == 64
+    assert runner.env.batch.totals.invalid_attempts == 0
+    runner.stop()
+    sample.ray.get = lambda reference: reference
+    error = sample._sample(params, 1, runner)
+    assert error.reason == "ENV_CLOSED"
+    assert f"runner 1, which plays on {anywhere}" in str(error)
+
+
+def test_a_random_policy_has_the_mean_of_the_points(sample: ModuleType, anywhere: str | None) -> None:
+    found = evaluate(sample.randomly(1), "random", games=100, seed=1, address=anywhere)
+    assert found.games == 100
+    assert sum(found.places) == found.shifts
+    # A Shift has 5, 3, 1 and 0 points.
+    assert abs(found.points - 9 / 4) < 4 * found.standard_error < 1
 
 
 @pytest.mark.server
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'chefshat[ray]'")
-def test_a_few_iterations_are_trained(real_address: str, tmp_path: Path) -> None:
-    out = tmp_path / "n.safetensors"
-    command = [sys.executable, str(SAMPLE), "--address", real_address, "--runners", "2", "--games", "8", "--iterations", "2"]
-    done = subprocess.run([*command, "--out", str(out)], capture_output=True, text=True, timeout=LIMIT_S)
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert [json.loads(line)["decisions"] for line in lines[:2]] == [1024, 2048]
-    assert "against random, random, random" in lines[2]
-    assert network.load(out).info.name == "rllib"
+def test_a_training_is_the_same_on_two_servers_and_in_process(real_binary: Path, tmp_path: Path) -> None:
+    pytest.importorskip("chefshat_native")
+    command = [sys.executable, str(SAMPLE), "--json", "--runners", "2", "--games", "8", "--iterations", "2", "--evaluation", "8"]
+    trained = []
+    for name, where in (("servers", ["--servers", "2"]), ("process", [])):
+        out = tmp_path / f"{name}.safetensors"
+        done = subprocess.run([*command, *where, "--out", str(out)], capture_output=True, text=True, timeout=LIMIT_S)
+        assert done.returncode == 0, done.stderr
+        *iterations, _, evaluation, last = map(json.loads, done.stdout.splitlines())
+        assert [line["decisions"] for line in iterations] == [1024, 2048]
+        assert [line["runners"] for line in iterations] == [2, 2]
+        assert evaluation["opponents"] == "greedy"
+        assert [evaluation[player]["games"] for player in ("learned", "untrained", "random")] == [8, 8, 8]
+        assert network.load(out).info.name == "rllib"
+        trained.append((evaluation, last))
+    assert trained[0] == trained[1]

@@ -1,4 +1,4 @@
-"""The command `evaluate`: plays a network on one seat against built-in agents, over whole games.
+"""The command `evaluate`: plays a network, or another policy, on one seat against built-in agents, over whole games.
 
 `chefshat compare` (the program) repeats deals with rotated seats, and so needs far fewer Shifts for the same certainty. How a
 network decides is in `network`.
@@ -18,6 +18,7 @@ from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
+from chefshat.opponents import Policy
 from chefshat.vector import Rules, Seed, VectorEnv
 
 # Parallel games.
@@ -32,7 +33,7 @@ class Evaluation:
         opponents: the agents of the other seats.
         games: games played.
         shifts: Shifts played.
-        points: points per Shift of the network's seat.
+        points: points per Shift of the evaluated seat.
         standard_error: of `points`; games count as independent, the Shifts of one game do not (roles connect them).
         places: counts of each place, first to last.
     """
@@ -52,7 +53,7 @@ class Evaluation:
 
 
 def evaluate(
-    network: Network,
+    player: Network | Policy,
     opponents: str | Sequence[str],
     *,
     games: int,
@@ -60,10 +61,10 @@ def evaluate(
     rules: Rules = None,
     address: str | ServerAddress | None = None,
 ) -> Evaluation:
-    """Plays games with the network on seat 0; random deals make all seats equal.
+    """Plays games with the player on seat 0; random deals make all seats equal.
 
     Args:
-        network: takes the legal action with the highest output.
+        player: a network, which takes the legal action with the highest output, or a function that chooses actions.
         opponents: built-in agents or network files of the other seats, one name for all or one for each.
         games: number of games.
         seed: seed of the deals.
@@ -74,21 +75,22 @@ def evaluate(
         ChefsHatError: the games are refused, or the server does not answer.
         ValueError: the network was trained for games of another size.
     """
+    network = player if isinstance(player, Network) else None
     with VectorEnv(
         address,
         min(games, SIDE_BY_SIDE),
         client_seats=[0],
         opponents=opponents,
         episode="shift",
-        decisions="turns" if network.info.output == "turns" else "all",
+        decisions="turns" if network and network.info.output == "turns" else "all",
         skip_forced=True,
         total_games=games,
         seed=seed,
         rules=rules,
         shift_statistics=True,
     ) as env:
-        info = network.info
-        if not info.fits(env.players, env.faces, env.hand_size):
+        if network and not network.info.fits(env.players, env.faces, env.hand_size):
+            info = network.info
             raise ValueError(
                 f"the network plays with {info.players} players, {info.faces} faces and hands of {info.hand_size} cards, "
                 f"not with {env.players}, {env.faces} and {env.hand_size}"
@@ -106,7 +108,11 @@ def evaluate(
             places.append(batch.shifts.places[:, 0])
             if batch.done:
                 break
-            batch = env.step(network.actions(batch.observations, batch.seats, batch.kinds, batch.mask_bits))
+            if isinstance(player, Network):
+                actions: npt.ArrayLike = player.actions(batch.observations, batch.seats, batch.kinds, batch.mask_bits)
+            else:
+                actions = player(batch)
+            batch = env.step(actions)
         taken = np.bincount(np.concatenate(places), minlength=env.players + 1)[1:]
     return summed_up(names, games, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
 
