@@ -220,9 +220,9 @@ def configured(plan: Plan, addresses: Sequence[str], *, runners: int, rules: str
     places: Sequence[str | None] = addresses or [None]
     complete = [full_rules(rules, address) for address in places]
     setting = {"plan": plan, "addresses": addresses, "rules": complete[0]}
-    return (
-        JaxPPOConfig().environment(env_config=setting).env_runners(num_env_runners=runners).debugging(seed=seed, log_level="ERROR")
-    )
+    config = JaxPPOConfig()
+    config.environment(env_config=setting).env_runners(num_env_runners=runners).debugging(seed=seed, log_level="ERROR")
+    return config
 
 
 def randomly(seed: int) -> Policy:
