@@ -9,19 +9,22 @@ use std::io;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
+use futures::future::{Either, try_join};
 use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
+use tonic::body::Body;
 use tonic::service::Routes;
 use tonic::transport;
-use tonic::transport::server::Connected;
+use tonic::transport::server::{Connected, TcpConnectInfo};
+use tower::util::{MapRequestLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
-use crate::cluster::{Directory, SingleServer};
+use crate::cluster::{CONNECTION_WINDOW, Directory, PeerPort, STREAM_WINDOW, SingleServer};
 use crate::config::{
     DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
     ServerConfig,
@@ -31,6 +34,7 @@ use crate::forwarded::ForwardedLayer;
 use crate::grpc;
 use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
+use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
 use crate::rooms::Rooms;
 use crate::scrape;
@@ -92,6 +96,7 @@ pub struct Server {
     tournaments: Arc<Tournaments>,
     access: Arc<Access>,
     tls: Option<Arc<Tls>>,
+    peers: Option<PeerPort>,
     calls: Arc<CallLimits>,
     connections: Arc<Connections>,
     tracker: TaskTracker,
@@ -139,9 +144,20 @@ impl Server {
             tournaments,
             access: Arc::new(access),
             tls,
+            peers: None,
             tracker,
             games,
         })
+    }
+
+    /// Serves other nodes on a socket of their own, and sends them what is about their rooms and
+    /// tournaments.
+    #[must_use]
+    pub fn with_peers(self, port: PeerPort) -> Self {
+        Self {
+            peers: Some(port),
+            ..self
+        }
     }
 
     /// Number of resumed games and of tournament games that are still to be played.
@@ -197,6 +213,7 @@ impl Server {
             tournaments,
             access,
             tls,
+            peers,
             calls,
             connections,
             tracker,
@@ -242,6 +259,38 @@ impl Server {
         if let Some(tls) = tls {
             tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
         }
+        let forwarding = (peers.as_ref())
+            .map(|port| grpc::ForwardLayer::new(Arc::clone(rooms.directory()), port.peers()));
+        let peer_serving = match peers {
+            None => Either::Left(std::future::ready(Ok(()))),
+            Some(port) => {
+                if let Some(tls) = port.tls() {
+                    tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
+                }
+                let closed = closing.clone();
+                Either::Right(
+                    transport::Server::builder()
+                        .http2_max_header_list_size(MAX_HEADER_BYTES)
+                        .max_concurrent_streams(None)
+                        .initial_stream_window_size(STREAM_WINDOW)
+                        .initial_connection_window_size(CONNECTION_WINDOW)
+                        .layer(MapRequestLayer::new(without_address))
+                        .layer(ForwardedLayer::new(TrustedProxies::new([
+                            TrustedProxy::UnixSocket,
+                        ])))
+                        .layer(grpc::count_refusals(rooms.metrics()))
+                        .layer(grpc::AccessLayer::new(
+                            Arc::clone(&access),
+                            Arc::clone(&calls),
+                        ))
+                        .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
+                        .add_routes(routes.clone())
+                        .serve_with_incoming_shutdown(port.incoming(), async move {
+                            closed.cancelled().await;
+                        }),
+                )
+            }
+        };
         let closed = closing.clone();
         let origins = Origins::new(config.allowed_origins.clone(), config.allowed_hosts.clone());
         let mut builder = transport::Server::builder();
@@ -259,6 +308,7 @@ impl Server {
             .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
+            .layer(option_layer(forwarding))
             .layer(grpc::AccessLayer::new(
                 Arc::clone(&access),
                 Arc::clone(&calls),
@@ -288,7 +338,7 @@ impl Server {
             tokio::time::sleep(DRAIN_LIMIT).await;
         };
         tokio::select! {
-            served = serving => served?,
+            served = try_join(serving, peer_serving) => drop(served?),
             () = ended_or_drained => warn!("dropping connections that do not close"),
             // Nothing more can be acknowledged: waiting clients learn it at once when the process
             // ends.
@@ -301,6 +351,12 @@ impl Server {
         store.close().await;
         Ok(())
     }
+}
+
+/// A request of another node, without that node's address: it names the client's, if it has one.
+fn without_address(mut request: http::Request<Body>) -> http::Request<Body> {
+    request.extensions_mut().remove::<TcpConnectInfo>();
+    request
 }
 
 fn routes(
@@ -324,12 +380,7 @@ fn routes(
     let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
     let recorded = grpc::Recorded::new(reach.clone(), config.access.records);
     let retention = Retention::new(Arc::clone(rooms), Arc::clone(tournaments));
-    let admin = grpc::AdminCalls::new(
-        Arc::clone(rooms),
-        Arc::clone(tournaments),
-        Arc::clone(connections),
-        retention,
-    );
+    let admin = grpc::AdminCalls::new(reach.clone(), Arc::clone(connections), retention);
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let routes = Routes::new(

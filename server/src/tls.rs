@@ -14,7 +14,7 @@ use futures::{Stream, StreamExt as _, stream};
 use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::server::WebPkiClientVerifier;
-use rustls::{RootCertStore, ServerConfig};
+use rustls::{ClientConfig, RootCertStore, ServerConfig};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
@@ -88,14 +88,8 @@ impl TlsFiles {
         let builder = match &self.client_authority {
             None => builder.with_no_client_auth(),
             Some(path) => {
-                let wrong = |problem: &dyn std::fmt::Display| TlsError::Authority {
-                    path: path.clone(),
-                    problem: problem.to_string(),
-                };
-                let mut roots = RootCertStore::empty();
-                for certificate in certificates(path)? {
-                    roots.add(certificate).map_err(|error| wrong(&error))?;
-                }
+                let wrong = |problem: &dyn std::fmt::Display| bad_authority(path, problem);
+                let roots = roots(path)?;
                 let verifier = WebPkiClientVerifier::builder_with_provider(roots.into(), provider);
                 builder.with_client_cert_verifier(verifier.build().map_err(|error| wrong(&error))?)
             }
@@ -106,6 +100,50 @@ impl TlsFiles {
         })?;
         config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
         Ok(Arc::new(config))
+    }
+
+    /// How a node connects to others: it shows its certificate, and admits servers of the authority
+    /// for clients alone.
+    ///
+    /// # Errors
+    /// The files cannot be used.
+    pub fn client_config(&self) -> Result<Arc<ClientConfig>, TlsError> {
+        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let chain = certificates(&self.certificate)?;
+        let key =
+            PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
+        let roots = match &self.client_authority {
+            Some(path) => roots(path)?,
+            None => RootCertStore::empty(),
+        };
+        let builder = ClientConfig::builder_with_provider(provider)
+            .with_safe_default_protocol_versions()
+            .expect("ring supports the default versions")
+            .with_root_certificates(roots);
+        let mut config = builder
+            .with_client_auth_cert(chain, key)
+            .map_err(|source| {
+                let path = self.certificate.clone();
+                TlsError::Certificate { path, source }
+            })?;
+        config.alpn_protocols = vec![b"h2".to_vec()];
+        Ok(Arc::new(config))
+    }
+}
+
+/// The authorities of a file.
+fn roots(path: &Path) -> Result<RootCertStore, TlsError> {
+    let mut roots = RootCertStore::empty();
+    for certificate in certificates(path)? {
+        (roots.add(certificate)).map_err(|error| bad_authority(path, &error))?;
+    }
+    Ok(roots)
+}
+
+fn bad_authority(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
+    TlsError::Authority {
+        path: path.to_path_buf(),
+        problem: problem.to_string(),
     }
 }
 
@@ -292,7 +330,6 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for MaybeTls<C> {
 
 #[cfg(test)]
 mod tests {
-    use rustls::ClientConfig;
     use rustls::pki_types::ServerName;
     use tokio::io::{AsyncReadExt as _, DuplexStream, duplex};
     use tokio_rustls::TlsConnector;

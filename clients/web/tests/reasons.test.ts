@@ -72,6 +72,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "OUT_OF_DESCRIPTORS",
     "TOO_MANY_CONNECTIONS",
   ],
+  "only nodes of a cluster send it to each other": ["NOT_OWNER"],
   "environment variables": ["CARGO_MANIFEST_DIR", "CARGO_PKG_VERSION", "CHEFSHAT_PAIRS"],
 };
 

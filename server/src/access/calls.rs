@@ -28,6 +28,8 @@ pub struct Call {
     pub reads_records: bool,
     /// Whether its requests or answers are a stream.
     pub streams: bool,
+    /// Whether its request, a single message, may be about a room or tournament of another node.
+    pub forwarded: bool,
 }
 
 impl Call {
@@ -42,6 +44,13 @@ impl Call {
             ..self
         }
     }
+
+    const fn forwarded(self) -> Self {
+        Self {
+            forwarded: true,
+            ..self
+        }
+    }
 }
 
 const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
@@ -51,6 +60,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         scoped,
         reads_records: false,
         streams: false,
+        forwarded: false,
     }
 }
 
@@ -61,28 +71,34 @@ const fn records(path: &'static str) -> Call {
         scoped: Scoped::Compared,
         reads_records: true,
         streams: false,
+        forwarded: false,
     }
 }
 
 /// Every call of the server. Those played most often come first.
 pub const CALLS: &[Call] = &[
-    call("/chefshat.v1.PlayService/Act", Player, Compared),
+    call("/chefshat.v1.PlayService/Act", Player, Compared).forwarded(),
     call("/chefshat.v1.PlayService/Play", Player, Compared).streaming(),
     call("/chefshat.v1.PlayService/Watch", Player, Compared).streaming(),
-    call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared).streaming(),
-    call("/chefshat.v1.TableService/Report", Player, Compared),
-    call("/chefshat.v1.TableService/Watch", Player, Compared).streaming(),
-    call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared),
+    call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared)
+        .streaming()
+        .forwarded(),
+    call("/chefshat.v1.TableService/Report", Player, Compared).forwarded(),
+    call("/chefshat.v1.TableService/Watch", Player, Compared)
+        .streaming()
+        .forwarded(),
+    call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared).forwarded(),
     call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
-    call("/chefshat.v1.RoomService/JoinRoom", Player, Compared),
-    call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared),
-    call("/chefshat.v1.RoomService/CreateRoom", Host, Refused),
-    call("/chefshat.v1.RoomService/CloseRoom", Host, Compared),
+    call("/chefshat.v1.RoomService/JoinRoom", Player, Compared).forwarded(),
+    call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
+    call("/chefshat.v1.RoomService/CreateRoom", Host, Refused).forwarded(),
+    call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetTournament",
         Spectator,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/ListTournaments",
         Spectator,
@@ -93,17 +109,20 @@ pub const CALLS: &[Call] = &[
         Spectator,
         Compared,
     )
-    .streaming(),
+    .streaming()
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetTournamentResults",
         Spectator,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/ListTournamentGames",
         Spectator,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetLeaderboard",
         Spectator,
@@ -113,32 +132,38 @@ pub const CALLS: &[Call] = &[
         "/chefshat.v1.TournamentService/JoinTournament",
         Player,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/CreateTournament",
         Host,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/AddTableParticipant",
         Host,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetPhysicalTable",
         Host,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/StartTournament",
         Host,
         Compared,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/CloseTournament",
         Host,
         Compared,
-    ),
+    )
+    .forwarded(),
     records("/chefshat.v1.RecordService/ListRecords"),
     records("/chefshat.v1.RecordService/GetRecord").streaming(),
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
@@ -152,8 +177,8 @@ pub const CALLS: &[Call] = &[
     ),
     call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
     call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
-    call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused),
-    call("/chefshat.v1.AdminService/CloseTournament", Admin, Refused),
+    call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused).forwarded(),
+    call("/chefshat.v1.AdminService/CloseTournament", Admin, Refused).forwarded(),
     call("/chefshat.v1.AdminService/GetStorage", Admin, Refused),
     call("/chefshat.v1.AdminService/PruneRecords", Admin, Refused),
     call(

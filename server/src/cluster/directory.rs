@@ -31,8 +31,28 @@ pub enum Location {
     Unknown,
 }
 
-/// Finds the owners of rooms and tournaments. Answers may be cached, so they may be outdated: the
-/// node that is named says so, and is then forgotten.
+/// What a request is about is at another node.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("another node has it")]
+pub struct Elsewhere {
+    /// The node.
+    pub peer: Peer,
+    /// How it was found.
+    pub found_by: FoundBy,
+}
+
+/// How a room or tournament was found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FoundBy {
+    /// By its id.
+    Id(Id),
+    /// By its join code, in its normal form.
+    Code(String),
+}
+
+/// Finds the owners of rooms and tournaments. It may remember nodes that it has named; a node that
+/// is not the owner any more says so, and is then forgotten. That nobody has something is never
+/// remembered.
 pub trait Directory: Send + Sync + 'static {
     /// The location of a room or tournament that is not in memory.
     fn locate(&self, id: Id) -> BoxFuture<'_, Location>;
@@ -40,11 +60,8 @@ pub trait Directory: Send + Sync + 'static {
     /// The location of the room or tournament with a join code in its normal form.
     fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location>;
 
-    /// The last answer for an id was outdated: the node does not own it, or cannot be reached.
-    fn forget(&self, id: Id);
-
-    /// The last answer for a join code was outdated.
-    fn forget_code(&self, code: &str);
+    /// The node that was named last does not own it any more, or cannot be reached.
+    fn forget(&self, found_by: &FoundBy);
 }
 
 impl fmt::Debug for dyn Directory {
@@ -66,7 +83,5 @@ impl Directory for SingleServer {
         ready(Location::Nowhere).boxed()
     }
 
-    fn forget(&self, _id: Id) {}
-
-    fn forget_code(&self, _code: &str) {}
+    fn forget(&self, _found_by: &FoundBy) {}
 }

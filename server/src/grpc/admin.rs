@@ -9,13 +9,12 @@ use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
 use super::pages;
+use super::reach::Reach;
 use super::status::{Refusal, field, room_unknown, status, store_failed, tournament_unknown};
 use super::tournaments;
 use crate::connections::{Client, Connections};
 use crate::retention::Retention;
-use crate::rooms::Rooms;
 use crate::store::Keep;
-use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
 /// Most clients in a page.
@@ -24,23 +23,16 @@ const CLIENTS_PER_PAGE: u32 = 1_000;
 /// The service.
 #[derive(Debug, Clone)]
 pub struct AdminCalls {
-    rooms: Arc<Rooms>,
-    tournaments: Arc<Tournaments>,
+    reach: Reach,
     connections: Arc<Connections>,
     retention: Retention,
 }
 
 impl AdminCalls {
     /// Creates the service for this server.
-    pub fn new(
-        rooms: Arc<Rooms>,
-        tournaments: Arc<Tournaments>,
-        connections: Arc<Connections>,
-        retention: Retention,
-    ) -> Self {
+    pub fn new(reach: Reach, connections: Arc<Connections>, retention: Retention) -> Self {
         Self {
-            rooms,
-            tournaments,
+            reach,
             connections,
             retention,
         }
@@ -95,9 +87,8 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::AdminServiceCloseRoomRequest>,
     ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
-        let handle = Id::parse(&request.into_inner().room_id)
-            .and_then(|id| self.rooms.get(id))
-            .ok_or_else(room_unknown)?;
+        let id = Id::parse(&request.into_inner().room_id).ok_or_else(room_unknown)?;
+        let handle = self.reach.room_here(id).await?.ok_or_else(room_unknown)?;
         info!(room = %handle.id(), "an operator closes a room");
         handle.close_without_token().await;
         let room = handle.describe().await.map_err(Refusal::from)?;
@@ -109,8 +100,8 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::AdminServiceCloseTournamentRequest>,
     ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
-        let id = request.into_inner().tournament_id;
-        let handle = Id::parse(&id).and_then(|id| self.tournaments.get(id));
+        let id = Id::parse(&request.into_inner().tournament_id).ok_or_else(tournament_unknown)?;
+        let handle = self.reach.tournament_here(id).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         info!(tournament = %handle.id(), "an operator closes a tournament");
         handle.close().await.map_err(tournaments::stopped)?;
@@ -131,7 +122,7 @@ impl AdminService for AdminCalls {
             record_files: usage.record_files,
             free_bytes: usage.disk.free_bytes,
             finished_games: usage.finished_games,
-            open_rooms: self.rooms.open_count() as u64,
+            open_rooms: self.reach.rooms().open_count() as u64,
             connections: self.connections.clients().len() as u64,
         }))
     }

@@ -148,7 +148,8 @@ impl PlayService for Play {
         let executing: Option<Executing> = request.extensions().get().cloned();
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
-        let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown)?;
+        let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown);
+        let room = room.await?;
         let action = match request.command {
             Some(act_request::Command::Answer(answer)) => {
                 SeatAction::Answer(convert::answer_from_proto(answer))

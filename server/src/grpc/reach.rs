@@ -9,13 +9,16 @@ use chefshat_proto::v1::{self, record_line::Line};
 use tonic::Status;
 
 use super::access::check;
-use super::status::{read_failed, room_gone, room_unknown, tournament_unknown};
+use super::status::{
+    elsewhere, owner_unreachable, read_failed, room_gone, room_unknown, tournament_unknown,
+};
 use crate::access::{Caller, Role, Standing};
+use crate::cluster::{Elsewhere, FoundBy, Location};
 use crate::room::Handle;
 use crate::rooms::Rooms;
 use crate::store::StoredGame;
 use crate::tournaments::{TournamentHandle, Tournaments};
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Visibility;
 
@@ -46,6 +49,77 @@ impl Reach {
         &self.rooms
     }
 
+    /// The room with this id, if this node has it. If another node does, the error sends the request
+    /// there.
+    pub(super) async fn room_here(&self, id: Id) -> Result<Option<Handle>, Status> {
+        match self.rooms.get(id) {
+            Some(handle) if !handle.is_gone() => Ok(Some(handle)),
+            stopped => {
+                let is_known = || stopped.is_some() || self.tournaments.get(id).is_some();
+                let location = self.rooms.directory().locate(id).await;
+                not_elsewhere(location, FoundBy::Id(id), is_known)?;
+                Ok(stopped)
+            }
+        }
+    }
+
+    /// The room with this join code, as [`Reach::room_here`].
+    pub(super) async fn room_with_code(&self, code: &str) -> Result<Option<Handle>, Status> {
+        match self.rooms.by_code(code) {
+            Some(handle) if !handle.is_gone() => Ok(Some(handle)),
+            stopped => {
+                let code = normal_code(code);
+                let is_known = || stopped.is_some() || self.tournaments.by_code(&code).is_some();
+                let location = self.rooms.directory().locate_code(&code).await;
+                not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
+                Ok(stopped)
+            }
+        }
+    }
+
+    /// The tournament with this id, as [`Reach::room_here`].
+    pub(super) async fn tournament_here(
+        &self,
+        id: Id,
+    ) -> Result<Option<Arc<TournamentHandle>>, Status> {
+        if let Some(handle) = self.tournaments.get(id) {
+            return Ok(Some(handle));
+        }
+        let location = self.rooms.directory().locate(id).await;
+        not_elsewhere(location, FoundBy::Id(id), || self.rooms.get(id).is_some())?;
+        Ok(None)
+    }
+
+    /// The tournament with this join code, as [`Reach::room_here`].
+    pub(super) async fn tournament_with_code(
+        &self,
+        code: &str,
+    ) -> Result<Option<Arc<TournamentHandle>>, Status> {
+        if let Some(handle) = self.tournaments.by_code(code) {
+            return Ok(Some(handle));
+        }
+        let code = normal_code(code);
+        let location = self.rooms.directory().locate_code(&code).await;
+        let is_known = || self.rooms.by_code(&code).is_some();
+        not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
+        Ok(None)
+    }
+
+    /// Checks that no other node has created a room or tournament for this request before.
+    pub(super) async fn check_not_created_elsewhere(
+        &self,
+        request: Option<RequestKey>,
+    ) -> Result<(), Status> {
+        let Some(id) = request.map(|request| request.created_id()) else {
+            return Ok(());
+        };
+        if self.rooms.get(id).is_some() || self.tournaments.get(id).is_some() {
+            return Ok(());
+        }
+        let location = self.rooms.directory().locate(id).await;
+        not_elsewhere(location, FoundBy::Id(id), || false)
+    }
+
     /// The room with an id from a message.
     pub(super) async fn room(&self, caller: &Caller, id: &str) -> Result<Handle, Status> {
         let id = Id::parse(id).ok_or_else(room_unknown)?;
@@ -64,7 +138,7 @@ impl Reach {
             true => room_gone(),
             false => unknown(),
         };
-        let handle = self.rooms.get(id).ok_or_else(unknown)?;
+        let handle = self.room_here(id).await?.ok_or_else(unknown)?;
         let header = self.rooms.header(id).ok_or_else(unknown)?;
         if header.policy.visibility == Visibility::Private
             && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
@@ -85,13 +159,13 @@ impl Reach {
 
     /// The room of a ticket, which is still to be compared. A caller whose scope does not include a
     /// private room gets the answer for an unknown ticket, whatever the ticket.
-    pub(super) fn room_of_ticket(
+    pub(super) async fn room_of_ticket(
         &self,
         caller: &Caller,
         room: Id,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
-        let handle = self.rooms.get(room).ok_or_else(&unknown)?;
+        let handle = self.room_here(room).await?.ok_or_else(&unknown)?;
         if caller.scope.is_some() {
             let header = self.rooms.header(room).ok_or_else(&unknown)?;
             check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
@@ -115,13 +189,14 @@ impl Reach {
     }
 
     /// The tournament with an id from a message.
-    pub(super) fn tournament(
+    pub(super) async fn tournament(
         &self,
         caller: &Caller,
         id: &str,
     ) -> Result<Arc<TournamentHandle>, Status> {
-        let found = Id::parse(id).and_then(|id| self.tournaments.get(id));
-        let handle = found.ok_or_else(tournament_unknown)?;
+        let id = Id::parse(id).ok_or_else(tournament_unknown)?;
+        let handle = self.tournament_here(id).await?;
+        let handle = handle.ok_or_else(tournament_unknown)?;
         if handle.visibility() == Visibility::Private
             && standing_in_tournament(caller, &handle) == Standing::Stranger
         {
@@ -296,6 +371,21 @@ impl Reach {
         by_token
             .max(by_room)
             .max(by_tournament.unwrap_or(Standing::Stranger))
+    }
+}
+
+/// Checks that what a request is about is not at another node. Something of this node that is not
+/// in memory (`is_known`) is about to be resumed.
+fn not_elsewhere(
+    location: Location,
+    found_by: FoundBy,
+    is_known: impl FnOnce() -> bool,
+) -> Result<(), Status> {
+    match location {
+        Location::Nowhere => Ok(()),
+        Location::Here if is_known() => Ok(()),
+        Location::Here | Location::Unknown => Err(owner_unreachable()),
+        Location::Node(peer) => Err(elsewhere(Elsewhere { peer, found_by })),
     }
 }
 

@@ -18,7 +18,8 @@ use crate::access::Caller;
 use crate::convert;
 use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key};
 use crate::room::{Handle, JoinRequest};
-use crate::rooms::Rooms;
+use crate::rooms::{CreateError, Rooms};
+use crate::store::StoreError;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::ParticipantKind;
 
@@ -61,11 +62,17 @@ impl RoomCalls {
     ) -> Result<Handle, Status> {
         let refused = |refused| Status::from(Refusal::from(refused));
         self.calls.may_try_code(key).map_err(refused)?;
-        let by_code = self.rooms.by_code(join_code);
-        let is_meant = |handle: &Handle| {
-            room_id.is_empty() || Id::parse(room_id).is_some_and(|id| id == handle.id())
+        let found = match room_id {
+            "" => self.reach().room_with_code(join_code).await?,
+            id => match Id::parse(id) {
+                Some(id) => self.reach().room_here(id).await?,
+                None => None,
+            },
         };
-        let Some(handle) = by_code.filter(is_meant) else {
+        let by_code = self.rooms.by_code(join_code);
+        let has_code =
+            |handle: &Handle| (by_code.as_ref()).is_some_and(|it| it.id() == handle.id());
+        let Some(handle) = found.filter(has_code) else {
             self.calls.wrong_code(key);
             if !room_id.is_empty() {
                 self.reach().room(caller, room_id).await?;
@@ -100,6 +107,8 @@ impl RoomService for RoomCalls {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let new = new_room(&self.recorded, &caller, request.into_inner(), key).await?;
+        let request = new.request;
+        self.reach().check_not_created_elsewhere(request).await?;
         let physical = new.physical;
         let built_in = new.fills.iter().all(|fill| fill.is_built_in());
         let cost = match built_in {
@@ -107,7 +116,12 @@ impl RoomService for RoomCalls {
             false => COST_OF_ROOM,
         };
         self.calls.charge(key, cost);
-        let created = self.rooms.create(new).await.map_err(Refusal::from)?;
+        let created = self.rooms.create(new).await;
+        if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
+            // Another node has created it meanwhile.
+            self.reach().check_not_created_elsewhere(request).await?;
+        }
+        let created = created.map_err(Refusal::from)?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
             room: Some(room),
@@ -229,7 +243,9 @@ impl RoomService for RoomCalls {
         let caller = Caller::of(request.extensions());
         let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
         let reach = self.reach();
-        let handle = reach.room_of_ticket(&caller, ticket.room, ticket_unknown)?;
+        let handle = reach
+            .room_of_ticket(&caller, ticket.room, ticket_unknown)
+            .await?;
         let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
         let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))

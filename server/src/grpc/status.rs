@@ -11,6 +11,7 @@ use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
+use crate::cluster::Elsewhere;
 use crate::convert;
 use crate::limits::Refused;
 use crate::outbox::StreamEnd;
@@ -231,6 +232,47 @@ pub fn room_gone() -> Status {
         Code::Unavailable,
         "ROOM_GONE",
         "the room cannot be reached: it has just ended, or the server is stopping; try again",
+        [],
+    )
+}
+
+/// Reason of [`not_owner`].
+const NOT_OWNER: &str = "NOT_OWNER";
+
+/// This node does not have what a request is about. Only nodes see it: the one that has passed the
+/// request on looks for the owner again.
+fn not_owner() -> Status {
+    status(
+        Code::Unavailable,
+        NOT_OWNER,
+        "another node has this room or tournament",
+        [],
+    )
+}
+
+/// What a request is about is at another node. `forward` sends the request there.
+pub fn elsewhere(elsewhere: Elsewhere) -> Status {
+    let mut status = not_owner();
+    status.set_source(std::sync::Arc::new(elsewhere));
+    status
+}
+
+/// Where a request must go, if this status says so.
+pub fn is_elsewhere(status: &Status) -> Option<&Elsewhere> {
+    std::error::Error::source(status)?.downcast_ref()
+}
+
+/// Whether the answer of another node says that it does not have what the request is about.
+pub fn is_not_owner(headers: &http::HeaderMap) -> bool {
+    Status::from_header_map(headers).is_some_and(|status| has_reason(&status, NOT_OWNER))
+}
+
+/// The node that has a room or tournament cannot be reached, or is just handing it over.
+pub fn owner_unreachable() -> Status {
+    status(
+        Code::Unavailable,
+        "OWNER_UNREACHABLE",
+        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again",
         [],
     )
 }

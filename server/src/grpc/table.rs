@@ -28,9 +28,10 @@ impl TableCalls {
     }
 
     /// The room of a table's ticket, and the ticket's secret.
-    fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
+    async fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
         let token = Token::parse(ticket).ok_or_else(table_unknown)?;
-        let room = (self.reach).room_of_ticket(caller, token.room, table_unknown)?;
+        let room = (self.reach).room_of_ticket(caller, token.room, table_unknown);
+        let room = room.await?;
         Ok((room, token.secret))
     }
 }
@@ -46,7 +47,7 @@ impl TableService for TableCalls {
     ) -> Result<Response<v1::ReportResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let (room, secret) = self.find(&caller, &request.table_ticket)?;
+        let (room, secret) = self.find(&caller, &request.table_ticket).await?;
         let ruled = room.report(secret, request).await.map_err(Refusal::from)?;
         let response = ruled.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(*response))
@@ -57,7 +58,9 @@ impl TableService for TableCalls {
         request: Request<v1::TableServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
         let caller = Caller::of(request.extensions());
-        let (room, secret) = self.find(&caller, &request.into_inner().table_ticket)?;
+        let (room, secret) = self
+            .find(&caller, &request.into_inner().table_ticket)
+            .await?;
         let watching = room.watch_table(secret).await.map_err(Refusal::from)?;
         let states = watching.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
         Ok(Response::new(Box::pin(followed(states))))

@@ -31,11 +31,12 @@ use crate::config::{
 use crate::convert;
 use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
+use crate::store::StoreError;
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
     Tournaments,
 };
-use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
+use chefshat_room::ids::{Id, RequestKey, Token, normal_code, random_bytes};
 use chefshat_room::journal::ParticipantKind;
 
 /// Default page size of games, and default number of rows of a leaderboard.
@@ -78,14 +79,14 @@ impl TournamentCalls {
         }
     }
 
-    fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
-        self.recorded.reach().tournament(caller, id)
+    async fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
+        self.recorded.reach().tournament(caller, id).await
     }
 
     /// The tournament with a join code; if an id is given too, it must match. Wrong codes are
     /// charged, those of unknown tournaments too: whether a tournament is private or unknown makes
     /// no difference.
-    fn find_by_code(
+    async fn find_by_code(
         &self,
         caller: &Caller,
         id: &str,
@@ -93,14 +94,20 @@ impl TournamentCalls {
         key: Key,
     ) -> Result<Arc<TournamentHandle>, Status> {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
-        let by_code = self.tournaments.by_code(join_code);
-        let is_meant = |handle: &Arc<TournamentHandle>| {
-            id.is_empty() || Id::parse(id).is_some_and(|id| id == handle.id())
+        let reach = self.recorded.reach();
+        let found = match id {
+            "" => reach.tournament_with_code(join_code).await?,
+            id => match Id::parse(id) {
+                Some(id) => reach.tournament_here(id).await?,
+                None => None,
+            },
         };
-        let Some(handle) = by_code.filter(is_meant) else {
+        let code = normal_code(join_code);
+        let has_code = |handle: &Arc<TournamentHandle>| handle.join_code() == code;
+        let Some(handle) = found.filter(has_code) else {
             self.calls.wrong_code(key);
             if !id.is_empty() {
-                self.find(caller, id)?;
+                self.find(caller, id).await?;
             }
             return Err(status(
                 Code::PermissionDenied,
@@ -113,13 +120,13 @@ impl TournamentCalls {
         Ok(handle)
     }
 
-    fn find_owned(
+    async fn find_owned(
         &self,
         caller: &Caller,
         id: &str,
         owner_token: &str,
     ) -> Result<Arc<TournamentHandle>, Status> {
-        let handle = self.find(&caller.showing(owner_token), id)?;
+        let handle = self.find(&caller.showing(owner_token), id).await?;
         if handle.is_owner(owner_token) {
             return Ok(handle);
         }
@@ -162,12 +169,15 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
+        let reach = self.recorded.reach();
+        reach.check_not_created_elsewhere(request_key).await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
-        let (handle, owner) = self
-            .tournaments
-            .create(&name, plan, request_key, key)
-            .await
-            .map_err(create_refused)?;
+        let created = self.tournaments.create(&name, plan, request_key, key).await;
+        if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
+            // Another node has created it meanwhile.
+            reach.check_not_created_elsewhere(request_key).await?;
+        }
+        let (handle, owner) = created.map_err(create_refused)?;
         Ok(Response::new(v1::CreateTournamentResponse {
             tournament: Some(handle.describe()),
             join_code: handle.join_code().to_owned(),
@@ -183,8 +193,11 @@ impl TournamentService for TournamentCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
-            "" => self.find(&caller, &request.tournament_id)?,
-            code => self.find_by_code(&caller, &request.tournament_id, code, key)?,
+            "" => self.find(&caller, &request.tournament_id).await?,
+            code => {
+                let id = &request.tournament_id;
+                self.find_by_code(&caller, id, code, key).await?
+            }
         };
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
@@ -228,7 +241,7 @@ impl TournamentService for TournamentCalls {
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
         let (id, code) = (&request.tournament_id, &request.join_code);
-        let handle = self.find_by_code(&caller, id, code, key)?;
+        let handle = self.find_by_code(&caller, id, code, key).await?;
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !handle.admits(kind) {
@@ -265,7 +278,8 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::AddTableParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Human);
@@ -293,7 +307,8 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::GetPhysicalTableResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
         let game = usize::try_from(request.game).unwrap_or(usize::MAX);
         let owner = handle.physical_room(game).map_err(table_problem)?;
         // It is created after its id is committed.
@@ -313,7 +328,8 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::StartTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
         let started = handle.begin().await.map_err(stopped)?;
         started.map_err(|problem| {
             let reason = match problem {
@@ -332,7 +348,8 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find_owned(&caller, &request.tournament_id, &request.owner_token)?;
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
         handle.close().await.map_err(stopped)?;
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::CloseTournamentResponse { tournament }))
@@ -344,7 +361,9 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<Self::FollowTournamentStream>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
-        let handle = self.find(&caller, &request.into_inner().tournament_id)?;
+        let handle = self
+            .find(&caller, &request.into_inner().tournament_id)
+            .await?;
         let place = self.followers.try_take(key).ok_or_else(|| {
             Refusal::from(Refused {
                 reason: "TOO_MANY_FOLLOWERS",
@@ -372,7 +391,9 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let handle = self.find(&caller, &request.into_inner().tournament_id)?;
+        let handle = self
+            .find(&caller, &request.into_inner().tournament_id)
+            .await?;
         let results = handle.results(&self.result_permits).await;
         let results = results.map_err(compute_failed)?.message.clone();
         Ok(Response::new(results))
@@ -384,7 +405,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.find(&caller, &request.tournament_id)?;
+        let handle = self.find(&caller, &request.tournament_id).await?;
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
         let size = match request.page_size {

@@ -63,6 +63,11 @@ impl Handle {
         self.id
     }
 
+    /// Whether the room has stopped: it has ended, or its game resumes elsewhere or later.
+    pub fn is_gone(&self) -> bool {
+        self.mailbox.is_closed()
+    }
+
     /// Number of messages in the mailbox.
     pub fn mailbox_depth(&self) -> usize {
         self.mailbox.max_capacity() - self.mailbox.capacity()

@@ -36,7 +36,14 @@ export function faultOf(thrown: unknown): Fault {
 }
 
 /** Reasons that end a stream or a call, which may be repeated. */
-const PASSING_REASONS = ["SHUTTING_DOWN", "STORE_FAILED", "ROOM_GONE", "SPECTATOR_TOO_SLOW", "FOLLOWER_TOO_SLOW"];
+const PASSING_REASONS = [
+  "SHUTTING_DOWN",
+  "STORE_FAILED",
+  "ROOM_GONE",
+  "OWNER_UNREACHABLE",
+  "SPECTATOR_TOO_SLOW",
+  "FOLLOWER_TOO_SLOW",
+];
 
 /**
  * Whether a retry may succeed soon: the server is unreachable, restarting or shutting down, the

@@ -254,8 +254,9 @@ impl Reader {
             let reach = Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments));
             let in_scope = match &tournament {
                 Some(handle) => reach.check_ticket_of(&self.caller, handle, ticket_unknown),
-                None => reach
+                None => (reach
                     .room_of_ticket(&self.caller, token.room, ticket_unknown)
+                    .await)
                     .map(drop),
             };
             if let Err(status) = in_scope {

@@ -1,0 +1,258 @@
+//! The layer that sends a call to the node that has its room or tournament. A call is first tried
+//! here; if its handler finds what it is about at another node (`status::elsewhere`), the same
+//! request goes to that node, and its answer comes back as it arrives. So no method knows anything
+//! of forwarding. A single server does not have this layer.
+//!
+//! The other node decides about access and charges the caller, so the headers that it needs for
+//! that pass with the request. It never passes the request on.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::body::HttpBody;
+use bytes::Bytes;
+use futures::future::{BoxFuture, Either};
+use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
+use http_body::{Frame, SizeHint};
+use tonic::Status;
+use tonic::body::Body;
+use tower::{Layer, Service, ServiceExt as _};
+use tracing::debug;
+
+use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
+use crate::access::{Call, SECRET_HEADER};
+use crate::cluster::{Directory, Peers};
+use crate::config::MAX_MESSAGE_BYTES;
+use crate::connections::peer_address;
+use crate::proxies::FORWARDED_FOR;
+
+/// How often a call looks for the node that has its room or tournament.
+const ATTEMPTS: u32 = 3;
+/// Pause before a call looks again: the node that was named is just handing over.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Most bytes of a request that are kept: one message.
+const MAX_KEPT_BYTES: usize = MAX_MESSAGE_BYTES + 1024;
+/// The headers of a request that other nodes need.
+const HEADERS: [HeaderName; 8] = [
+    header::AUTHORIZATION,
+    HeaderName::from_static(SECRET_HEADER),
+    header::CONTENT_TYPE,
+    header::TE,
+    header::USER_AGENT,
+    HeaderName::from_static("grpc-timeout"),
+    HeaderName::from_static("grpc-encoding"),
+    HeaderName::from_static("grpc-accept-encoding"),
+];
+
+/// The headers with which a request is sent to other nodes, in its extensions. They name its
+/// client, and contain its token and secrets.
+#[derive(Clone)]
+pub(super) struct PassedHeaders(pub(super) HeaderMap);
+
+impl PassedHeaders {
+    /// The headers of a client's request.
+    fn of<B>(request: &Request<B>) -> Self {
+        let mut passed = HeaderMap::new();
+        for name in HEADERS {
+            for value in request.headers().get_all(&name) {
+                passed.append(name.clone(), value.clone());
+            }
+        }
+        if let Some(client) = peer_address(request.extensions()) {
+            let client = HeaderValue::try_from(client.to_string());
+            let client = client.expect("addresses are printable");
+            passed.insert(HeaderName::from_static(FORWARDED_FOR), client);
+        }
+        Self(passed)
+    }
+}
+
+/// Puts forwarding in front of the services.
+#[derive(Debug, Clone)]
+pub struct ForwardLayer {
+    directory: Arc<dyn Directory>,
+    peers: Arc<Peers>,
+}
+
+impl ForwardLayer {
+    /// Creates a layer that sends calls to these peers.
+    pub fn new(directory: Arc<dyn Directory>, peers: Arc<Peers>) -> Self {
+        Self { directory, peers }
+    }
+}
+
+impl<S> Layer<S> for ForwardLayer {
+    type Service = Forwarding<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        Forwarding {
+            layer: self.clone(),
+            services,
+        }
+    }
+}
+
+/// The services with forwarding in front of them.
+#[derive(Debug, Clone)]
+pub struct Forwarding<S> {
+    layer: ForwardLayer,
+    services: S,
+}
+
+impl<S> Service<Request<Body>> for Forwarding<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+        let Some(call) = Call::find(request.uri().path()) else {
+            return Either::Left(self.services.call(request));
+        };
+        if !call.forwarded {
+            // A stream of seats opens its own streams to other nodes.
+            if call.streams {
+                let headers = PassedHeaders::of(&request);
+                request.extensions_mut().insert(headers);
+            }
+            return Either::Left(self.services.call(request));
+        }
+        // The clone that is ready serves this call.
+        let clone = self.services.clone();
+        let services = std::mem::replace(&mut self.services, clone);
+        Either::Right(Box::pin(self.layer.clone().answer(services, request)))
+    }
+}
+
+impl ForwardLayer {
+    /// Answers a call here or at the node that has what it is about.
+    async fn answer<S>(
+        self,
+        mut services: S,
+        request: Request<Body>,
+    ) -> Result<Response<Body>, S::Error>
+    where
+        S: Service<Request<Body>, Response = Response<Body>> + Clone + Send,
+        S::Future: Send,
+        S::Error: Send,
+    {
+        let headers = PassedHeaders::of(&request);
+        let (parts, body) = request.into_parts();
+        let kept = Kept::default();
+        let mut body = Body::new(KeepingBody {
+            body,
+            kept: kept.clone(),
+        });
+        for attempt in 1..=ATTEMPTS {
+            let request = Request::from_parts(parts.clone(), body);
+            let again = services.clone();
+            let response = services.call(request).await?;
+            let Some(elsewhere) = response.extensions().get().and_then(is_elsewhere) else {
+                return Ok(response);
+            };
+            let Some(message) = kept.message() else {
+                break;
+            };
+            let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
+            *forwarded.method_mut() = parts.method.clone();
+            *forwarded.uri_mut() = parts.uri.clone();
+            *forwarded.headers_mut() = headers.0.clone();
+            match self.peers.send(&elsewhere.peer, forwarded).await {
+                Ok(answer) if !is_not_owner(answer.headers()) => return Ok(returned(answer)),
+                Ok(_) => self.directory.forget(&elsewhere.found_by),
+                Err(error) => {
+                    debug!(peer = %elsewhere.peer.node, %error, "a call could not be forwarded");
+                    self.directory.forget(&elsewhere.found_by);
+                    // Whether it was executed is unknown.
+                    break;
+                }
+            }
+            if attempt < ATTEMPTS {
+                tokio::time::sleep(PAUSE).await;
+            }
+            body = Body::new(http_body_util::Full::new(message));
+            services = again;
+            services.ready().await?;
+        }
+        Ok(owner_unreachable().into_http())
+    }
+}
+
+/// The answer of another node, as an answer of this one.
+fn returned(answer: Response<Body>) -> Response<Body> {
+    let (parts, body) = answer.into_parts();
+    let mut response = Response::new(body);
+    *response.status_mut() = parts.status;
+    *response.headers_mut() = parts.headers;
+    response
+}
+
+/// What has been read of the body of a request.
+#[derive(Clone, Default)]
+struct Kept(Arc<Mutex<Read>>);
+
+#[derive(Default)]
+struct Read {
+    bytes: Vec<u8>,
+    too_long: bool,
+}
+
+impl Kept {
+    fn add(&self, data: &Bytes) {
+        let mut read = (self.0.lock()).expect("nothing panics under this lock");
+        if read.bytes.len() + data.len() > MAX_KEPT_BYTES {
+            read.too_long = true;
+            read.bytes = Vec::new();
+        } else if !read.too_long {
+            read.bytes.extend_from_slice(data);
+        }
+    }
+
+    /// The message of the request, which has been read; `None` if it is too long.
+    fn message(&self) -> Option<Bytes> {
+        let read = (self.0.lock()).expect("nothing panics under this lock");
+        (!read.too_long).then(|| Bytes::copy_from_slice(&read.bytes))
+    }
+}
+
+/// The body of a request that may be sent again.
+struct KeepingBody {
+    body: Body,
+    kept: Kept,
+}
+
+impl HttpBody for KeepingBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let frame = Pin::new(&mut self.body).poll_frame(context);
+        if let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(data) = frame.data_ref()
+        {
+            self.kept.add(data);
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
