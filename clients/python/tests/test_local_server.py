@@ -125,10 +125,13 @@ def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPat
     with LocalServer(binary) as server:
         address = server.address
         assert server.running
+        os.kill(server.pid, 0)  # Raises an error if there is no such process.
         with chefshat.Client(address) as client:
             assert client.server_info().built_in_agents
         server.kill()
         assert not server.running
+        with pytest.raises(ValueError, match="not been started"):
+            _ = server.pid
         assert server.start().address == address
         with chefshat.Client(address) as client:
             assert client.server_info().built_in_agents

@@ -84,37 +84,42 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray is not among the d
         # Ray counts on one core for each runner. JAX would start a thread for each core of the machine.
         os.environ["NPROC"] = "1"
         super().__init__(config=config, **kwargs)
-        setting = config.env_config
-        self._plan: Plan = setting["plan"]
+        self._plan: Plan = config.env_config["plan"]
         # Every runner has its own seeds, which differ from those of evaluations.
         self._key = jax.random.fold_in(jax.random.key(config.seed), self.worker_index)
-        addresses: Sequence[str] = setting["addresses"]
+        addresses: Sequence[str] = config.env_config["addresses"]
+        self.address = addresses[(self.worker_index - 1) % len(addresses)] if addresses else None
+        self._collector: Collector | None = None
+
+    def _begin(self) -> Collector:
+        """Starts the games."""
         self.env = VectorEnv(
-            addresses[(self.worker_index - 1) % len(addresses)] if addresses else None,
+            self.address,
             self._plan.games,
             skip_forced=True,
             episode="shift",
-            seed=config.seed + SEED_STEP * self.worker_index,
-            rules=setting["rules"],
+            seed=self.config.seed + SEED_STEP * self.worker_index,
+            rules=self.config.env_config["rules"],
         )
-        self._collector = Collector(self.env, self._plan.games, self._plan.steps)
+        return Collector(self.env, self._plan.games, self._plan.steps)
 
     def sample(self, params: Params, iteration: int, **_: Any) -> Played:  # noqa: ANN401 - RLlib's.
-        """Plays `plan.steps` steps."""
+        """Plays `plan.steps` steps. The first call starts the games, because RLlib hides errors of the constructor."""
+        self._collector = self._collector or self._begin()
         began, cpu = time.perf_counter(), time.process_time()
         samples = play(self._collector, params, jax.random.fold_in(self._key, iteration), self._plan)
         return Played(self.worker_index, samples, time.perf_counter() - began, time.process_time() - cpu)
 
     def assert_healthy(self) -> None:
-        """Checks that the games exist."""
-        assert self.env is not None
+        """Does nothing: a runner without games starts them."""
 
     def get_spaces(self) -> None:
         """Returns None: there is no RLlib module."""
 
     def stop(self) -> None:
         """Ends the games."""
-        self.env.close()
+        if self.env is not None:
+            self.env.close()
 
 
 class JaxPPOConfig(AlgorithmConfig):  # type: ignore[misc]
@@ -188,7 +193,8 @@ def _sample(params: ray.ObjectRef, iteration: int, runner: SelfPlayRunner) -> Pl
         return runner.sample(ray.get(params), iteration)
     except ChefsHatError as error:
         # Returned, not raised: RLlib would start the runner again.
-        return ChefsHatError(error.reason, f"runner {runner.worker_index}, which plays on {runner.env.server}: {error.message}")
+        where = runner.address or "this process"
+        return ChefsHatError(error.reason, f"runner {runner.worker_index}, which plays on {where}: {error.message}")
 
 
 @contextmanager
@@ -217,6 +223,7 @@ def built(config: JaxPPOConfig) -> Iterator[JaxPPO]:
 
 def configured(plan: Plan, addresses: Sequence[str], *, runners: int, rules: str, seed: int) -> JaxPPOConfig:
     """Configures a training. Raises ChefsHatError if one of the servers does not answer."""
+    logging.getLogger("ray.rllib").setLevel(logging.ERROR)
     places: Sequence[str | None] = addresses or [None]
     complete = [full_rules(rules, address) for address in places]
     setting = {"plan": plan, "addresses": addresses, "rules": complete[0]}
@@ -291,7 +298,6 @@ def described(event: dict[str, Any]) -> str:
 def run(options: argparse.Namespace) -> int:
     """Trains on the cluster, and prints what happens."""
     out = sys.stdout
-    logging.getLogger("ray").setLevel(logging.ERROR)
     with ExitStack() as stack:
         # Ray prints there, too.
         stack.enter_context(redirect_stdout(sys.stderr))

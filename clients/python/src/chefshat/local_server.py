@@ -121,6 +121,13 @@ class LocalServer:
         return self._process is not None and self._process.poll() is None
 
     @property
+    def pid(self) -> int:
+        """The number of the process. Raises ValueError if it has not been started."""
+        if self._process is None:
+            raise ValueError("the server has not been started")
+        return self._process.pid
+
+    @property
     def log(self) -> str:
         """The server's standard error."""
         self._log.seek(0)
