@@ -46,6 +46,11 @@ impl LeaseTimes {
         self.beat_every_ms
     }
 
+    /// From the end of the time for which a node serves after a beat to the end of its lease.
+    pub(crate) fn margin_ms(self) -> u64 {
+        self.expire_after_ms - self.serve_for_ms
+    }
+
     /// Whether a lease has expired, on the clock of the database.
     pub fn expired(self, beat_ms: u64, now_ms: u64) -> bool {
         now_ms.saturating_sub(beat_ms) >= self.expire_after_ms

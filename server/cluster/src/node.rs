@@ -3,7 +3,8 @@
 //! came is brought in as well, once the caller has waited long enough.
 //!
 //! Each answer to a beat says which units the node owns according to the database. So if an answer is lost (to a claim or a
-//! release), the node learns the truth with one of its next beats.
+//! release), the node learns the truth with one of its next beats. A node whose lease has expired stops everything; what nobody
+//! else has taken over meanwhile it serves again with its next beat.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -178,9 +179,15 @@ impl<K: Ord + Copy> Node<K> {
     /// When it wants to be woken with [`Input::Time`].
     pub fn wakes_at_ms(&self) -> u64 {
         match self.suspended {
-            true => self.beats_at_ms,
+            true if self.owned.is_empty() => self.beats_at_ms,
+            true => self.beats_at_ms.min(self.expires_ms()),
             false => self.beats_at_ms.min(self.lease.ends_ms()),
         }
+    }
+
+    /// From when on others may take over what it owns, on its own clock.
+    fn expires_ms(&self) -> u64 {
+        self.lease.ends_ms() + self.lease.times().margin_ms()
     }
 
     /// Takes in what happened and returns what has to be done, in order.
@@ -236,6 +243,15 @@ impl<K: Ord + Copy> Node<K> {
             self.claiming.values_mut().for_each(|held| *held = false);
             outputs.push(Output::Suspend);
         }
+        if self.suspended && now_ms >= self.expires_ms() {
+            self.stop_all(outputs);
+        }
+    }
+
+    fn stop_all(&mut self, outputs: &mut Vec<Output<K>>) {
+        outputs.extend(self.owned.keys().copied().map(Output::Stop));
+        self.owned.clear();
+        self.releasing.clear();
     }
 
     fn own(&mut self, id: K, epoch: Epoch) {
@@ -264,9 +280,7 @@ impl<K: Ord + Copy> Node<K> {
         match answer {
             BeatAnswer::None => {}
             BeatAnswer::Unknown => {
-                outputs.extend(self.owned.keys().copied().map(Output::Stop));
-                self.owned.clear();
-                self.releasing.clear();
+                self.stop_all(outputs);
                 self.phase = Phase::Left;
             }
             BeatAnswer::Kept(owned) => {

@@ -222,10 +222,12 @@ impl<K: Ord + Copy, E> Tables<K, E> {
         }
     }
 
-    /// Ends an item: nobody owns it any more, and its journal stays as it is. Doing so again changes nothing.
-    pub fn finish(&mut self, id: K, epoch: Epoch) -> Kept {
+    /// Ends an item whose journal has this many rows: nobody owns it any more, and its journal stays as it is. Doing so again
+    /// changes nothing. The rows are compared because an append of the same owner, from before it lost and regained its lease,
+    /// may still arrive.
+    pub fn finish(&mut self, id: K, epoch: Epoch, rows: u64) -> Kept {
         match self.items.get_mut(&id) {
-            Some(item) if item.epoch == epoch => {
+            Some(item) if item.epoch == epoch && item.journal.len() as u64 == rows => {
                 item.over = true;
                 Kept::Kept
             }
@@ -237,6 +239,12 @@ impl<K: Ord + Copy, E> Tables<K, E> {
     pub fn open_items(&self, unit: K) -> Vec<K> {
         let items = self.open().filter(|(_, item)| item.unit == unit);
         items.map(|(id, _)| id).collect()
+    }
+
+    /// Whether a writer of this epoch may still append to the journal of an item.
+    pub fn may_append(&self, id: K, epoch: Epoch) -> bool {
+        let item = self.items.get(&id);
+        item.is_some_and(|item| item.epoch == epoch && !item.over)
     }
 
     /// The rows of a journal, from position 0.

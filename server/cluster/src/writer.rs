@@ -59,7 +59,7 @@ impl Writer {
     }
 
     /// The position was read: `None` if nothing stands there, else whether it is the present row, written at this epoch.
-    /// `fenced` says whether the epoch is no longer the present one, in which case nothing can arrive later.
+    /// `fenced` says whether the epoch is no longer the present one, or the item is over: then nothing can arrive later.
     pub fn read(&mut self, row_is_ours: Option<bool>, fenced: bool) -> Step {
         match row_is_ours {
             Some(true) => self.publish(),

@@ -57,6 +57,14 @@ const TOURNAMENT: Bounds = Bounds {
     ..TAKEOVER
 };
 
+/// A tournament or its room ends while others may take it over.
+const TOURNAMENT_END: Bounds = Bounds {
+    until: 4,
+    creations: 1,
+    ends: 1,
+    ..Bounds::NONE
+};
+
 /// Expired nodes are removed from the database.
 const REMOVED: Bounds = Bounds {
     until: 7,
@@ -86,7 +94,9 @@ fn check(name: &str, bounds: Bounds, planted: Option<(Fault, &'static str)>) -> 
     let fails: Vec<_> = fails.map(|property| property.name).collect();
     for name in &fails {
         if let Some(path) = found.get(name).filter(|_| fault.is_none()) {
-            println!("{name}: {:#?}", path.clone().into_actions());
+            for action in path.clone().into_actions() {
+                println!("{name}: {action:?}");
+            }
         }
     }
     fails
@@ -102,6 +112,7 @@ fn every_order_is_safe_and_recovers() {
         ("drain", DRAIN),
         ("end", END),
         ("tournament", TOURNAMENT),
+        ("tournament's end", TOURNAMENT_END),
         ("removed", REMOVED),
     ] {
         assert_eq!(check(name, bounds, None), [""; 0], "{name}");
@@ -133,8 +144,13 @@ fn planted_faults_are_found() {
             "nothing is published after a takeover",
         ),
         (
-            END,
+            TOURNAMENT_END,
             Fault::FinishWithoutEpoch,
+            "what is over stays as its owner ended it",
+        ),
+        (
+            END,
+            Fault::FinishWithoutRows,
             "what is over stays as its owner ended it",
         ),
         (

@@ -25,6 +25,8 @@ pub(crate) enum Fault {
     ClaimKeepsEpoch,
     /// The database ends items for writers of any epoch.
     FinishWithoutEpoch,
+    /// The database ends items whose journals have other rows than the writer knows.
+    FinishWithoutRows,
     /// The database creates items of a unit for creators of any epoch.
     CreationWithoutEpoch,
     /// Leases expire by the clocks of the nodes, of which the first is two behind.
@@ -94,7 +96,7 @@ pub(crate) enum Request {
     Release(Epoch),
     Create(Epoch),
     Append(u8, Epoch, u64, Entry),
-    Read(u8, u64),
+    Read(u8, Epoch, u64),
     Finish(u8, Epoch, u64),
     Leave,
 }
@@ -108,7 +110,8 @@ pub(crate) enum Answer {
     Done,
     Created(Created),
     Kept(Kept),
-    Read(Option<(Epoch, Entry)>, Epoch),
+    /// The row at a position, and whether the writer is fenced.
+    Read(Option<(Epoch, Entry)>, bool),
 }
 
 /// An item that runs on a server.
@@ -128,7 +131,10 @@ pub(crate) struct Server {
     pub(crate) running: BTreeMap<u8, Running>,
     /// The epoch to release once all its writes are answered.
     releases: Option<Epoch>,
+    /// A room is being created. What is created is not given up, so that whoever resumes the unit finds it.
     creates: bool,
+    /// Serving the unit at this epoch waits for that.
+    serves_next: Option<Epoch>,
     pub(crate) left: bool,
 }
 
@@ -195,15 +201,10 @@ impl Cluster {
             Output::Beat => self.send(world, server, Request::Beat(world.now)),
             Output::FindOrphans(_) => self.send(world, server, Request::FindOrphans),
             Output::Claim(_, seen) => self.send(world, server, Request::Claim(seen)),
-            // The journals are read at once: another writer would have another epoch.
-            Output::Serve(unit, epoch) => {
-                it.running.clear();
-                for item in world.tables.open_items(unit) {
-                    let rows = world.tables.journal(item).len() as u64;
-                    it.running.insert(item, Running::new(epoch, rows));
-                }
-            }
-            Output::Stop(_) => it.stop(),
+            // The journals are read at once: any other writer conflicts at the position or has another epoch.
+            Output::Serve(_, epoch) if it.creates => it.serves_next = Some(epoch),
+            Output::Serve(_, epoch) => it.serve(&world.tables, epoch),
+            Output::Stop(_) => world.stop(server),
             Output::Suspend => {}
             Output::Resume => {
                 let mut publish = Vec::new();
@@ -322,18 +323,25 @@ impl Cluster {
                 };
                 Answer::Kept(tables.append(item, epoch, position, entry))
             }
-            Request::Read(item, position) => {
+            Request::Read(item, epoch, position) => {
                 let row = tables.journal(item).get(position as usize);
                 let row = row.map(|row| (shown(row.epoch), row.entries));
-                let epoch = tables.epoch(item).map_or(Epoch::FIRST, shown);
-                Answer::Read(row, epoch)
+                let epoch = match any_epoch {
+                    true => present(tables, item, epoch),
+                    false => epoch,
+                };
+                Answer::Read(row, !tables.may_append(item, epoch))
             }
             Request::Finish(item, epoch, rows) => {
                 let checked = match any_epoch || self.has(Fault::FinishWithoutEpoch) {
                     true => present(tables, item, epoch),
                     false => epoch,
                 };
-                let kept = tables.finish(item, checked);
+                let counted = match self.has(Fault::FinishWithoutRows) {
+                    true => tables.journal(item).len() as u64,
+                    false => rows,
+                };
+                let kept = tables.finish(item, checked, counted);
                 if kept == Kept::Kept {
                     world.ended.entry(item).or_insert((epoch, rows));
                 }
@@ -365,12 +373,12 @@ impl Cluster {
                 }
                 return;
             }
-            (Request::Read(item, _), Some(Answer::Read(row, present))) => {
+            (Request::Read(item, ..), Some(Answer::Read(row, fenced))) => {
                 if let Some(running) = it.running.get_mut(&item) {
                     let epoch = running.writer.epoch();
                     let ours =
                         row.map(|(writer, entry)| writer == epoch && Some(entry) == running.open);
-                    let step = running.writer.read(ours, present != epoch);
+                    let step = running.writer.read(ours, fenced);
                     self.go_on(world, server, item, step);
                 }
                 return;
@@ -399,7 +407,14 @@ impl Cluster {
                 if !std::mem::take(&mut it.creates) {
                     return;
                 }
+                if let Some(epoch) = it.serves_next.take_if(|_| answer.is_some()) {
+                    return it.serve(&world.tables, epoch);
+                }
                 match answer {
+                    // It was stopped meanwhile.
+                    Some(_) if it.running.is_empty() => {
+                        return self.release_if_quiet(world, server);
+                    }
                     // It is taken if this is a repetition.
                     Some(Answer::Created(Created::Created | Created::Taken)) => {
                         it.running.insert(ROOM, Running::new(epoch, 1));
@@ -455,7 +470,7 @@ impl Cluster {
                 }
                 self.release_if_quiet(world, server);
             }
-            Step::Read => self.send(world, server, Request::Read(item, position)),
+            Step::Read => self.send(world, server, Request::Read(item, epoch, position)),
             Step::Append => {
                 let entry = running.open.expect("an append is open");
                 let append = Request::Append(item, epoch, position, entry);
@@ -482,14 +497,35 @@ impl Running {
 }
 
 impl Server {
-    fn stop(&mut self) {
+    /// Reads the journals and runs the unit.
+    fn serve(&mut self, tables: &Tables<u8, Entry>, epoch: Epoch) {
         self.running.clear();
-        self.releases = None;
-        self.creates = false;
+        for item in tables.open_items(UNIT) {
+            let rows = tables.journal(item).len() as u64;
+            self.running.insert(item, Running::new(epoch, rows));
+        }
     }
 }
 
 impl World {
+    /// A server stops its unit at once, and does not wait for what it has sent.
+    fn stop(&mut self, server: usize) {
+        let it = self.servers[server].as_mut().expect("it lives");
+        it.running.clear();
+        (it.releases, it.serves_next) = (None, None);
+        let is_write =
+            |request: &Request| matches!(request, Request::Append(..) | Request::Finish(..));
+        let given_up = |from: usize, request: &Request| from == server && is_write(request);
+        (self.answers).retain(|(to, request, _)| !given_up(*to, request));
+        let requests = std::mem::take(&mut self.requests).into_iter();
+        self.requests = requests
+            .map(|(from, request, awaited)| {
+                let awaited = awaited && !given_up(from, &request);
+                (from, request, awaited)
+            })
+            .collect();
+    }
+
     fn publish(&mut self, item: u8, position: u64, epoch: Epoch, entry: Entry) {
         let rows = self.published.entry((item, position)).or_default();
         rows.insert((epoch, entry));
@@ -517,6 +553,7 @@ impl Model for Cluster {
                 running: BTreeMap::new(),
                 releases: None,
                 creates: false,
+                serves_next: None,
                 left: false,
             })
         });

@@ -47,7 +47,7 @@ pub(super) fn all(bounds: &Bounds) -> Vec<Property<Cluster>> {
             |_, world: &World| {
                 world.ended.iter().all(|(item, (epoch, rows))| {
                     let journal = world.tables.journal(*item);
-                    let is_owner = journal.last().is_some_and(|row| row.epoch <= *epoch);
+                    let is_owner = world.tables.epoch(*item) == Some(*epoch);
                     is_owner && journal.len() as u64 == *rows
                 })
             },
