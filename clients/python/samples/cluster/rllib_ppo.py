@@ -328,6 +328,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the network to this file")
     parser.add_argument("--json", action="store_true", help="print lines of JSON instead of text")
     options = parser.parse_args()
+    if options.runners < 1:
+        parser.error("--runners: at least 1")
     if options.servers and "RAY_ADDRESS" in os.environ:
         parser.error("--servers: other machines cannot reach servers of this one; start them and give their --address")
     return exit_code(lambda: run(options), ValueError, as_json=options.json)
