@@ -6,24 +6,12 @@
 
 use std::time::Duration;
 
+pub use chefshat_cluster::{Epoch, NodeId};
 use futures::future::BoxFuture;
 
 use super::tournaments::StoredTournament;
 use super::{ResumableGame, Store, StoreError};
 use chefshat_room::ids::Id;
-
-/// Identifies a node: one run of a server. Numbers are given by the database and never used again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct NodeId(pub u64);
-
-/// How often a unit has been taken over, from 1, when it is created.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Epoch(pub u64);
-
-impl Epoch {
-    /// The epoch of what has just been created.
-    pub const FIRST: Self = Self(1);
-}
 
 /// What a node says about itself when it joins.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

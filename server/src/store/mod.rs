@@ -6,6 +6,7 @@ mod codec;
 mod failing;
 mod form;
 mod memory;
+mod postgres;
 mod sqlite;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use futures::future::{BoxFuture, ready};
 
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
+pub use postgres::{DatabaseError, PostgresOptions, PostgresStore, migrate};
 pub use sqlite::{
     DATABASE_FILE, DatabaseCopy, ForgetError, Forgetting, Forgotten, LOCK_FILE, OpenError,
     SqliteStore, check_copy, copy_database,

@@ -1,4 +1,4 @@
-//! Behavior that all stores share. Each test runs with games in memory and with a database.
+//! Behavior that all stores share. Each test runs with games in memory, in SQLite and in PostgreSQL.
 
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_room::ids::SecretHash;
@@ -13,6 +13,9 @@ async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
     check(&MemoryStore::default()).await;
     let folder = tempfile::tempdir().expect("a folder");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
+    check(&store).await;
+    store.close().await;
+    let store = postgres::tests::node(&chefshat_postgres::database()).await;
     check(&store).await;
     store.close().await;
 }
@@ -36,7 +39,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
             game_seed: [game; 32],
         },
         created_at_ms: 1_000,
-        join_code: "ABCDEFGH".into(),
+        join_code: format!("ABCDE{game:03}"),
         owner: SecretHash::of(b"owner"),
         tournament: None,
         table: None,

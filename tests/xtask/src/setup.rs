@@ -156,6 +156,18 @@ pub(crate) fn prometheus() -> Result<(), Failure> {
     debian_package("prometheus")
 }
 
+/// PostgreSQL, of which tests start servers of their own.
+pub(crate) fn postgresql() -> Result<(), Failure> {
+    let versions = fs::read_dir("/usr/lib/postgresql").into_iter().flatten();
+    match versions
+        .flatten()
+        .any(|it| it.path().join("bin/postgres").exists())
+    {
+        true => Ok(()),
+        false => debian_package("postgresql"),
+    }
+}
+
 /// tmux, for the tests of terminal commands.
 pub(crate) fn tmux() -> Result<(), Failure> {
     if succeeds("tmux", &["-V"]) {
@@ -252,13 +264,16 @@ fn debian_package(name: &str) -> Result<(), Failure> {
         )));
     }
     run(Command::new("apt-get").args(["update", "--quiet"]))?;
-    run(Command::new("apt-get").args([
+    let mut install = Command::new("apt-get");
+    install.args([
         "install",
         "--yes",
         "--quiet",
         "--no-install-recommends",
         name,
-    ]))
+    ]);
+    // Services are not started: tests start servers of their own.
+    run(install.env("RUNLEVEL", "1"))
 }
 
 /// Makes `copy` equal to `source`, except for the modules: those of `copy` stay, those of `source`

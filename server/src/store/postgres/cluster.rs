@@ -1,0 +1,642 @@
+//! Nodes, and who owns what. See [`ClusterStore`].
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use chefshat_engine::RULES_VERSION;
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+use sqlx::postgres::{PgConnection, PgRow};
+use sqlx::{Connection as _, Row as _};
+use tracing::error;
+
+use super::commands::text;
+use super::journals::encode;
+use super::{PostgresStore, integer, lock};
+use crate::clock::since_epoch_ms;
+use crate::store::cluster::{
+    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
+};
+use crate::store::form::{self, FORM};
+use crate::store::tournaments::StoredTournament;
+use crate::store::{ResumableGame, StoreError};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Entry};
+
+/// Nodes that own nothing and have not beaten for this long are forgotten.
+const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
+/// How often a claim is tried again because the last owner has just written something.
+const CLAIM_ATTEMPTS: usize = 5;
+/// Most ended games that are read at once.
+const MAX_ENDED: i64 = 256;
+
+/// The columns of `location`.
+macro_rules! locations {
+    ($rest:literal) => {
+        concat!(
+            "SELECT id, kind, unit, node, epoch, over FROM owned ",
+            $rest
+        )
+    };
+}
+
+/// The columns of `Reader::rooms` and the epoch, of durable rooms.
+macro_rules! rooms {
+    ($rest:literal) => {
+        concat!(
+            "SELECT number, games.form, header, over, epoch
+             FROM owned JOIN games USING (game_id) WHERE durable AND kind = 0 AND ",
+            $rest
+        )
+    };
+}
+
+impl PostgresStore {
+    /// See `Store::resumable_games`.
+    pub(super) async fn own_games(
+        &self,
+        ended_since_ms: u64,
+    ) -> Result<Vec<ResumableGame>, StoreError> {
+        let node = self.node()?;
+        let rows = self.reader.read(|connection| {
+            sqlx::query(rooms!(
+                "node = $1 AND (NOT over OR number IN (
+                     SELECT number FROM games JOIN owned USING (game_id)
+                     WHERE node = $1 AND over AND ended_at_ms >= $2
+                     ORDER BY ended_at_ms DESC LIMIT $3))
+                 ORDER BY number"
+            ))
+            .bind(node)
+            .bind(integer(ended_since_ms))
+            .bind(MAX_ENDED)
+            .fetch_all(connection)
+            .boxed()
+        });
+        self.resumables(rows.await?).await
+    }
+
+    /// The games in rows of `rooms`, with journals that write at the epochs there.
+    async fn resumables(&self, rows: Vec<PgRow>) -> Result<Vec<ResumableGame>, StoreError> {
+        let epochs: std::collections::HashMap<i64, i64> =
+            rows.iter().map(|row| (row.get(0), row.get(4))).collect();
+        let rooms = self.reader.rooms(rows).await?;
+        Ok((rooms.into_iter())
+            .map(|room| {
+                let epoch = epochs[&room.number];
+                self.resumable(room, epoch)
+            })
+            .collect())
+    }
+
+    /// See `Store::tournaments`.
+    pub(super) async fn own_tournaments(
+        &self,
+        newest_over: usize,
+    ) -> Result<Vec<StoredTournament>, StoreError> {
+        let node = self.node()?;
+        let rows = self.reader.read(|connection| {
+            sqlx::query(
+                "SELECT number, form, header FROM tournaments WHERE number IN (
+                     SELECT number FROM tournaments JOIN owned ON id = tournament_id
+                     WHERE node = $1 AND NOT owned.over
+                     UNION ALL
+                     SELECT * FROM (
+                         SELECT number FROM tournaments WHERE over
+                         ORDER BY number DESC LIMIT $2) newest)
+                 ORDER BY number",
+            )
+            .bind(node)
+            .bind(integer(newest_over as u64))
+            .fetch_all(connection)
+            .boxed()
+        });
+        self.reader.read_tournaments(rows.await?).await
+    }
+
+    /// One attempt to claim a unit.
+    async fn try_claim(&self, unit: Id, seen: Epoch) -> Result<Claim, StoreError> {
+        let node = self.node()?;
+        let expire_after = millis(self.options.expire_after);
+        let claim = self.reader.read(move |connection| {
+            async move {
+                let mut transaction = connection.begin().await?;
+                let seen = integer(seen.0);
+                let claim = claim(&mut transaction, node, expire_after, unit, seen).await?;
+                match claim {
+                    Claim::Won(_) => transaction.commit().await?,
+                    Claim::Lost | Claim::Busy => transaction.rollback().await?,
+                }
+                Ok(claim)
+            }
+            .boxed()
+        });
+        claim.await
+    }
+
+    async fn locate_where(
+        &self,
+        query: &'static str,
+        value: LocatedBy,
+    ) -> Result<Option<Location>, StoreError> {
+        let row = self.reader.read(|connection| {
+            let query = sqlx::query(query);
+            match value {
+                LocatedBy::Id(id) => query.bind(id.0.to_vec()),
+                LocatedBy::Code(code) => query.bind(code),
+            }
+            .fetch_optional(connection)
+            .boxed()
+        });
+        row.await?.as_ref().map(location).transpose()
+    }
+}
+
+enum LocatedBy {
+    Id(Id),
+    Code(String),
+}
+
+/// What became of a claim.
+enum Claim {
+    Won(Epoch),
+    Lost,
+    /// The last owner wrote something at the same time.
+    Busy,
+}
+
+async fn claim(
+    connection: &mut PgConnection,
+    node: i64,
+    expire_after: i64,
+    unit: Id,
+    seen: i64,
+) -> sqlx::Result<Claim> {
+    let unit = unit.0.as_slice();
+    // Whoever has locked the rows claims the unit, or ends one of them.
+    let rows: Vec<(Option<i64>, bool)> = sqlx::query_as(
+        "SELECT node, durable FROM owned
+         WHERE unit = $1 AND epoch = $2 AND NOT over AND EXISTS (SELECT FROM nodes WHERE node = $3)
+         ORDER BY id FOR UPDATE",
+    )
+    .bind(unit)
+    .bind(seen)
+    .bind(node)
+    .fetch_all(&mut *connection)
+    .await?;
+    if !rows.iter().any(|(_, durable)| *durable) {
+        return Ok(Claim::Lost);
+    }
+    // All of them have the same owner.
+    let (owner, _) = rows[0];
+    if let Some(owner) = owner {
+        // A beat waits for the lock, so its answer comes before or after the whole claim.
+        let alive: Option<bool> = sqlx::query_scalar(
+            "SELECT beat_ms + $2 > clock_ms() FROM nodes WHERE node = $1 FOR SHARE",
+        )
+        .bind(owner)
+        .bind(expire_after)
+        .fetch_optional(&mut *connection)
+        .await?;
+        if alive == Some(true) {
+            return Ok(Claim::Lost);
+        }
+    }
+    sqlx::query("DELETE FROM owned WHERE unit = $1 AND NOT durable AND NOT over")
+        .bind(unit)
+        .execute(&mut *connection)
+        .await?;
+    let epoch = seen + 1;
+    // The rooms that are over can be shown by the new owner.
+    sqlx::query(
+        "UPDATE owned SET node = $2, epoch = CASE WHEN over THEN epoch ELSE $3 END WHERE unit = $1",
+    )
+    .bind(unit)
+    .bind(node)
+    .bind(epoch)
+    .execute(&mut *connection)
+    .await?;
+    match restart(connection, unit, epoch).await? {
+        true => Ok(Claim::Won(Epoch(epoch.cast_unsigned()))),
+        false => Ok(Claim::Busy),
+    }
+}
+
+/// Adds "the server was restarted" to the journals of a unit's rooms that are not over. Returns
+/// `false` if the last owner has just written at the same position.
+async fn restart(connection: &mut PgConnection, unit: &[u8], epoch: i64) -> sqlx::Result<bool> {
+    let games = sqlx::query(
+        "SELECT number, created_at_ms, position, entries
+         FROM owned JOIN games USING (game_id)
+              LEFT JOIN LATERAL (SELECT position, entries FROM journal WHERE game = number
+                                 ORDER BY position DESC LIMIT 1) last ON true
+         WHERE unit = $1 AND NOT over",
+    )
+    .bind(unit)
+    .fetch_all(&mut *connection)
+    .await?;
+    let (mut numbers, mut positions, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    for game in &games {
+        let number: i64 = game.get(0);
+        let mut last = Vec::new();
+        let entries: Option<&[u8]> = game.get(3);
+        if let Err(problem) = form::read_entries(entries.unwrap_or_default(), &mut last) {
+            error!(number, %problem, "a game cannot be read; it is left unchanged");
+            continue;
+        }
+        let created_at_ms = u64::try_from(game.get::<i64, _>(1)).unwrap_or_default();
+        let age = Duration::from_millis(since_epoch_ms().saturating_sub(created_at_ms));
+        let last = last.last().map_or(Duration::ZERO, |entry| entry.at);
+        let entry = Entry {
+            // A clock that was set back does not make the room younger than its journal.
+            at: age.max(last),
+            change: Change::ServerRestarted,
+        };
+        numbers.push(number);
+        positions.push(game.get::<Option<i64>, _>(2).map_or(0, |last| last + 1));
+        rows.push(encode(&mut vec![entry]));
+    }
+    let written = sqlx::query(
+        "INSERT INTO journal (game, position, epoch, entries)
+         SELECT game, position, $3, entries FROM unnest($1, $2, $4) AS new (game, position, entries)
+         ON CONFLICT DO NOTHING",
+    )
+    .bind(&numbers)
+    .bind(&positions)
+    .bind(epoch)
+    .bind(&rows)
+    .execute(connection)
+    .await?;
+    Ok(written.rows_affected() == numbers.len() as u64)
+}
+
+impl ClusterStore for PostgresStore {
+    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
+        async move {
+            let node: i64 = (self.reader.read(|connection| {
+                sqlx::query_scalar(
+                    "WITH forgotten AS (
+                         DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
+                           AND NOT EXISTS (SELECT FROM owned WHERE owned.node = nodes.node AND NOT over)
+                     )
+                     INSERT INTO nodes (name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
+                     VALUES ($1, $2, $3, $4, $5, clock_ms()) RETURNING node",
+                )
+                .bind(text(&info.name).into_owned())
+                .bind(text(&info.peer_endpoint).into_owned())
+                .bind(text(&info.client_endpoint).into_owned())
+                .bind(text(&info.build).into_owned())
+                .bind(integer(info.capacity))
+                .bind(FORGET_NODES_AFTER_MS)
+                .fetch_one(connection)
+                .boxed()
+            }))
+            .await?;
+            self.node.store(node, Ordering::Release);
+            Ok(NodeId(node.cast_unsigned()))
+        }
+        .boxed()
+    }
+
+    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+        async move {
+            let node = self.node()?;
+            let beat = self.reader.read(move |connection| {
+                async move {
+                    let mut transaction = connection.begin().await?;
+                    let drain: Option<bool> = sqlx::query_scalar(
+                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms())
+                         WHERE node = $1 RETURNING drain",
+                    )
+                    .bind(node)
+                    .fetch_optional(&mut *transaction)
+                    .await?;
+                    let Some(drain) = drain else {
+                        return Ok(None);
+                    };
+                    // A statement of its own: a claim that the beat waited for is visible.
+                    let units = sqlx::query(
+                        "SELECT DISTINCT unit, epoch FROM owned WHERE node = $1 AND NOT over",
+                    )
+                    .bind(node)
+                    .fetch_all(&mut *transaction)
+                    .await?;
+                    transaction.commit().await?;
+                    let owned = units.iter().filter_map(unit_at).collect();
+                    Ok(Some(Beat { owned, drain }))
+                }
+                .boxed()
+            });
+            beat.await
+        }
+        .boxed()
+    }
+
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
+        async move {
+            let expire_after = millis(self.options.expire_after);
+            let retention = millis(self.options.retention);
+            let units = self.reader.read(move |connection| {
+                async move {
+                    tidy(connection, expire_after, retention).await?;
+                    sqlx::query(
+                        "SELECT DISTINCT unit, epoch FROM owned
+                         WHERE NOT over AND durable
+                           AND (node IS NULL OR node IN (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
+                           AND NOT EXISTS (
+                               SELECT FROM owned other
+                               WHERE other.unit = owned.unit AND NOT over
+                                 AND (form > $2 OR coalesce(rules_version, $3) <> $3))
+                         ORDER BY unit LIMIT $4",
+                    )
+                    .bind(expire_after)
+                    .bind(FORM)
+                    .bind(i64::from(RULES_VERSION))
+                    .bind(integer(count as u64))
+                    .fetch_all(connection)
+                    .await
+                }
+                .boxed()
+            });
+            Ok(units.await?.iter().filter_map(unit_at).collect())
+        }
+        .boxed()
+    }
+
+    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+        async move {
+            for _ in 0..CLAIM_ATTEMPTS {
+                match self.try_claim(unit, seen).await? {
+                    Claim::Won(epoch) => return Ok(Some(epoch)),
+                    Claim::Lost => return Ok(None),
+                    Claim::Busy => {}
+                }
+            }
+            Ok(None)
+        }
+        .boxed()
+    }
+
+    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
+        async move {
+            let node = self.node()?;
+            let at = integer(epoch.0);
+            let is_owned: bool = (self.reader.read(move |connection| {
+                sqlx::query_scalar(
+                    "SELECT EXISTS (SELECT FROM owned
+                                    WHERE unit = $1 AND epoch = $2 AND node = $3 AND NOT over)",
+                )
+                .bind(unit.0.to_vec())
+                .bind(at)
+                .bind(node)
+                .fetch_one(connection)
+                .boxed()
+            }))
+            .await?;
+            if !is_owned {
+                return Ok(None);
+            }
+            let tournament = self.tournament(unit).await?;
+            let games = self.reader.read(move |connection| {
+                sqlx::query(rooms!("unit = $1 ORDER BY number"))
+                    .bind(unit.0.to_vec())
+                    .fetch_all(connection)
+                    .boxed()
+            });
+            let rooms = self.reader.rooms(games.await?).await?;
+            if tournament.is_some() {
+                lock(&self.tournaments).insert(unit, at);
+            }
+            Ok(Some(Unit {
+                tournament,
+                // At the epoch that was asked for: if another one has come since, they are fenced.
+                games: (rooms.into_iter())
+                    .map(|room| self.resumable(room, at))
+                    .collect(),
+            }))
+        }
+        .boxed()
+    }
+
+    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let node = self.node()?;
+            let released = self.reader.read(move |connection| {
+                async move {
+                    let mut transaction = connection.begin().await?;
+                    sqlx::query(
+                        "DELETE FROM owned
+                         WHERE unit = $1 AND epoch = $2 AND node = $3 AND NOT durable AND NOT over",
+                    )
+                    .bind(unit.0.to_vec())
+                    .bind(integer(epoch.0))
+                    .bind(node)
+                    .execute(&mut *transaction)
+                    .await?;
+                    sqlx::query(
+                        "UPDATE owned SET node = NULL
+                         WHERE unit = $1 AND node = $3 AND (epoch = $2 OR over)",
+                    )
+                    .bind(unit.0.to_vec())
+                    .bind(integer(epoch.0))
+                    .bind(node)
+                    .execute(&mut *transaction)
+                    .await?;
+                    transaction.commit().await
+                }
+                .boxed()
+            });
+            released.await
+        }
+        .boxed()
+    }
+
+    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
+        async move {
+            let node = self.node()?;
+            let left = self.reader.read(move |connection| {
+                sqlx::query(
+                    "DELETE FROM nodes WHERE node = $1
+                       AND NOT EXISTS (SELECT FROM owned WHERE node = $1 AND NOT over)",
+                )
+                .bind(node)
+                .execute(connection)
+                .boxed()
+            });
+            Ok(left.await?.rows_affected() > 0)
+        }
+        .boxed()
+    }
+
+    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+        self.locate_where(locations!("WHERE id = $1"), LocatedBy::Id(id))
+            .boxed()
+    }
+
+    fn locate_code<'a>(
+        &'a self,
+        join_code: &'a str,
+    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>> {
+        // A code may be used again once what had it is over.
+        self.locate_where(
+            locations!("WHERE join_code = $1 ORDER BY over, ended_ms DESC LIMIT 1"),
+            LocatedBy::Code(text(join_code).into_owned()),
+        )
+        .boxed()
+    }
+
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        async move {
+            let rows = self.reader.read(move |connection| {
+                sqlx::query(rooms!("id = $1 AND over"))
+                    .bind(room.0.to_vec())
+                    .fetch_all(connection)
+                    .boxed()
+            });
+            Ok(self.resumables(rows.await?).await?.pop())
+        }
+        .boxed()
+    }
+
+    fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
+        async move {
+            let rows = self.reader.read(move |connection| {
+                sqlx::query("SELECT number, form, header FROM tournaments WHERE tournament_id = $1")
+                    .bind(id.0.to_vec())
+                    .fetch_all(connection)
+                    .boxed()
+            });
+            Ok(self.reader.read_tournaments(rows.await?).await?.pop())
+        }
+        .boxed()
+    }
+
+    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>> {
+        async move {
+            let rows: i64 = (self.reader.read(move |connection| {
+                sqlx::query_scalar(
+                    "SELECT coalesce(max(position) + 1, 0) FROM tournament_entries
+                     WHERE tournament = (SELECT number FROM tournaments WHERE tournament_id = $1)",
+                )
+                .bind(id.0.to_vec())
+                .fetch_one(connection)
+                .boxed()
+            }))
+            .await?;
+            Ok(rows.cast_unsigned())
+        }
+        .boxed()
+    }
+
+    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
+        async move {
+            let expire_after = millis(self.options.expire_after);
+            let nodes = self.reader.read(move |connection| {
+                sqlx::query(
+                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
+                            greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain,
+                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
+                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments
+                     FROM nodes ORDER BY node",
+                )
+                .bind(expire_after)
+                .fetch_all(connection)
+                .boxed()
+            });
+            let number = |row: &PgRow, column: &str| row.get::<i64, _>(column).cast_unsigned();
+            Ok((nodes.await?.iter())
+                .map(|row| NodeStatus {
+                    id: NodeId(number(row, "node")),
+                    info: NodeInfo {
+                        name: row.get("name"),
+                        peer_endpoint: row.get("peer_endpoint"),
+                        client_endpoint: row.get("client_endpoint"),
+                        build: row.get("build"),
+                        capacity: number(row, "capacity"),
+                    },
+                    last_beat: Duration::from_millis(number(row, "since_ms")),
+                    expired: row.get("expired"),
+                    drain: row.get("drain"),
+                    rooms: number(row, "rooms"),
+                    tournaments: number(row, "tournaments"),
+                })
+                .collect())
+        }
+        .boxed()
+    }
+
+    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>> {
+        async move {
+            let asked = self.reader.read(move |connection| {
+                sqlx::query("UPDATE nodes SET drain = true WHERE node = $1")
+                    .bind(integer(node.0))
+                    .execute(connection)
+                    .boxed()
+            });
+            Ok(asked.await?.rows_affected() > 0)
+        }
+        .boxed()
+    }
+}
+
+/// Removes what is over since long, and what died with its node.
+async fn tidy(
+    connection: &mut PgConnection,
+    expire_after: i64,
+    retention: i64,
+) -> sqlx::Result<()> {
+    sqlx::query(
+        "DELETE FROM owned WHERE NOT durable AND NOT over AND unit = id
+           AND (node IS NULL OR node IN (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))",
+    )
+    .bind(expire_after)
+    .execute(&mut *connection)
+    .await?;
+    // Where a tournament was stays known: it is listed for ever.
+    sqlx::query("DELETE FROM owned WHERE over AND kind = 0 AND ended_ms < clock_ms() - $1")
+        .bind(retention)
+        .execute(&mut *connection)
+        .await?;
+    // Games that were abandoned before the deal leave nothing behind.
+    sqlx::query(
+        "WITH game AS (
+             DELETE FROM games WHERE state <> 0 AND summary IS NULL AND ended_at_ms < clock_ms() - $1
+             RETURNING number
+         )
+         DELETE FROM journal USING game WHERE game = number",
+    )
+    .bind(retention)
+    .execute(&mut *connection)
+    .await?;
+    Ok(())
+}
+
+/// A unit and its epoch, from a row.
+fn unit_at(row: &PgRow) -> Option<(Id, Epoch)> {
+    let epoch: i64 = row.get(1);
+    Some((id_of(row, 0)?, Epoch(epoch.cast_unsigned())))
+}
+
+fn id_of(row: &PgRow, column: usize) -> Option<Id> {
+    row.get::<&[u8], _>(column).try_into().ok().map(Id)
+}
+
+fn location(row: &PgRow) -> Result<Location, StoreError> {
+    let odd = || StoreError::Failed("an id in the database does not have 16 bytes".into());
+    Ok(Location {
+        id: id_of(row, 0).ok_or_else(odd)?,
+        kind: match row.get::<i16, _>(1) {
+            0 => Kind::Room,
+            _ => Kind::Tournament,
+        },
+        unit: id_of(row, 2).ok_or_else(odd)?,
+        node: row
+            .get::<Option<i64>, _>(3)
+            .map(|node| NodeId(node.cast_unsigned())),
+        epoch: Epoch(row.get::<i64, _>(4).cast_unsigned()),
+        over: row.get(5),
+    })
+}
+
+fn millis(time: Duration) -> i64 {
+    integer(u64::try_from(time.as_millis()).unwrap_or(u64::MAX))
+}

@@ -1,0 +1,359 @@
+//! Reads the database over connections of a pool, each read in bounded time.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_proto::v1;
+use futures::future::BoxFuture;
+use futures::{FutureExt as _, TryStreamExt as _};
+use prost::Message as _;
+use sqlx::Row as _;
+use sqlx::postgres::{PgConnection, PgPool, PgRow};
+use tokio::time::timeout;
+use tracing::error;
+
+use super::commands::text;
+use super::errors::failure;
+use super::integer;
+use crate::store::codec::Codec;
+use crate::store::form::{self, FORM, Unreadable};
+use crate::store::tournaments::StoredTournament;
+use crate::store::{Keep, Part, StoreError, StoredGame};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader};
+
+/// How long one read may take; then its connection is dropped.
+const READ_LIMIT: Duration = Duration::from_secs(15);
+
+/// The query for a list of finished games, with the condition on their numbers and the order.
+macro_rules! list_query {
+    ($part:literal, $order:literal) => {
+        concat!(
+            "SELECT listed, summary FROM games
+             WHERE summary IS NOT NULL AND ",
+            $part,
+            " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
+               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
+               AND ($7 = 0 OR EXISTS (SELECT FROM participants WHERE game = number AND kind = $7))
+               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE (name = $8 AND agent = '') OR agent = $8))
+               AND NOT ($9 AND added)
+             ORDER BY ",
+            $order,
+            " LIMIT $10"
+        )
+    };
+}
+
+/// Reads stored games.
+#[derive(Clone)]
+pub(super) struct Reader {
+    pub(super) pool: PgPool,
+    pub(super) codec: Codec,
+}
+
+/// A game that is or was a room's, as stored.
+pub(super) struct StoredRoom {
+    pub(super) number: i64,
+    pub(super) header: GameHeader,
+    pub(super) entries: Vec<Entry>,
+    /// Number of rows of its journal.
+    pub(super) rows: i64,
+    /// Whether its end has been committed.
+    pub(super) over: bool,
+}
+
+impl Reader {
+    /// Reads in bounded time; a connection whose answer does not come is dropped.
+    pub(super) async fn read<T>(
+        &self,
+        work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, sqlx::Result<T>>,
+    ) -> Result<T, StoreError> {
+        let failed = |error: sqlx::Error| failure(&error);
+        let mut connection = self.pool.acquire().await.map_err(failed)?;
+        match timeout(READ_LIMIT, work(&mut connection)).await {
+            Ok(read) => read.map_err(failed),
+            Err(_) => {
+                drop(connection.detach());
+                let late = std::io::Error::from(std::io::ErrorKind::TimedOut);
+                Err(failed(late.into()))
+            }
+        }
+    }
+
+    /// The entries of a game's journal.
+    pub(super) async fn entries(&self, number: i64) -> Result<Vec<Entry>, StoreError> {
+        match self.journal(number).await? {
+            Ok((entries, _)) => Ok(entries),
+            Err(problem) => Err(StoreError::Failed(format!(
+                "the journal of game number {number} cannot be read back: {problem}"
+            ))),
+        }
+    }
+
+    /// The entries of a game's journal and the number of its rows; the inner result says why it
+    /// cannot be read.
+    async fn journal(
+        &self,
+        number: i64,
+    ) -> Result<Result<(Vec<Entry>, i64), Unreadable>, StoreError> {
+        let mut journals = self.journals(vec![number]).await?;
+        let rows = journals.remove(&number).unwrap_or_default();
+        self.decode(rows).await
+    }
+
+    /// The rows of journals: position and entries, by the number of the game.
+    async fn journals(
+        &self,
+        games: Vec<i64>,
+    ) -> Result<HashMap<i64, Vec<(i64, Vec<u8>)>>, StoreError> {
+        self.read(|connection| {
+            async move {
+                let mut rows = sqlx::query(
+                    "SELECT game, position, entries FROM journal WHERE game = ANY ($1) ORDER BY game, position",
+                )
+                .bind(games)
+                .fetch(connection);
+                let mut journals: HashMap<i64, Vec<_>> = HashMap::new();
+                while let Some(row) = rows.try_next().await? {
+                    let journal = journals.entry(row.get(0)).or_default();
+                    journal.push((row.get(1), row.get(2)));
+                }
+                Ok(journals)
+            }
+            .boxed()
+        })
+        .await
+    }
+
+    async fn decode(
+        &self,
+        rows: Vec<(i64, Vec<u8>)>,
+    ) -> Result<Result<(Vec<Entry>, i64), Unreadable>, StoreError> {
+        let bytes: usize = rows.iter().map(|(_, entries)| entries.len()).sum();
+        let decoding = self.codec.run(bytes / 64, move || {
+            let mut entries = Vec::new();
+            let mut next = 0;
+            for (position, bytes) in &rows {
+                if *position != next {
+                    let gap = format!("a part of its journal is missing at {next}");
+                    return Err(Unreadable(gap));
+                }
+                form::read_entries(bytes, &mut entries)?;
+                next += 1;
+            }
+            Ok((entries, next))
+        });
+        decoding.await
+    }
+
+    /// The games in rows of number, form, header and whether it is over. One that cannot be read is
+    /// logged.
+    pub(super) async fn rooms(&self, games: Vec<PgRow>) -> Result<Vec<StoredRoom>, StoreError> {
+        let numbers = games.iter().map(|row| row.get(0)).collect();
+        let mut journals = self.journals(numbers).await?;
+        let mut rooms = Vec::with_capacity(games.len());
+        for row in games {
+            let number: i64 = row.get(0);
+            let header = check_form(row.get(1)).and_then(|()| header_of(&row));
+            let journal = self.decode(journals.remove(&number).unwrap_or_default());
+            let journal = journal.await?;
+            match header.and_then(|header| Ok((header, journal?))) {
+                Ok((header, (entries, rows))) => rooms.push(StoredRoom {
+                    number,
+                    header,
+                    entries,
+                    rows,
+                    over: row.get(3),
+                }),
+                Err(problem) => {
+                    error!(number, %problem, "a game cannot be read; it is left unchanged");
+                }
+            }
+        }
+        Ok(rooms)
+    }
+
+    /// See `Store::finished`.
+    pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
+        let row = self.read(|connection| {
+            sqlx::query(
+                "SELECT number, form, header, record, signature
+                 FROM games LEFT JOIN added_records ON game = number
+                 WHERE game_id = $1 AND summary IS NOT NULL",
+            )
+            .bind(game.0.to_vec())
+            .fetch_optional(connection)
+            .boxed()
+        });
+        let Some(row) = row.await? else {
+            return Ok(None);
+        };
+        let unreadable = |problem: Unreadable| {
+            StoreError::Failed(format!("game {game} cannot be read: {problem}"))
+        };
+        check_form(row.get(1)).map_err(unreadable)?;
+        let record: Option<Vec<u8>> = row.get(3);
+        if let Some(record) = record {
+            let decoding = self
+                .codec
+                .run(record.len() / 64, move || form::lines_from_bytes(&record));
+            let lines = decoding.await?.map_err(unreadable)?;
+            return Ok(Some(StoredGame::Imported(lines.into())));
+        }
+        let header = header_of(&row).map_err(unreadable)?;
+        let (entries, _) = self.journal(row.get(0)).await?.map_err(unreadable)?;
+        let signature: Option<&[u8]> = row.get(4);
+        let signed = signature.map(form::signed_from_bytes).transpose();
+        Ok(Some(StoredGame::Hosted(
+            Arc::new(header),
+            entries.into(),
+            signed.map_err(unreadable)?.map(Arc::new),
+        )))
+    }
+
+    /// Tournaments in rows of number, form and header. One that cannot be read is logged.
+    pub(super) async fn read_tournaments(
+        &self,
+        tournaments: Vec<PgRow>,
+    ) -> Result<Vec<StoredTournament>, StoreError> {
+        let mut stored = Vec::with_capacity(tournaments.len());
+        for row in tournaments {
+            let number: i64 = row.get(0);
+            let parts: Vec<Vec<u8>> = (self.read(|connection| {
+                sqlx::query_scalar(
+                    "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
+                )
+                .bind(number)
+                .fetch_all(connection)
+                .boxed()
+            }))
+            .await?;
+            match tournament(&row, &parts) {
+                Ok(tournament) => stored.push(tournament),
+                Err(problem) => {
+                    error!(number, %problem, "a tournament cannot be read; it is left unchanged");
+                }
+            }
+        }
+        Ok(stored)
+    }
+
+    /// See `Store::list`.
+    pub(super) async fn list(
+        &self,
+        filter: &v1::RecordFilter,
+        part: Part,
+        count: usize,
+    ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
+        let (query, number) = match part {
+            Part::After(number) => (list_query!("listed > $1", "listed"), number),
+            Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
+        };
+        let query = sqlx::query(query)
+            .bind(integer(number))
+            .bind(filter.state)
+            .bind(filter.origin)
+            .bind(text(&filter.room_name).into_owned())
+            .bind(integer(filter.created_from_ms))
+            .bind(integer(filter.created_before_ms))
+            .bind(filter.kind)
+            .bind(text(&filter.participant).into_owned())
+            .bind(filter.hosted_here)
+            .bind(integer(count as u64));
+        let rows = self.read(|connection| query.fetch_all(connection).boxed());
+        let rows = rows.await?;
+        rows.iter()
+            .map(|row| {
+                let number: i64 = row.get(0);
+                let summary = v1::RecordSummary::decode(row.get::<&[u8], _>(1));
+                let summary = summary.map_err(|error| {
+                    StoreError::Failed(format!("game number {number}: {error}"))
+                })?;
+                Ok((u64::try_from(number).unwrap_or_default(), summary))
+            })
+            .collect()
+    }
+
+    /// See `Store::finished_games`.
+    pub(super) async fn finished_games(&self) -> Result<u64, StoreError> {
+        let count: i64 = (self.read(|connection| {
+            sqlx::query_scalar("SELECT count(*) FROM games WHERE state <> 0")
+                .fetch_one(connection)
+                .boxed()
+        }))
+        .await?;
+        Ok(u64::try_from(count).unwrap_or_default())
+    }
+
+    /// See `Store::prunable`. Games without a record are none of the newest ones.
+    pub(super) async fn prunable(
+        &self,
+        keep: Keep,
+        (after, count): (u64, usize),
+        record_files: bool,
+    ) -> Result<Vec<(u64, Id)>, StoreError> {
+        let query = sqlx::query_as(
+            "SELECT number, game_id FROM games
+             WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+               AND (summary IS NULL
+                    OR (filed OR NOT $5)
+                       AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                      ORDER BY listed DESC LIMIT 1 OFFSET $2))
+             ORDER BY number LIMIT $4",
+        )
+        .bind(integer(after))
+        .bind(integer(keep.newest.unwrap_or_default().max(1)))
+        .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+        .bind(integer(count as u64))
+        .bind(record_files);
+        let rows = self.read(|connection| query.fetch_all(connection).boxed());
+        let rows: Vec<(i64, Vec<u8>)> = rows.await?;
+        Ok((rows.into_iter())
+            .filter_map(|(number, id)| Some((u64::try_from(number).ok()?, Id(id.try_into().ok()?))))
+            .collect())
+    }
+
+    /// See `Store::without_record_file`.
+    pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
+        let ids: Vec<Vec<u8>> = (self.read(|connection| {
+            sqlx::query_scalar(
+                "SELECT game_id FROM games WHERE NOT filed AND summary IS NOT NULL ORDER BY number",
+            )
+            .fetch_all(connection)
+            .boxed()
+        }))
+        .await?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+}
+
+/// A tournament from its row and those of its journal.
+fn tournament(row: &PgRow, parts: &[Vec<u8>]) -> Result<StoredTournament, Unreadable> {
+    check_form(row.get(1))?;
+    let mut entries = Vec::new();
+    for part in parts {
+        entries.extend(form::tournament_entries_from_bytes(part)?);
+    }
+    Ok(StoredTournament {
+        header: form::tournament_from_bytes(row.get(2))?,
+        entries,
+        rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),
+    })
+}
+
+/// The header in the third column.
+fn header_of(row: &PgRow) -> Result<GameHeader, Unreadable> {
+    let bytes: Option<&[u8]> = row.get(2);
+    form::header_from_bytes(bytes.ok_or_else(|| Unreadable("its header is missing".into()))?)
+}
+
+fn check_form(form: i64) -> Result<(), Unreadable> {
+    if form == FORM {
+        Ok(())
+    } else {
+        let problem = format!("it has encoding {form}; this version reads encoding {FORM}");
+        Err(Unreadable(problem))
+    }
+}

@@ -1,0 +1,363 @@
+//! Takeovers: an owner that has lost a room or tournament writes nothing any more, and nothing that
+//! was acknowledged is lost.
+
+use super::*;
+
+const FIRST: Epoch = Epoch::FIRST;
+const SECOND: Epoch = Epoch(2);
+
+/// Two nodes on one database, whose first node has stopped to beat long ago when `stall` is called.
+struct Pair {
+    database: Database,
+    first: PostgresStore,
+    second: PostgresStore,
+}
+
+impl Pair {
+    async fn new() -> Self {
+        let database = chefshat_postgres::database();
+        let first = node(&database).await;
+        stop_clock(&database);
+        // The first one joined by another clock.
+        first.join(NodeInfo::default()).await.expect("it joins");
+        let second = node(&database).await;
+        Self {
+            database,
+            first,
+            second,
+        }
+    }
+
+    /// Lets the lease of the first node expire.
+    async fn stall(&self) {
+        advance(&self.database, 8_000);
+        let beat = self.second.beat().await.expect("it answers");
+        assert!(beat.is_some(), "the second node is known");
+    }
+
+    async fn close(self) {
+        self.first.close().await;
+        self.second.close().await;
+    }
+}
+
+#[tokio::test]
+async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
+    let pair = Pair::new().await;
+    let room = Id([1; 16]);
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    let mut old = created.await.expect("created");
+    append(&mut old, 2).await.expect("committed");
+    assert_eq!(pair.second.orphans(9).await, Ok(vec![]));
+    assert_eq!(
+        pair.second.claim(room, FIRST).await,
+        Ok(None),
+        "it is alive"
+    );
+
+    pair.stall().await;
+    assert_eq!(pair.second.orphans(9).await, Ok(vec![(room, FIRST)]));
+    assert_eq!(pair.second.claim(room, SECOND).await, Ok(None));
+    assert_eq!(pair.second.claim(room, FIRST).await, Ok(Some(SECOND)));
+    assert_eq!(pair.second.claim(room, FIRST).await, Ok(None), "once");
+    assert_eq!(pair.second.orphans(9).await, Ok(vec![]));
+
+    let fenced = Err(StoreError::Fenced(room));
+    assert_eq!(append(&mut old, 3).await, fenced);
+    assert_eq!(append(&mut old, 4).await, fenced, "nor anything later");
+    assert_eq!(old.finish(Some(summary(1)), None).await, fenced);
+    assert!(
+        pair.first
+            .load(room, FIRST)
+            .await
+            .expect("readable")
+            .is_none()
+    );
+
+    let mut game = resumed(&pair.second, 1, SECOND).await;
+    assert!(!game.concluded);
+    assert_eq!(numbers(&game.entries), [1, 2, 0]);
+    append(&mut game.journal, 5).await.expect("committed");
+    let finished = game.journal.finish(Some(summary(1)), None);
+    finished.await.expect("committed");
+    let again = game.journal.finish(Some(summary(1)), None);
+    again.await.expect("it is finished already");
+    assert_eq!(pair.second.finished_games().await, Ok(1));
+    let stored = pair.first.finished(room).await.expect("readable");
+    let Some(StoredGame::Hosted(_, entries, _)) = stored else {
+        panic!("{stored:?}");
+    };
+    assert_eq!(numbers(&entries), [1, 2, 0, 5]);
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn an_append_that_is_late_finds_its_place_taken() {
+    let pair = Pair::new().await;
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    let mut old = created.await.expect("created");
+    pair.stall().await;
+    // The append waits in the database, where it has seen the old epoch already, until the claim
+    // is committed.
+    pair.database.run(
+        "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             IF NEW.epoch = 1 THEN
+                 PERFORM pg_advisory_xact_lock(1);
+             END IF;
+             RETURN NEW;
+         END $$;
+         CREATE TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW EXECUTE FUNCTION wait()",
+    );
+    let address = open::address(pair.database.url()).expect("an address");
+    let mut holder = open::connect(&address).await.expect("connected");
+    sqlx::query("SELECT pg_advisory_lock(1)")
+        .execute(&mut holder)
+        .await
+        .expect("locked");
+    let late = tokio::spawn(async move { append(&mut old, 2).await });
+    let waits = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
+    while pair.database.run(waits) != "1" {
+        tokio::task::yield_now().await;
+    }
+    let room = Id([1; 16]);
+    assert_eq!(pair.second.claim(room, FIRST).await, Ok(Some(SECOND)));
+    drop(holder);
+    assert_eq!(late.await.expect("no panic"), Err(StoreError::Fenced(room)));
+    let game = resumed(&pair.second, 1, SECOND).await;
+    assert_eq!(numbers(&game.entries), [1, 0]);
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn of_many_claims_one_wins() {
+    let pair = Pair::new().await;
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    created.await.expect("created");
+    let room = Id([1; 16]);
+    let third = node(&pair.database).await;
+    pair.first.release(room, FIRST).await.expect("released");
+    let stores = [&pair.first, &pair.second, &third];
+    let claims = (stores.iter().cycle().take(9)).map(|store| store.claim(room, FIRST));
+    let claims = futures::future::join_all(claims).await;
+    let won = claims.iter().filter(|claim| **claim == Ok(Some(SECOND)));
+    assert_eq!(won.count(), 1, "{claims:?}");
+    let lost = claims.iter().filter(|claim| **claim == Ok(None));
+    assert_eq!(lost.count(), 8, "{claims:?}");
+    let restarts = "SELECT count(*) FROM journal WHERE epoch = 2";
+    assert_eq!(pair.database.run(restarts), "1");
+    third.close().await;
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn a_tournament_changes_hands_with_all_its_rooms() {
+    let pair = Pair::new().await;
+    let unit = Id([9; 16]);
+    let begun = || {
+        vec![TournamentEntry::Change(TournamentChange::Begun {
+            rounds: 1,
+        })]
+    };
+    let created = pair.first.create_tournament(cup(9), begun());
+    created.await.expect("created");
+    let room = |number| header(number, Some(9), Durability::Durable);
+    let fenced = StoreError::Fenced(unit);
+    let refused = pair.second.create(room(4), vec![entry(1)]).await;
+    assert_eq!(refused.err(), Some(fenced.clone()), "not its tournament");
+    let mut journals = Vec::new();
+    for number in [1, 2] {
+        let created = pair.first.create(room(number), vec![entry(1)]);
+        journals.push(created.await.expect("created"));
+    }
+    let ephemeral = header(3, Some(9), Durability::Ephemeral);
+    pair.first.create(ephemeral, vec![]).await.expect("created");
+    let finished = journals[1].finish(Some(summary(2)), None);
+    finished.await.expect("committed");
+
+    pair.stall().await;
+    assert_eq!(pair.second.orphans(9).await, Ok(vec![(unit, FIRST)]));
+    assert_eq!(pair.second.claim(Id([1; 16]), FIRST).await, Ok(None));
+    assert_eq!(pair.second.claim(unit, FIRST).await, Ok(Some(SECOND)));
+    let late = pair.first.append_tournament(unit, 1, begun());
+    assert_eq!(late.await, Err(fenced.clone()));
+    assert_eq!(append(&mut journals[0], 2).await, Err(fenced.clone()));
+    let refused = pair.first.create(room(5), vec![entry(1)]).await;
+    assert_eq!(refused.err(), Some(fenced));
+
+    let found = pair.second.load(unit, SECOND).await.expect("readable");
+    let found = found.expect("it is owned");
+    assert_eq!(found.tournament.expect("a tournament").rows, 1);
+    let games: Vec<_> = (found.games.iter())
+        .map(|game| (game.concluded, numbers(&game.entries)))
+        .collect();
+    assert_eq!(games, [(false, vec![1, 0]), (true, vec![1])]);
+    let appended = pair.second.append_tournament(unit, 1, begun());
+    appended.await.expect("committed");
+    assert_eq!(pair.first.tournament_rows(unit).await, Ok(2));
+    let added = pair.second.create(room(6), vec![entry(1)]);
+    added
+        .await
+        .expect("the tournament's new owner creates rooms");
+    let located = pair.first.locate(Id([6; 16])).await.expect("readable");
+    let located = located.expect("known");
+    assert_eq!((located.unit, located.epoch), (unit, SECOND));
+    let gone = pair.first.locate(Id([3; 16])).await;
+    assert_eq!(gone, Ok(None), "ephemeral rooms die with their node");
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
+    let pair = Pair::new().await;
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    let mut journal = created.await.expect("created");
+    let created = pair.second.create_tournament(cup(9), vec![]);
+    created.await.expect("created");
+    for (code, id, kind, node) in [
+        ("ROOM1", 1, Kind::Room, NodeId(2)),
+        ("CUP9", 9, Kind::Tournament, NodeId(3)),
+    ] {
+        let by_id = pair.first.locate(Id([id; 16])).await.expect("readable");
+        let by_code = pair.first.locate_code(code).await.expect("readable");
+        assert_eq!(by_id, by_code);
+        let found = by_id.expect("known");
+        assert_eq!((found.kind, found.node), (kind, Some(node)));
+    }
+    assert_eq!(pair.first.locate(Id([7; 16])).await, Ok(None));
+    assert_eq!(pair.first.locate_code("NOTHING").await, Ok(None));
+
+    let finished = journal.finish(Some(summary(1)), None);
+    finished.await.expect("committed");
+    let found = pair.second.locate_code("ROOM1").await.expect("readable");
+    assert!(found.expect("known").over);
+    let shown = pair.second.ended_room(Id([1; 16])).await.expect("readable");
+    assert!(shown.expect("stored").concluded);
+    // Another room may have the code from now on.
+    let next = GameHeader {
+        join_code: "ROOM1".into(),
+        ..GameHeader::clone(&durable(2))
+    };
+    let created = pair.second.create(Arc::new(next), vec![entry(1)]);
+    created.await.expect("created");
+    let found = pair.first.locate_code("ROOM1").await.expect("readable");
+    assert_eq!(found.expect("known").id, Id([2; 16]));
+    // In the end nothing is left of the first room but its record.
+    advance(&pair.database, 600_001);
+    pair.first.orphans(9).await.expect("it answers");
+    assert_eq!(pair.first.locate(Id([1; 16])).await, Ok(None));
+    assert!(matches!(pair.first.ended_room(Id([1; 16])).await, Ok(None)));
+    assert_eq!(pair.first.finished_games().await, Ok(1));
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn a_node_is_listed_drained_and_leaves() {
+    let pair = Pair::new().await;
+    let node = NodeId(2);
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    created.await.expect("created");
+    assert_eq!(pair.first.leave().await, Ok(false), "it owns a room");
+    assert_eq!(pair.second.request_drain(node).await, Ok(true));
+    assert_eq!(pair.second.request_drain(NodeId(99)).await, Ok(false));
+    let beat = pair.first.beat().await.expect("it answers");
+    let beat = beat.expect("it is known");
+    assert!(beat.drain);
+    assert_eq!(beat.owned, [(Id([1; 16]), FIRST)]);
+    let nodes = pair.second.nodes().await.expect("readable");
+    let listed: Vec<_> = (nodes.iter())
+        .map(|node| (node.id.0, node.rooms, node.drain, node.expired))
+        .collect();
+    assert_eq!(listed[1..], [(2, 1, true, false), (3, 0, false, false)]);
+    let released = pair.first.release(Id([1; 16]), FIRST);
+    released.await.expect("released");
+    assert_eq!(pair.first.leave().await, Ok(true));
+    assert_eq!(pair.first.beat().await, Ok(None));
+    let refused = pair.first.create(durable(2), vec![entry(1)]).await;
+    assert_eq!(refused.err(), Some(StoreError::Fenced(Id([2; 16]))));
+    let claimed = pair.first.claim(Id([1; 16]), FIRST).await;
+    assert_eq!(claimed, Ok(None), "it is no node any more");
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn broken_connections_lose_and_double_nothing() {
+    const ROOMS: u8 = 8;
+    const APPENDS: u64 = 60;
+    let database = chefshat_postgres::database();
+    let store = Arc::new(node(&database).await);
+    let playing: Vec<_> = (1..=ROOMS)
+        .map(|room| {
+            let store = Arc::clone(&store);
+            tokio::spawn(async move {
+                let created = store.create(durable(room), vec![entry(1)]);
+                let mut journal = created.await.expect("created");
+                for number in 2..=APPENDS {
+                    append(&mut journal, number).await.expect("committed");
+                }
+                let finished = journal.finish(Some(summary(room)), None);
+                finished.await.expect("committed");
+            })
+        })
+        .collect();
+    let address = open::address(database.url()).expect("an address");
+    let killer = address.application_name("killer");
+    let mut killer = open::connect(&killer).await.expect("connected");
+    let mut killed = 0;
+    for round in 1..=10_i64 {
+        let mut rows = 0;
+        while rows < round * 40 {
+            let count = sqlx::query_scalar("SELECT count(*) FROM journal");
+            rows = count.fetch_one(&mut killer).await.expect("readable");
+        }
+        let kill = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity
+                    WHERE datname = current_database() AND application_name = 'chefshat'";
+        let terminated: i64 =
+            (sqlx::query_scalar(kill).fetch_one(&mut killer).await).expect("done");
+        killed += terminated;
+    }
+    for done in playing {
+        done.await.expect("every append is acknowledged");
+    }
+    assert!(killed >= 10, "connections were broken");
+    let all: Vec<u64> = (1..=APPENDS).collect();
+    for room in 1..=ROOMS {
+        let stored = store.finished(Id([room; 16])).await;
+        let Ok(Some(StoredGame::Hosted(_, entries, _))) = stored else {
+            panic!("{stored:?}");
+        };
+        assert_eq!(numbers(&entries), all);
+    }
+    let listed = "SELECT string_agg(listed::text, ' ' ORDER BY listed) FROM games";
+    assert_eq!(database.run(listed), "1 2 3 4 5 6 7 8");
+    store.close().await;
+}
+
+#[tokio::test]
+async fn a_cursor_misses_no_game_that_nodes_finish_at_the_same_time() {
+    let database = chefshat_postgres::database();
+    let (first, second) = (node(&database).await, node(&database).await);
+    let mut finishing = Vec::new();
+    for room in 1..=40 {
+        let store = [&first, &second][usize::from(room % 2)];
+        let created = store.create(durable(room), vec![entry(1)]);
+        let mut journal = created.await.expect("created");
+        finishing.push(tokio::spawn(async move {
+            journal.finish(Some(summary(room)), None).await
+        }));
+    }
+    let mut seen: Vec<u64> = Vec::new();
+    loop {
+        let done = finishing.iter().all(tokio::task::JoinHandle::is_finished);
+        let after = Part::After(seen.last().copied().unwrap_or(0));
+        let page = first.list(&v1::RecordFilter::default(), after, 3).await;
+        let page = page.expect("readable");
+        if done && page.is_empty() {
+            break;
+        }
+        seen.extend(page.iter().map(|(number, _)| *number));
+    }
+    assert_eq!(seen, (1..=40).collect::<Vec<u64>>());
+    first.close().await;
+    second.close().await;
+}

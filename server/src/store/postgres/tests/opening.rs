@@ -1,0 +1,86 @@
+//! Opening a database: unusable ones are refused and left unchanged.
+
+use super::*;
+
+async fn refusal(database: &Database) -> DatabaseError {
+    let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
+    opened.err().expect("it is refused")
+}
+
+#[tokio::test]
+async fn only_an_empty_database_gets_tables_without_being_asked() {
+    let database = chefshat_postgres::database();
+    let tables = "SELECT count(*) FROM pg_tables WHERE schemaname = 'public'";
+    database.run("CREATE TABLE recipes (name text)");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::NotOurs), "{error}");
+    let error = migrate(database.url()).await.expect_err("it is refused");
+    assert!(matches!(error, DatabaseError::NotOurs), "{error}");
+    assert_eq!(database.run(tables), "1");
+
+    database.run("DROP TABLE recipes");
+    node(&database).await.close().await;
+    node(&database).await.close().await;
+    assert_eq!(migrate(database.url()).await.ok(), Some((1, 1)));
+}
+
+#[tokio::test]
+async fn a_later_schema_is_used_if_it_only_adds() {
+    let database = chefshat_postgres::database();
+    assert_eq!(migrate(database.url()).await.ok(), Some((0, 1)));
+    database.run(
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'of the future', true, '', 0)",
+    );
+    node(&database).await.close().await;
+    let error = migrate(database.url()).await.expect_err("it is refused");
+    assert!(matches!(error, DatabaseError::Newer), "{error}");
+    database.run("UPDATE schema_support SET oldest = 9999");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Newer), "{error}");
+    database.run("UPDATE _sqlx_migrations SET version = version - 2000 WHERE version > 5");
+    database.run(
+        "DELETE FROM _sqlx_migrations WHERE version > 5; UPDATE _sqlx_migrations SET version = 0",
+    );
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Older), "{error}");
+    assert!(error.to_string().contains("chefshat migrate"), "{error}");
+}
+
+#[tokio::test]
+async fn a_database_that_acknowledges_too_early_is_refused() {
+    let database = chefshat_postgres::database();
+    let name = database.run("SELECT current_database()");
+    database.run(&format!(
+        "ALTER DATABASE {name} SET synchronous_commit = off"
+    ));
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Unsafe), "{error}");
+}
+
+#[tokio::test]
+async fn addresses_are_refused_without_showing_a_password() {
+    for (url, advice) in [
+        ("not an address", "postgres://user@host"),
+        ("postgres://ada:secret@host:port/games", "ada"),
+        (
+            "postgres://ada:secret@127.0.0.1:1/games",
+            "cannot be reached",
+        ),
+    ] {
+        let opened = PostgresStore::open(url, PostgresOptions::default()).await;
+        let error = opened.err().expect("it is refused").to_string();
+        assert!(!error.contains("secret"), "{error}");
+        assert!(error.contains(advice) || advice == "ada", "{error}");
+    }
+}
+
+#[tokio::test]
+async fn a_node_that_has_not_joined_creates_nothing() {
+    let database = chefshat_postgres::database();
+    let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
+    let store = opened.expect("an empty database");
+    let refused = store.create(durable(1), vec![]).await;
+    assert!(matches!(refused.err(), Some(StoreError::Failed(_))));
+    store.close().await;
+}

@@ -1,0 +1,209 @@
+//! The writers of a node: each commits what waits for it in one transaction, so that many rooms
+//! share a commit. A commit without an answer may have happened or not: the same work is then done
+//! again on a new connection, until its outcome is certain. So work must be *idempotent*: what it
+//! finds done by itself counts as done.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures::future::BoxFuture;
+use sqlx::postgres::{PgConnectOptions, PgConnection};
+use tokio::sync::{Mutex, mpsc, oneshot};
+use tokio::time::{Instant, sleep, timeout};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info, warn};
+
+use super::errors::{failure, is_temporary};
+use super::open::connect;
+use crate::metrics::StoreMetrics;
+use crate::store::StoreError;
+
+/// Work that may wait for a writer.
+const QUEUE: usize = 1_024;
+/// How long a transaction may take; then the connection is dropped.
+const COMMIT_LIMIT: Duration = Duration::from_secs(5);
+/// Pauses before a transaction is tried again.
+const FIRST_PAUSE: Duration = Duration::from_millis(50);
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// How long work is tried again after the store was closed.
+const CLOSING_LIMIT: Duration = Duration::from_secs(5);
+
+/// Work of one kind.
+pub(super) trait Work: Send + Sync + Sized + 'static {
+    /// What its sender receives.
+    type Answer: Send;
+    /// Most pieces in one transaction.
+    const MOST: usize;
+
+    /// Does all of it in one transaction, or nothing. `again` says that it may have been done
+    /// before.
+    fn commit<'a>(
+        connection: &'a mut PgConnection,
+        work: &'a [Arc<Self>],
+        again: bool,
+    ) -> BoxFuture<'a, sqlx::Result<Answers<Self>>>;
+}
+
+/// What became of each piece of work, in their order.
+pub(super) type Answers<W> = Vec<Result<<W as Work>::Answer, StoreError>>;
+
+struct Pending<W: Work> {
+    work: Arc<W>,
+    since: Instant,
+    reply: oneshot::Sender<Result<W::Answer, StoreError>>,
+}
+
+/// Takes work to writers.
+pub(super) struct Queue<W: Work>(mpsc::Sender<Pending<W>>);
+
+impl<W: Work> Clone for Queue<W> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+impl<W: Work> Queue<W> {
+    /// Does work and waits until it is committed. The work is done even if the caller is cancelled.
+    pub(super) async fn commit(&self, work: Arc<W>) -> Result<W::Answer, StoreError> {
+        let closed = || StoreError::Failed("the database is closed".into());
+        let (reply, committed) = oneshot::channel();
+        let since = Instant::now();
+        let pending = Pending { work, since, reply };
+        self.0.send(pending).await.map_err(|_| closed())?;
+        committed.await.map_err(|_| closed())?
+    }
+
+    /// Pieces of work in the queue.
+    pub(super) fn depth(&self) -> usize {
+        self.0.max_capacity() - self.0.capacity()
+    }
+}
+
+/// What all writers share.
+#[derive(Clone)]
+pub(super) struct Shared {
+    pub(super) options: PgConnectOptions,
+    /// How long work with an unknown outcome is tried again.
+    pub(super) retry_for: Duration,
+    pub(super) metrics: StoreMetrics,
+    pub(super) closing: CancellationToken,
+}
+
+/// Starts writers for one kind of work.
+pub(super) fn start<W: Work>(
+    shared: &Shared,
+    writers: usize,
+    tasks: &mut Vec<tokio::task::JoinHandle<()>>,
+) -> Queue<W> {
+    let (queue, waiting) = mpsc::channel(QUEUE);
+    let waiting = Arc::new(Mutex::new(waiting));
+    for _ in 0..writers {
+        let writer = Writer {
+            shared: shared.clone(),
+            connection: None,
+        };
+        tasks.push(tokio::spawn(writer.run(Arc::clone(&waiting))));
+    }
+    Queue(queue)
+}
+
+struct Writer {
+    shared: Shared,
+    connection: Option<PgConnection>,
+}
+
+impl Writer {
+    /// Commits work until the store is closed or all senders are gone. While one writer commits,
+    /// the next one takes what arrives.
+    async fn run<W: Work>(mut self, waiting: Arc<Mutex<mpsc::Receiver<Pending<W>>>>) {
+        let mut batch = Vec::new();
+        loop {
+            {
+                let mut waiting = waiting.lock().await;
+                let taking = waiting.recv_many(&mut batch, W::MOST);
+                let taken = tokio::select! {
+                    biased;
+                    taken = taking => taken,
+                    () = self.shared.closing.cancelled() => {
+                        waiting.close();
+                        waiting.recv_many(&mut batch, W::MOST).await
+                    }
+                };
+                if taken == 0 {
+                    break;
+                }
+            }
+            let began = Instant::now();
+            let pieces = batch.len();
+            self.commit(std::mem::take(&mut batch)).await;
+            self.shared.metrics.committed(pieces, began.elapsed());
+        }
+    }
+
+    /// Commits a batch and answers its senders.
+    async fn commit<W: Work>(&mut self, mut batch: Vec<Pending<W>>) {
+        let mut pause = FIRST_PAUSE;
+        let mut again = false;
+        while !batch.is_empty() {
+            let work: Vec<_> = batch.iter().map(|it| Arc::clone(&it.work)).collect();
+            let cause = match self.attempt(&work, again).await {
+                Ok(answers) => {
+                    if again {
+                        info!("the database answers again");
+                    }
+                    for (pending, answer) in batch.into_iter().zip(answers) {
+                        // The sender may be gone.
+                        let _ = pending.reply.send(answer);
+                    }
+                    return;
+                }
+                Err(cause) => cause,
+            };
+            let failed = failure(&cause);
+            if !is_temporary(&cause) {
+                error!(error = %failed, pieces = batch.len(), "a commit was refused");
+                // One piece must not make the others fail.
+                if batch.len() == 1 {
+                    let _ = batch.remove(0).reply.send(Err(failed));
+                    return;
+                }
+                for pending in batch {
+                    Box::pin(self.commit(vec![pending])).await;
+                }
+                return;
+            }
+            if !again {
+                warn!(error = %failed, "a commit has no answer; it is tried again");
+            }
+            again = true;
+            let limit = match self.shared.closing.is_cancelled() {
+                true => CLOSING_LIMIT.min(self.shared.retry_for),
+                false => self.shared.retry_for,
+            };
+            let (late, rest) = (batch.into_iter()).partition(|it| it.since.elapsed() >= limit);
+            batch = rest;
+            let late: Vec<Pending<W>> = late;
+            for pending in late {
+                let _ = pending.reply.send(Err(failed.clone()));
+            }
+            sleep(pause).await;
+            pause = LONGEST_PAUSE.min(pause * 2);
+        }
+    }
+
+    /// Tries once. After an error the connection is gone.
+    async fn attempt<W: Work>(&mut self, work: &[Arc<W>], again: bool) -> sqlx::Result<Answers<W>> {
+        let mut connection = match self.connection.take() {
+            Some(connection) => connection,
+            None => connect(&self.shared.options).await?,
+        };
+        match timeout(COMMIT_LIMIT, W::commit(&mut connection, work, again)).await {
+            Ok(Ok(answers)) => {
+                self.connection = Some(connection);
+                Ok(answers)
+            }
+            Ok(Err(error)) => Err(error),
+            Err(_) => Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into())),
+        }
+    }
+}

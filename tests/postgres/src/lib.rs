@@ -1,0 +1,292 @@
+//! A PostgreSQL server for tests: Debian's, in a temporary folder, on a free port of loopback. All
+//! tests of a process share one server and have a database each; a test that stops its server has
+//! one of its own. The server ends with the process that started it, however that ends.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::net::TcpListener;
+use std::os::unix::fs::{MetadataExt as _, chown};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// Where Debian's packages have the programs, in a folder for each version.
+const PROGRAMS: &str = "/usr/lib/postgresql";
+/// The user that owns all databases.
+const USER: &str = "chefshat";
+/// The system's user `nobody`: PostgreSQL refuses to run as root.
+const NOBODY: u32 = 65_534;
+/// How long a server may take to start or stop.
+const LIMIT: Duration = Duration::from_secs(60);
+/// Nothing here is to survive a crash of the machine.
+const SETTINGS: [&str; 6] = [
+    "fsync=off",
+    "full_page_writes=off",
+    "listen_addresses=127.0.0.1",
+    "max_connections=200",
+    "shared_buffers=32MB",
+    "unix_socket_directories=",
+];
+/// Runs a server until a line or the end of the input arrives. It ends when the test's process ends,
+/// in whatever way; then the folder is removed too.
+const KEEPER: &str = r#"
+"$1" -D "$2/data" &
+server=$!
+read -r stop
+kill -QUIT $server
+wait $server
+[ -n "$stop" ] || rm -rf "$2"
+"#;
+
+/// A server.
+#[derive(Debug)]
+pub struct Server {
+    folder: TempDir,
+    programs: PathBuf,
+    port: u16,
+    keeper: Option<Child>,
+}
+
+/// A database of its own.
+#[derive(Debug)]
+pub struct Database {
+    url: String,
+    programs: PathBuf,
+}
+
+/// Creates an empty database on the server that all tests of this process share.
+///
+/// # Panics
+/// If PostgreSQL is missing or does not start.
+pub fn database() -> Database {
+    static SHARED: OnceLock<Server> = OnceLock::new();
+    SHARED.get_or_init(Server::start).database()
+}
+
+impl Server {
+    /// Starts a new server with no databases.
+    ///
+    /// # Panics
+    /// If PostgreSQL is missing or does not start.
+    pub fn start() -> Self {
+        let programs = programs().expect(
+            "the tests need PostgreSQL: install it, for example with `apt-get install postgresql`",
+        );
+        let folder = tempfile::Builder::new()
+            .prefix("chefshat-postgres-")
+            .tempdir();
+        let folder = folder.expect("a temporary folder");
+        if is_root() {
+            chown(folder.path(), Some(NOBODY), Some(NOBODY)).expect("root may change owners");
+        }
+        let mut server = Self {
+            port: free_port(),
+            programs,
+            folder,
+            keeper: None,
+        };
+        let data = server.data();
+        let initdb = as_nobody(&server.programs.join("initdb"))
+            .args([
+                "--auth=trust",
+                "--encoding=UTF8",
+                "--locale=C.UTF-8",
+                "--no-sync",
+            ])
+            .args(["--username", USER, "--pgdata"])
+            .arg(&data)
+            .output();
+        succeeded("initdb", initdb);
+        server.resume();
+        server
+    }
+
+    /// Creates an empty database.
+    ///
+    /// # Panics
+    /// If the server does not run.
+    pub fn database(&self) -> Database {
+        static NUMBER: AtomicU64 = AtomicU64::new(1);
+        let name = format!("test{}", NUMBER.fetch_add(1, Ordering::Relaxed));
+        self.with_url("postgres")
+            .run(&format!("CREATE DATABASE {name}"));
+        self.with_url(&name)
+    }
+
+    fn with_url(&self, name: &str) -> Database {
+        Database {
+            url: format!("postgres://{USER}@127.0.0.1:{}/{name}", self.port),
+            programs: self.programs.clone(),
+        }
+    }
+
+    /// Its port on 127.0.0.1.
+    pub fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// Ends the server at once, as a crash does.
+    pub fn stop(&mut self) {
+        if let Some(mut keeper) = self.keeper.take() {
+            if let Some(mut input) = keeper.stdin.take() {
+                // If it has ended already, so has the server.
+                let _ = input.write_all(b"stop\n");
+            }
+            let _ = keeper.wait();
+        }
+    }
+
+    /// Starts the server again, with its databases.
+    ///
+    /// # Panics
+    /// If it does not start.
+    pub fn resume(&mut self) {
+        let deadline = Instant::now() + LIMIT;
+        let settings: String = (SETTINGS.iter())
+            .map(|setting| {
+                format!("{setting}\n")
+                    .replacen('=', " = '", 1)
+                    .replace('\n', "'\n")
+            })
+            .collect();
+        let settings = format!("{settings}port = {}\n", self.port);
+        let file = self.data().join("postgresql.auto.conf");
+        fs::write(file, settings).expect("the folder of the database is writable");
+        let log = fs::File::create(self.log()).expect("the folder is writable");
+        let mut keeper = as_nobody(Path::new("/bin/sh"))
+            .args(["-c", KEEPER, "keeper"])
+            .arg(self.programs.join("postgres"))
+            .arg(self.folder.path())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn()
+            .expect("a shell runs");
+        while !self.is_ready() {
+            let ended = keeper.try_wait().expect("a child can be asked");
+            assert!(
+                ended.is_none() && Instant::now() < deadline,
+                "PostgreSQL does not start: {}",
+                fs::read_to_string(self.log()).unwrap_or_default()
+            );
+            sleep(Duration::from_millis(20));
+        }
+        self.keeper = Some(keeper);
+    }
+
+    fn is_ready(&self) -> bool {
+        let port = self.port.to_string();
+        Command::new(self.programs.join("pg_isready"))
+            .args(["--quiet", "--host=127.0.0.1", "--port", &port])
+            .status()
+            .is_ok_and(|status| status.success())
+    }
+
+    fn data(&self) -> PathBuf {
+        self.folder.path().join("data")
+    }
+
+    fn log(&self) -> PathBuf {
+        self.folder.path().join("log")
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+impl Database {
+    /// Its address.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Runs SQL with psql and returns what it prints, rows without decoration.
+    ///
+    /// # Panics
+    /// If the SQL fails.
+    pub fn run(&self, sql: &str) -> String {
+        let psql = Command::new(self.programs.join("psql"))
+            .args(["--no-psqlrc", "--quiet", "--tuples-only", "--no-align"])
+            .args(["--set=ON_ERROR_STOP=1", "--command", sql, &self.url])
+            .output();
+        succeeded("psql", psql).trim().to_owned()
+    }
+}
+
+/// The folder with the programs of the newest installed version.
+fn programs() -> Option<PathBuf> {
+    let versions = fs::read_dir(PROGRAMS).ok()?.flatten();
+    let newest = versions
+        .filter(|folder| folder.path().join("bin/postgres").exists())
+        .max_by_key(|folder| {
+            let name = folder.file_name().into_string().unwrap_or_default();
+            name.parse::<u32>().unwrap_or_default()
+        })?;
+    Some(newest.path().join("bin"))
+}
+
+fn is_root() -> bool {
+    fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0)
+}
+
+/// A command that runs as `nobody`, if this process runs as root.
+fn as_nobody(program: &Path) -> Command {
+    if !is_root() {
+        return Command::new(program);
+    }
+    let mut command = Command::new("setpriv");
+    let nobody = NOBODY.to_string();
+    command
+        .args(["--reuid", &nobody, "--regid", &nobody, "--clear-groups"])
+        .arg(program)
+        // Not necessarily a folder that it may enter.
+        .current_dir("/");
+    command
+}
+
+fn free_port() -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("loopback has a free port");
+    listener.local_addr().expect("it is bound").port()
+}
+
+/// What a program printed.
+fn succeeded(name: &str, output: io::Result<Output>) -> String {
+    let output = output.unwrap_or_else(|error| panic!("{name} does not run: {error}"));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name} failed: {errors}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_database_is_empty_and_survives_the_end_of_its_server() {
+        let mut server = Server::start();
+        let (first, second) = (server.database(), server.database());
+        first.run("CREATE TABLE dishes (name text)");
+        first.run("INSERT INTO dishes VALUES ('pizza')");
+        assert_eq!(second.run("SELECT to_regclass('dishes') IS NULL"), "t");
+        server.stop();
+        assert!(!server.is_ready());
+        server.resume();
+        assert_eq!(first.run("SELECT name FROM dishes"), "pizza");
+    }
+
+    #[test]
+    fn tests_share_one_server() {
+        let port = |database: &Database| database.url().split('/').nth(2).map(str::to_owned);
+        let (first, second) = (database(), database());
+        assert_eq!(port(&first), port(&second));
+        assert_ne!(first.url(), second.url());
+    }
+}
