@@ -1,5 +1,5 @@
 //! Generates the server side of the streaming services again, with responses that are already
-//! encoded (`wire`).
+//! encoded (`wire`), and both sides of the streams between nodes.
 
 use std::path::PathBuf;
 
@@ -10,11 +10,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         println!("cargo::rerun-if-changed=../clients/web/dist");
     }
-    let files = ["play_service", "spectator_service"]
-        .map(|service| PathBuf::from(format!("../proto/chefshat/v1/{service}.proto")));
+    let files = ["v1/play_service", "v1/spectator_service", "peer/v1/peer"]
+        .map(|service| PathBuf::from(format!("../proto/chefshat/{service}.proto")));
     let descriptors = protox::compile(files, ["../proto"])?;
     tonic_prost_build::configure()
-        .build_client(false)
+        .client_mod_attribute("chefshat.v1", "#[cfg(any())]")
         .codec_path("crate::wire::SmallBuffers")
         .extern_path(".chefshat.v1", "::chefshat_proto::v1")
         .extern_path(".chefshat.v1.PlayResponse", "crate::wire::Updates")
@@ -26,6 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ".chefshat.v1.SpectatorServiceWatchResponse",
             "crate::wire::Updates",
         )
+        .extern_path(".chefshat.peer.v1.PlayResponse", "crate::wire::Updates")
         .compile_well_known_types(true)
         .extern_path(".google.protobuf", "::pbjson_types")
         .compile_fds(descriptors)?;

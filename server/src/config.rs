@@ -14,6 +14,8 @@ use crate::tls::TlsFiles;
 
 /// Largest message a client may send, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
+/// Largest message between nodes, bytes: a batch of inputs of one client, or of updates for it.
+pub const MAX_PEER_MESSAGE_BYTES: usize = 16 * 1024 * 1024;
 /// Most streams of one connection.
 pub const MAX_STREAMS_PER_CONNECTION: u32 = 1_024;
 /// Most seats attached to one stream at a time.

@@ -25,14 +25,23 @@ pub const SPECTATOR_CAPACITY: usize = 256;
 /// that gRPC clients accept by default.
 pub const MESSAGE_CAPACITY: usize = 4_096;
 
+/// Notified when a decision request is handed to the transport.
+pub trait OnHandover: Send + Sync {
+    /// The transport has taken the request.
+    fn handed_over(&self, now: Instant);
+}
+
 /// Records when a decision request was handed to the transport. Shared by the outbox, which sets
-/// it, and the room, which reads it.
+/// it, and the room, which reads it. For a seat whose client is connected to another node, that
+/// node reports it, with the number of the decision.
 #[derive(Debug)]
 pub struct HandStamp {
     clock: RoomClock,
     /// Microseconds since the room was created, plus one; 0 while the request has not been handed
     /// over.
     micros: AtomicU64,
+    /// The decision that another node has reported, whose time is in `micros`.
+    reported: AtomicU64,
 }
 
 impl HandStamp {
@@ -41,6 +50,7 @@ impl HandStamp {
         Arc::new(Self {
             clock,
             micros: AtomicU64::new(0),
+            reported: AtomicU64::new(0),
         })
     }
 
@@ -55,7 +65,22 @@ impl HandStamp {
         Some(std::time::Duration::from_micros(micros))
     }
 
-    fn set(&self, now: Instant) {
+    /// Another node has handed a decision request over.
+    pub fn report(&self, decision_id: u64, now: Instant) {
+        self.handed_over(now);
+        // After its time: a room that sees the number reads this time.
+        self.reported.store(decision_id, Ordering::Release);
+    }
+
+    /// When another node reported that it handed this request over.
+    pub fn reported(&self, decision_id: u64) -> Option<std::time::Duration> {
+        let reported = self.reported.load(Ordering::Acquire);
+        self.get().filter(|_| reported == decision_id)
+    }
+}
+
+impl OnHandover for HandStamp {
+    fn handed_over(&self, now: Instant) {
         let micros = self.clock.at(now).as_micros();
         self.micros.store(
             u64::try_from(micros).unwrap_or(u64::MAX - 1) + 1,
@@ -103,7 +128,7 @@ pub struct Outbox {
 struct Waiting {
     updates: Updates,
     weight: usize,
-    stamps: SmallVec<[Arc<HandStamp>; 1]>,
+    stamps: SmallVec<[Arc<dyn OnHandover>; 1]>,
     space_waiters: Vec<Arc<dyn OnSpace>>,
     /// The end of the stream, taken once.
     end: Option<StreamEnd>,
@@ -138,12 +163,12 @@ impl Outbox {
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
 
-    /// Queues updates; `stamp` is set when they are handed over. If they do not fit, nothing is
-    /// queued, `updates` is unchanged, and `on_space` is called when there is space again.
+    /// Queues updates; `stamps` are notified when they are handed over. If they do not fit, nothing
+    /// is queued, `updates` is unchanged, and `on_space` is called when there is space again.
     pub fn push(
         &self,
         updates: &mut Updates,
-        stamp: Option<&Arc<HandStamp>>,
+        stamps: impl IntoIterator<Item = Arc<dyn OnHandover>>,
         on_space: Option<&Arc<dyn OnSpace>>,
     ) -> bool {
         let weight = updates.weight();
@@ -163,7 +188,7 @@ impl Outbox {
         }
         waiting.weight += weight;
         waiting.updates.append(updates);
-        waiting.stamps.extend(stamp.cloned());
+        waiting.stamps.extend(stamps);
         drop(waiting);
         self.waker.wake();
         true
@@ -285,7 +310,7 @@ impl Stream for OutboxStream {
         if !waiting.stamps.is_empty() {
             let now = Instant::now();
             for stamp in waiting.stamps.drain(..) {
-                stamp.set(now);
+                stamp.handed_over(now);
             }
         }
         let space_waiters = std::mem::take(&mut waiting.space_waiters);

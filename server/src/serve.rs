@@ -26,8 +26,8 @@ use tracing::{info, warn};
 use crate::access::{Access, TokenFileError};
 use crate::cluster::{CONNECTION_WINDOW, Directory, PeerPort, STREAM_WINDOW, SingleServer};
 use crate::config::{
-    DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
-    ServerConfig,
+    DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION,
+    MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
 };
 use crate::connections::{self, Connections, Limits, Listener};
 use crate::forwarded::ForwardedLayer;
@@ -42,6 +42,7 @@ use crate::store::{Store, StoreError};
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
+use crate::wire::peer::peer_service_server::PeerServiceServer;
 
 /// Largest request headers, bytes.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
@@ -261,6 +262,13 @@ impl Server {
         }
         let forwarding = (peers.as_ref())
             .map(|port| grpc::ForwardLayer::new(Arc::clone(rooms.directory()), port.peers()));
+        let play = grpc::Play::new(
+            Arc::clone(&rooms),
+            Arc::clone(&tournaments),
+            closing.clone(),
+        );
+        let peer_play =
+            PeerServiceServer::new(play).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
         let peer_serving = match peers {
             None => Either::Left(std::future::ready(Ok(()))),
             Some(port) => {
@@ -284,7 +292,7 @@ impl Server {
                             Arc::clone(&calls),
                         ))
                         .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
-                        .add_routes(routes.clone())
+                        .add_routes(routes.clone().add_service(peer_play))
                         .serve_with_incoming_shutdown(port.incoming(), async move {
                             closed.cancelled().await;
                         }),

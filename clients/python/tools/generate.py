@@ -27,8 +27,8 @@ SYNC_NAMES = {"AsyncCalls": "Calls", "async_channel": "channel", "async_pages": 
 
 
 def run_protoc(proto: Path, out: Path) -> None:
-    """Runs protoc with its Python, gRPC and typing generators over every file of `proto`, into `out`."""
-    files = sorted(str(path) for path in (proto / "chefshat").rglob("*.proto"))
+    """Runs protoc with its Python, gRPC and typing generators over every file of the public protocol in `proto`, into `out`."""
+    files = sorted(str(path) for path in (proto / "chefshat" / "v1").glob("*.proto"))
     if not files:
         raise SystemExit(f"no .proto files under {proto}")
     scripts = Path(sys.executable).parent

@@ -131,6 +131,9 @@ pub struct Answer {
     pub annotations: Option<Box<[u8]>>,
     /// Annotations were sent that cannot be recorded.
     pub annotations_refused: bool,
+    /// Time from handing over the decision request until the answer was read, if both happened at
+    /// another server, which measured it.
+    pub measured: Option<Duration>,
 }
 
 impl Answer {
@@ -141,6 +144,7 @@ impl Answer {
             action,
             annotations: None,
             annotations_refused: false,
+            measured: None,
         }
     }
 }

@@ -41,7 +41,7 @@ impl Core {
             self.decided_at(open)
         } else {
             let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
-            deadline.max(open.recheck_at)
+            (deadline + self.seats[seat.index()].grace).max(open.recheck_at)
         })
     }
 
@@ -316,9 +316,8 @@ impl Core {
             let seat = open.decision.seat;
             // The clock is paused while the seat waits for the server.
             let by = open.paused_since.map_or(now, |since| since.min(now));
-            let late = open
-                .start
-                .is_some_and(|start| start + self.time_allowed(seat) <= by);
+            let allowed = self.time_allowed(seat) + self.seats[seat.index()].grace;
+            let late = open.start.is_some_and(|start| start + allowed <= by);
             if late && !self.is_automatic(seat) {
                 self.time_out(now);
             }
@@ -328,10 +327,11 @@ impl Core {
 
     /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a
     /// substitute, but never for a silent decision, which the substitution would reveal.
-    fn time_out(&mut self, now: Duration) {
+    pub(super) fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let (seat, silent) = (open.decision.seat, open.is_silent());
         let time = now.saturating_sub(open.start.unwrap_or(open.released));
+        let time = time.saturating_sub(self.seats[seat.index()].grace);
         let source = if self.seats[seat.index()].connection.is_some() {
             Source::Timeout
         } else {

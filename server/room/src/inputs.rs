@@ -8,7 +8,7 @@ use chefshat_engine::{ActionError, Seat};
 use super::answers::{Answer, Answered, ExpressError, JoinError, LeaveError, Verdict};
 use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
-    MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS, State,
+    MAX_EXPRESSIONS_PER_SEAT, MAX_GATEWAY_DELAY, MAX_SEATINGS, OpenDecision, State,
 };
 use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
 use crate::log::RoomEvent;
@@ -123,6 +123,7 @@ impl Core {
         let state = &mut self.seats[seat.index()];
         state.recalled = false;
         state.connection = Some(connection);
+        state.grace = Duration::ZERO;
         state.ever_attached = true;
         // With a contribution to the seed this game would have other deals than the rest of its
         // series.
@@ -135,6 +136,11 @@ impl Core {
         }
         self.start_if_complete(now);
         self.advance(now);
+    }
+
+    /// Lets answers of a seat's connection arrive late, because another server measures their time.
+    pub fn expect_delays(&mut self, seat: Seat) {
+        self.seats[seat.index()].grace = MAX_GATEWAY_DELAY;
     }
 
     /// Records the loss of a connection. Does nothing if the seat has a newer one.
@@ -150,6 +156,7 @@ impl Core {
             return;
         }
         self.seats[seat.index()].connection = None;
+        self.seats[seat.index()].grace = Duration::ZERO;
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed);
         }
@@ -196,7 +203,7 @@ impl Core {
     }
 
     /// Processes an answer that was read at `arrived`. `handed`: when the transport received the
-    /// decision request.
+    /// decision request. The time that another server measured counts instead of what passed here.
     pub fn answer(
         &mut self,
         now: Duration,
@@ -220,6 +227,17 @@ impl Core {
         if (self.awaited_from(seat)).is_none_or(|open| open.id != answer.decision_id) {
             return Answered::closed(Verdict::Closed);
         }
+        let read_here = arrived;
+        let (handed, arrived) = match answer.measured {
+            None => (handed, read_here),
+            Some(time) => {
+                // The report of the other server is missing, or was slower than the answer.
+                let latest = read_here.saturating_sub(time);
+                let handed = handed.map_or(latest, |handed| handed.min(latest));
+                let earliest = read_here.saturating_sub(MAX_GATEWAY_DELAY);
+                (Some(handed), (handed + time).max(earliest))
+            }
+        };
         self.settle_start(now, handed);
         let open = self.open.as_ref().expect("a decision is awaited");
         // The clock is paused while the seat waits for the server, as for the deadline.
@@ -230,6 +248,11 @@ impl Core {
         if time >= self.time_allowed(seat) {
             // It arrived after the deadline, but before the timer fired.
             self.tick(now, handed);
+            let is_open = |open: &OpenDecision| open.id == answer.decision_id;
+            if self.awaited_from(seat).is_some_and(is_open) {
+                self.time_out(now);
+                self.advance(now);
+            }
             return Answered {
                 time,
                 ..Answered::closed(Verdict::Closed)

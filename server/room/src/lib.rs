@@ -39,9 +39,9 @@ pub use answers::{
 
 pub use limits::{
     BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
-    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_HINTS,
-    MAX_IDLE, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME, SEARCH_PATIENCE,
-    SEARCH_PATIENCE_UNATTENDED,
+    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_GATEWAY_DELAY,
+    MAX_HANDOVER, MAX_HINTS, MAX_IDLE, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME,
+    SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED,
 };
 pub use revive::BadJournal;
 pub use search::SearchRequest;
@@ -110,6 +110,8 @@ struct SeatState {
     joined_at: Duration,
     ever_attached: bool,
     connection: Option<ConnectionId>,
+    /// How late answers of the connection may arrive because another server measures their time.
+    grace: Duration,
     entropy: Vec<u8>,
     /// Whether the loss of the agent's connection has been published.
     away: bool,
@@ -234,6 +236,7 @@ impl Core {
                     joined_at: Duration::ZERO,
                     ever_attached: false,
                     connection: None,
+                    grace: Duration::ZERO,
                     entropy: Vec::new(),
                     away: false,
                     recalled: false,

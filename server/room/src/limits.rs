@@ -19,6 +19,9 @@ pub const JOIN_HOLD: Duration = Duration::from_secs(120);
 /// The clock of a decision starts at most this long after its release, even if the transport has
 /// not received the request.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
+/// How late an answer that was measured by another server may arrive, and how much of its time the
+/// network between the servers may have cost.
+pub const MAX_GATEWAY_DELAY: Duration = Duration::from_secs(1);
 /// After a restart of the server, the clock of a decision waits this long for its seat to be
 /// attached.
 pub const RECALL_TIME: Duration = Duration::from_secs(60);

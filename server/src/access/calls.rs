@@ -35,7 +35,8 @@ pub struct Call {
 impl Call {
     /// The requirements of the call with this path.
     pub fn find(path: &str) -> Option<&'static Self> {
-        CALLS.iter().find(|call| call.path == path)
+        let mut calls = CALLS.iter().chain(CALLS_OF_NODES);
+        calls.find(|call| call.path == path)
     }
 
     const fn streaming(self) -> Self {
@@ -200,6 +201,11 @@ pub const CALLS: &[Call] = &[
     )
     .streaming(),
 ];
+
+/// The calls that only nodes make of each other, on a listener of their own. The rest of the server
+/// does not have them.
+const CALLS_OF_NODES: &[Call] =
+    &[call("/chefshat.peer.v1.PeerService/Play", Player, Compared).streaming()];
 
 #[cfg(test)]
 mod tests {

@@ -86,6 +86,7 @@ pub fn answer_from_proto(answer: v1::Answer) -> Answer {
         decision_id: answer.decision_id,
         action: answer.action,
         annotations_refused: annotations.is_err(),
+        measured: None,
         annotations: annotations.unwrap_or_default(),
     }
 }

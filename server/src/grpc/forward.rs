@@ -46,26 +46,45 @@ const HEADERS: [HeaderName; 8] = [
     HeaderName::from_static("grpc-accept-encoding"),
 ];
 
-/// The headers with which a request is sent to other nodes, in its extensions. They name its
-/// client, and contain its token and secrets.
-#[derive(Clone)]
-pub(super) struct PassedHeaders(pub(super) HeaderMap);
+/// The headers with which a request is sent to other nodes. They name its client, and contain its
+/// token and secrets.
+fn passed_headers<B>(request: &Request<B>) -> HeaderMap {
+    let mut passed = HeaderMap::new();
+    for name in HEADERS {
+        for value in request.headers().get_all(&name) {
+            passed.append(name.clone(), value.clone());
+        }
+    }
+    if let Some(client) = peer_address(request.extensions()) {
+        let client = HeaderValue::try_from(client.to_string());
+        let client = client.expect("addresses are printable");
+        passed.insert(HeaderName::from_static(FORWARDED_FOR), client);
+    }
+    passed
+}
 
-impl PassedHeaders {
-    /// The headers of a client's request.
-    fn of<B>(request: &Request<B>) -> Self {
-        let mut passed = HeaderMap::new();
-        for name in HEADERS {
-            for value in request.headers().get_all(&name) {
-                passed.append(name.clone(), value.clone());
-            }
-        }
-        if let Some(client) = peer_address(request.extensions()) {
-            let client = HeaderValue::try_from(client.to_string());
-            let client = client.expect("addresses are printable");
-            passed.insert(HeaderName::from_static(FORWARDED_FOR), client);
-        }
-        Self(passed)
+/// What the stream of a client needs to reach its seats at other nodes, in the extensions of its
+/// request.
+#[derive(Clone)]
+pub(super) struct Gateway {
+    layer: ForwardLayer,
+    headers: HeaderMap,
+}
+
+impl Gateway {
+    /// The connections to other nodes.
+    pub(super) fn peers(&self) -> &Peers {
+        &self.layer.peers
+    }
+
+    /// Who has which rooms and tournaments.
+    pub(super) fn directory(&self) -> &Arc<dyn Directory> {
+        &self.layer.directory
+    }
+
+    /// The headers with which the client's stream is continued at other nodes.
+    pub(super) fn headers(&self) -> &HeaderMap {
+        &self.headers
     }
 }
 
@@ -122,8 +141,11 @@ where
         if !call.forwarded {
             // A stream of seats opens its own streams to other nodes.
             if call.streams {
-                let headers = PassedHeaders::of(&request);
-                request.extensions_mut().insert(headers);
+                let gateway = Gateway {
+                    layer: self.layer.clone(),
+                    headers: passed_headers(&request),
+                };
+                request.extensions_mut().insert(gateway);
             }
             return Either::Left(self.services.call(request));
         }
@@ -146,7 +168,7 @@ impl ForwardLayer {
         S::Future: Send,
         S::Error: Send,
     {
-        let headers = PassedHeaders::of(&request);
+        let headers = passed_headers(&request);
         let (parts, body) = request.into_parts();
         let kept = Kept::default();
         let mut body = Body::new(KeepingBody {
@@ -166,7 +188,7 @@ impl ForwardLayer {
             let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
             *forwarded.method_mut() = parts.method.clone();
             *forwarded.uri_mut() = parts.uri.clone();
-            *forwarded.headers_mut() = headers.0.clone();
+            *forwarded.headers_mut() = headers.clone();
             match self.peers.send(&elsewhere.peer, forwarded).await {
                 Ok(answer) if !is_not_owner(answer.headers()) => return Ok(returned(answer)),
                 Ok(_) => self.directory.forget(&elsewhere.found_by),

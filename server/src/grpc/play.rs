@@ -2,6 +2,7 @@
 //! requests of a stream; the responses come from its outbox, which rooms fill.
 
 mod reader;
+mod remote;
 
 use std::pin::Pin;
 use std::sync::{Arc, OnceLock};
@@ -15,6 +16,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::analysis::estimate_to_proto;
+use super::forward::Gateway;
 use super::reach::Reach;
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::access::Caller;
@@ -27,9 +29,11 @@ use crate::room::SeatAction;
 use crate::rooms::Rooms;
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
+use crate::wire::peer::PlayRequest;
+use crate::wire::peer::peer_service_server::PeerService;
 use crate::wire::service::play_service_server::PlayService;
 use chefshat_room::ids::Token;
-use reader::{Reader, express_action};
+use reader::{Reader, Requests, express_action};
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -69,6 +73,45 @@ impl Play {
     }
 }
 
+impl Play {
+    /// Starts to read a stream, and returns its responses.
+    fn responses<R: Requests + 'static>(
+        &self,
+        reader: Reader,
+        requests: Streaming<R>,
+        updates: OutboxStream,
+    ) -> Response<Responses> {
+        let failure = Arc::new(OnceLock::new());
+        let (closing, outbox) = (self.closing.clone(), Arc::clone(&reader.outbox));
+        tokio::spawn(reader.read(requests, Arc::clone(&failure), closing.clone()));
+        let counted = self.rooms.metrics().stream(StreamKind::Play);
+        tokio::spawn(async move {
+            let _counted = counted;
+            tokio::select! {
+                () = closing.cancelled() => outbox.stop_reading(),
+                () = outbox.abandoned() => {}
+            }
+        });
+        Response::new(Responses { updates, failure })
+    }
+}
+
+/// The streams of other nodes, for their clients.
+#[tonic::async_trait]
+impl PeerService for Play {
+    type PlayStream = Responses;
+
+    async fn play(
+        &self,
+        request: Request<Streaming<PlayRequest>>,
+    ) -> Result<Response<Responses>, Status> {
+        let (outbox, updates) = Outbox::new();
+        let caller = Caller::of(request.extensions());
+        let reader = self.reader(caller, &outbox, true).by_gateway();
+        Ok(self.responses(reader, request.into_inner(), updates))
+    }
+}
+
 #[tonic::async_trait]
 impl PlayService for Play {
     type PlayStream = Responses;
@@ -79,19 +122,10 @@ impl PlayService for Play {
         request: Request<Streaming<v1::PlayRequest>>,
     ) -> Result<Response<Self::PlayStream>, Status> {
         let (outbox, updates) = Outbox::new();
-        let failure = Arc::new(OnceLock::new());
-        let reader = self.reader(Caller::of(request.extensions()), &outbox, true);
-        let closing = self.closing.clone();
-        tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure), closing.clone()));
-        let counted = self.rooms.metrics().stream(StreamKind::Play);
-        tokio::spawn(async move {
-            let _counted = counted;
-            tokio::select! {
-                () = closing.cancelled() => outbox.stop_reading(),
-                () = outbox.abandoned() => {}
-            }
-        });
-        Ok(Response::new(Responses { updates, failure }))
+        let caller = Caller::of(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
+        let reader = self.reader(caller, &outbox, true).with_remote(gateway);
+        Ok(self.responses(reader, request.into_inner(), updates))
     }
 
     async fn watch(
@@ -99,6 +133,7 @@ impl PlayService for Play {
         request: Request<v1::PlayServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
         let caller = Caller::of(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
         let seats = request.into_inner().seats;
         if !(1..=MAX_SEATS_PER_WATCH).contains(&seats.len()) {
             return Err(field(
@@ -107,7 +142,7 @@ impl PlayService for Play {
             ));
         }
         let (outbox, updates) = Outbox::new();
-        let mut reader = self.reader(caller, &outbox, false);
+        let mut reader = self.reader(caller, &outbox, false).with_remote(gateway);
         let closing = self.closing.clone();
         let counted = self.rooms.metrics().stream(StreamKind::Watch);
         tokio::spawn(async move {

@@ -9,8 +9,8 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
 use super::message::{
-    Acted, AttachRequest, Hinted, JoinRequest, Joined, Message, Ruled, SeatAction, SpectateError,
-    SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, Ruled, SeatAction,
+    SpectateError, SpectateRequest, Watching,
 };
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
@@ -86,10 +86,7 @@ impl Handle {
     ///
     /// # Errors
     /// The room is gone.
-    pub async fn attach(
-        &self,
-        request: AttachRequest,
-    ) -> Result<Option<(Seat, ConnectionId)>, RoomGone> {
+    pub async fn attach(&self, request: AttachRequest) -> Result<Option<AttachedSeat>, RoomGone> {
         self.ask(|reply| Message::Attach(Box::new(request), reply))
             .await
     }

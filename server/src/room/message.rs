@@ -11,7 +11,7 @@ use tokio::time::Instant;
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
 use crate::limits::{Hint, Key};
-use crate::outbox::{OnSpace, Outbox};
+use crate::outbox::{HandStamp, OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::{AbortReason, ParticipantKind};
@@ -58,6 +58,8 @@ pub struct AttachRequest {
     pub handle: u32,
     /// How events and decisions are delivered to it.
     pub options: DeliveryOptions,
+    /// Whether the client is connected to another node, which measures the time of its answers.
+    pub by_gateway: bool,
     /// The seat's contribution to the game seed.
     pub entropy: Vec<u8>,
     /// When the request was read.
@@ -66,6 +68,17 @@ pub struct AttachRequest {
     pub detached: Arc<AtomicBool>,
     /// The seat's ticket, if the server attaches the client.
     pub assigned_ticket: Option<Token>,
+}
+
+/// A seat that was attached to a stream.
+#[derive(Debug)]
+pub struct AttachedSeat {
+    /// The seat.
+    pub seat: Seat,
+    /// Number of the connection.
+    pub connection: ConnectionId,
+    /// Records when its decision requests are handed over.
+    pub stamp: Arc<HandStamp>,
 }
 
 /// A request to watch.
@@ -133,10 +146,7 @@ pub type Watching = Result<watch::Receiver<SentState>, SpectateError>;
 /// A message to a room.
 pub(super) enum Message {
     Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
-    Attach(
-        Box<AttachRequest>,
-        oneshot::Sender<Option<(Seat, ConnectionId)>>,
-    ),
+    Attach(Box<AttachRequest>, oneshot::Sender<Option<AttachedSeat>>),
     Lost(Seat, ConnectionId, Option<v1::DetachReason>),
     Do(Seat, ConnectionId, SeatAction, Instant),
     Act(

@@ -16,6 +16,7 @@ use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
 use chefshat_room::{ConnectionId, Core};
 
+use super::message::AttachRequest;
 use crate::convert;
 use crate::limits::Held;
 use crate::metrics::Counted;
@@ -81,6 +82,8 @@ pub struct SeatConnection {
     pub options: DeliveryOptions,
     /// Records when a decision request is handed over.
     pub stamp: Arc<HandStamp>,
+    /// Whether the client is connected to another node, which reports when that happens.
+    pub by_gateway: bool,
     /// Set with the last update to the seat on this stream.
     pub detached: Arc<AtomicBool>,
     /// The last decision sent, or 0.
@@ -95,21 +98,19 @@ pub struct SeatConnection {
 impl SeatConnection {
     /// Creates a connection that has received nothing yet.
     pub fn new(
-        seat: Seat,
-        id: ConnectionId,
-        handle: u32,
-        options: DeliveryOptions,
+        (seat, id): (Seat, ConnectionId),
+        request: &AttachRequest,
         stamp: Arc<HandStamp>,
-        detached: Arc<AtomicBool>,
         counted: Counted,
     ) -> Self {
         Self {
             seat,
             id,
-            handle,
-            options,
+            handle: request.handle,
+            options: request.options,
             stamp,
-            detached,
+            by_gateway: request.by_gateway,
+            detached: Arc::clone(&request.detached),
             sent: 0,
             acknowledged: 0,
             decision_pending: false,
@@ -200,6 +201,9 @@ impl Subscriber {
     /// When a decision request was handed to the transport; `None` if it was not yet.
     pub fn handed(&self, decision_id: u64) -> Option<Duration> {
         let connection = self.connection()?;
+        if connection.by_gateway {
+            return connection.stamp.reported(decision_id);
+        }
         let left = connection.sent == decision_id && !connection.decision_pending;
         connection.stamp.get().filter(|_| left)
     }
@@ -349,7 +353,9 @@ impl Subscriber {
             let mut request = Vec::with_capacity(DECISION_CAPACITY);
             encode_decision(core, open, now, !connection.options.no_mask, &mut request);
             connection.sent = open.id;
-            connection.stamp.clear();
+            if !connection.by_gateway {
+                connection.stamp.clear();
+            }
             connection.decision_pending = true;
             self.pending.add_decision(connection.handle, &request);
         }
@@ -389,8 +395,10 @@ impl Subscriber {
     /// notified when there is space.
     fn flush(&mut self) -> bool {
         let stamp = match &self.role {
-            Role::Seat(connection) => connection.decision_pending.then_some(&connection.stamp),
-            Role::Spectator { .. } => None,
+            Role::Seat(connection) if connection.decision_pending && !connection.by_gateway => {
+                Some(Arc::clone(&connection.stamp) as _)
+            }
+            Role::Seat(_) | Role::Spectator { .. } => None,
         };
         let pushed = self
             .outbox

@@ -28,8 +28,8 @@ use tracing::{Instrument as _, debug, error, info};
 
 use super::clients::Clients;
 use super::message::{
-    Acted, AttachRequest, Hinted, JoinRequest, Joined, Message, NotifySpace, ReportRefusal, Ruled,
-    SeatAction, SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotifySpace,
+    ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::observed::Observed;
 use super::resting::Resting;
@@ -147,7 +147,7 @@ enum Release {
         Box<AttachRequest>,
         Seat,
         ConnectionId,
-        oneshot::Sender<Option<(Seat, ConnectionId)>>,
+        oneshot::Sender<Option<AttachedSeat>>,
     ),
     Result(Seat, ConnectionId, v1::AnswerResult),
     Refuse(Seat, ConnectionId, v1::Refused),
@@ -559,7 +559,7 @@ impl Room {
     fn attach(
         &mut self,
         request: Box<AttachRequest>,
-        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+        reply: oneshot::Sender<Option<AttachedSeat>>,
     ) {
         let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
             answer(reply, None);
@@ -570,6 +570,9 @@ impl Room {
         let (entropy, arrived) = (request.entropy.clone(), self.clock.at(request.arrived));
         self.core
             .attach(self.now, seat, connection, entropy, arrived, handed);
+        if request.by_gateway {
+            self.core.expect_delays(seat);
+        }
         self.releases
             .push(Release::Attach(request, seat, connection, reply));
     }
@@ -813,17 +816,15 @@ impl Room {
         request: AttachRequest,
         seat: Seat,
         connection: ConnectionId,
-        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+        reply: oneshot::Sender<Option<AttachedSeat>>,
     ) {
         let participant = self.core.standing(seat).participant;
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
+        let stamp = HandStamp::new(self.clock);
         let connected = SeatConnection::new(
-            seat,
-            connection,
-            request.handle,
-            request.options,
-            HandStamp::new(self.clock),
-            request.detached,
+            (seat, connection),
+            &request,
+            Arc::clone(&stamp),
             self.context.metrics.seat(kind),
         );
         let mut subscriber =
@@ -834,7 +835,12 @@ impl Room {
             older.detach(v1::DetachReason::Superseded);
         }
         self.always_visit[seat.index()] = true;
-        answer(reply, Some((seat, connection)));
+        let attached = AttachedSeat {
+            seat,
+            connection,
+            stamp,
+        };
+        answer(reply, Some(attached));
     }
 
     fn current(&mut self, seat: Seat, connection: ConnectionId) -> Option<&mut Subscriber> {

@@ -146,7 +146,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
 
 async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
-    let (seat, connection) = room
+    let attached = room
         .attach(AttachRequest {
             secret: ticket.secret,
             request_id: 0,
@@ -158,6 +158,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
                 snapshot: false,
                 from: 0,
             },
+            by_gateway: false,
             entropy: Vec::new(),
             arrived: Instant::now(),
             detached: Arc::default(),
@@ -167,8 +168,8 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
         .expect("the room exists")
         .expect("a valid ticket");
     AttachedSeat {
-        seat,
-        connection,
+        seat: attached.seat,
+        connection: attached.connection,
         ticket,
         updates,
     }

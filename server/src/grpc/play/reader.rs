@@ -6,6 +6,7 @@ use std::future::{Future as _, poll_fn};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::task::Poll;
+use std::time::Duration;
 
 use chefshat_engine::MAX_ENTROPY;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
@@ -16,20 +17,23 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
+use super::remote::{NodeGone, RemoteSeats};
 use crate::access::Caller;
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
 };
 use crate::convert;
+use crate::grpc::forward::Gateway;
 use crate::grpc::reach::Reach;
 use crate::grpc::refusals::count;
-use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
-use crate::outbox::{Outbox, StreamEnd};
+use crate::grpc::status::{field, is_elsewhere, refused, room_gone, status, ticket_unknown};
+use crate::outbox::{HandStamp, Outbox, StreamEnd};
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
 use crate::tournaments::{Call, Connection, TournamentHandle, Tournaments};
 use crate::wire::Updates;
+use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::{Answer, ConnectionId};
 
@@ -38,6 +42,7 @@ pub(super) struct BoundSeat {
     pub(super) room: Handle,
     seat: chefshat_engine::Seat,
     connection: ConnectionId,
+    stamp: Arc<HandStamp>,
     pub(super) secret: [u8; 32],
     /// Set when the seat has left the stream.
     detached: Arc<AtomicBool>,
@@ -71,7 +76,13 @@ pub(super) struct Reader {
     pub(super) seats: BTreeMap<u32, BoundSeat>,
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
     next_handle: u32,
-    pub(super) next_called: u32,
+    /// The handles of seats that the server attaches start here.
+    first_called: u32,
+    next_called: u32,
+    /// The seats that other nodes have. Boxed, because a single server has none.
+    remote: Option<Box<RemoteSeats>>,
+    /// Whether the stream comes from another node, at which its client is connected.
+    by_gateway: bool,
     /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
@@ -80,9 +91,89 @@ pub(super) struct Reader {
 }
 
 /// The next input of a reader.
-enum Next {
-    Message(Option<Result<v1::PlayRequest, Status>>),
+enum Next<R> {
+    Message(Option<Result<R, Status>>),
     Call(u32, Call),
+}
+
+/// A message of a stream, for its reader.
+pub(super) trait Requests: Send {
+    /// Executes the commands of the message, which was read at `arrived`.
+    ///
+    /// # Errors
+    /// The message breaks a rule.
+    fn execute(
+        self,
+        reader: &mut Reader,
+        arrived: Instant,
+    ) -> impl Future<Output = Result<(), Status>> + Send;
+}
+
+impl Requests for v1::PlayRequest {
+    async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {
+        if self.commands.len() > MAX_COMMANDS_PER_MESSAGE {
+            return Err(status(
+                Code::InvalidArgument,
+                "TOO_MANY_COMMANDS",
+                format!("a message contains at most {MAX_COMMANDS_PER_MESSAGE} commands"),
+                [("field", "commands")],
+            ));
+        }
+        // The rooms of a message for several seats work in parallel instead.
+        let in_place = self.commands.len() == 1;
+        for command in self.commands {
+            reader.execute(command, arrived, in_place).await;
+        }
+        Ok(())
+    }
+}
+
+impl Requests for PlayRequest {
+    async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {
+        if self.first_assigned_handle > 0 {
+            reader.first_called = self.first_assigned_handle;
+            reader.next_called = self.first_assigned_handle;
+        }
+        let in_place = self.inputs.len() == 1;
+        for PlayInput { input, elapsed_us } in self.inputs {
+            tokio::task::consume_budget().await;
+            match input {
+                Some(Input::Command(mut command)) => match command.command.take() {
+                    Some(Command::Attach(attach)) => {
+                        Box::pin(reader.attach_as(command.handle, attach)).await;
+                    }
+                    Some(Command::Answer(answer)) => {
+                        let measured = elapsed_us.map(Duration::from_micros);
+                        let answer = Answer {
+                            measured,
+                            ..convert::answer_from_proto(answer)
+                        };
+                        let left = match reader.seats.get(&command.handle) {
+                            Some(bound) => bound.answer_now(answer, arrived, in_place).err(),
+                            None => Some(answer),
+                        };
+                        if let Some(answer) = left {
+                            let action = SeatAction::Answer(answer);
+                            Box::pin(reader.perform(command.handle, action, arrived)).await;
+                        }
+                    }
+                    other => {
+                        Box::pin(reader.execute_command(command.handle, other, arrived)).await;
+                    }
+                },
+                Some(Input::HandedOver(HandedOver {
+                    handle,
+                    decision_id,
+                })) => {
+                    if let Some(bound) = reader.seats.get(&handle) {
+                        bound.stamp.report(decision_id, arrived);
+                    }
+                }
+                None => {}
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Reader {
@@ -103,17 +194,32 @@ impl Reader {
             seats: BTreeMap::new(),
             participants: BTreeMap::new(),
             next_handle: 0,
+            first_called: FIRST_CALLED,
             next_called: FIRST_CALLED,
+            remote: None,
+            by_gateway: false,
             calls,
             called,
             with_decisions,
         }
     }
 
+    /// Lets the stream have seats at other nodes.
+    pub(super) fn with_remote(mut self, gateway: Option<Gateway>) -> Self {
+        self.remote = gateway.map(|gateway| Box::new(RemoteSeats::new(gateway, &self.outbox)));
+        self
+    }
+
+    /// Marks the stream as one of another node.
+    pub(super) fn by_gateway(mut self) -> Self {
+        self.by_gateway = true;
+        self
+    }
+
     /// Reads requests until the stream ends. Sets `failure` if they break off or break a rule.
-    pub(super) async fn read(
+    pub(super) async fn read<R: Requests>(
         mut self,
-        mut requests: Streaming<v1::PlayRequest>,
+        mut requests: Streaming<R>,
         failure: Arc<OnceLock<Status>>,
         closing: CancellationToken,
     ) {
@@ -149,15 +255,11 @@ impl Reader {
             silence = None;
             let arrived = Instant::now();
             match message {
-                Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {
-                    break Err(status(
-                        Code::InvalidArgument,
-                        "TOO_MANY_COMMANDS",
-                        format!("a message contains at most {MAX_COMMANDS_PER_MESSAGE} commands"),
-                        [("field", "commands")],
-                    ));
+                Ok(Some(request)) => {
+                    if let Err(status) = request.execute(&mut self, arrived).await {
+                        break Err(status);
+                    }
                 }
-                Ok(Some(request)) => self.execute(request, arrived).await,
                 Ok(None) => break Ok(()),
                 Err(status) => break Err(status),
             }
@@ -175,29 +277,45 @@ impl Reader {
         });
     }
 
-    async fn execute(&mut self, request: v1::PlayRequest, arrived: Instant) {
-        // The rooms of a message for several seats work in parallel instead.
-        let in_place = request.commands.len() == 1;
-        for v1::SeatCommand { handle, command } in request.commands {
-            // A flood of answers, which are handled without waiting, must not hold the thread.
-            tokio::task::consume_budget().await;
-            match (command, self.seats.get(&handle)) {
-                (Some(Command::Answer(answer)), Some(bound)) => {
-                    let answer = convert::answer_from_proto(answer);
-                    if let Err(answer) = bound.answer_now(answer, arrived, in_place) {
-                        let action = SeatAction::Answer(answer);
-                        Box::pin(self.perform(handle, action, arrived)).await;
-                    }
+    async fn execute(&mut self, command: v1::SeatCommand, arrived: Instant, in_place: bool) {
+        // A flood of answers, which are handled without waiting, must not hold the thread.
+        tokio::task::consume_budget().await;
+        let v1::SeatCommand { handle, command } = command;
+        match (command, self.seats.get(&handle)) {
+            (Some(Command::Answer(answer)), Some(bound)) => {
+                let answer = convert::answer_from_proto(answer);
+                if let Err(answer) = bound.answer_now(answer, arrived, in_place) {
+                    let action = SeatAction::Answer(answer);
+                    Box::pin(self.perform(handle, action, arrived)).await;
                 }
-                // Boxed because it is rare: the future of a stream stays small.
-                (command, _) => Box::pin(self.execute_command(handle, command, arrived)).await,
             }
+            // Boxed because it is rare: the future of a stream stays small.
+            (Some(Command::Attach(attach)), _) => Box::pin(self.attach(attach)).await,
+            (command, _) => {
+                let command = v1::SeatCommand { handle, command };
+                Box::pin(self.execute_elsewhere(command, arrived)).await;
+            }
+        }
+    }
+
+    /// Executes a command for a seat of another node there, and any other here.
+    async fn execute_elsewhere(&mut self, command: v1::SeatCommand, arrived: Instant) {
+        let command = match &self.remote {
+            None => Ok(Some(command)),
+            Some(remote) => remote.pass_on(command, arrived).await,
+        };
+        match command {
+            Ok(Some(v1::SeatCommand { handle, command })) => {
+                self.execute_command(handle, command, arrived).await;
+            }
+            Ok(None) => {}
+            Err(NodeGone) => self.outbox.end(StreamEnd::RoomGone),
         }
     }
 
     async fn execute_command(&mut self, handle: u32, command: Option<Command>, arrived: Instant) {
         let action = match command {
-            Some(Command::Attach(attach)) => return self.attach(attach).await,
+            Some(Command::Attach(attach)) => return self.attach_as(handle, attach).await,
             Some(Command::Detach(_)) => return self.detach(handle).await,
             Some(Command::Answer(answer)) => SeatAction::Answer(convert::answer_from_proto(answer)),
             Some(Command::Express(expression)) => match express_action(&expression) {
@@ -234,14 +352,25 @@ impl Reader {
         }
     }
 
+    /// Attaches the next seat or participant of the client.
     pub(super) async fn attach(&mut self, attach: v1::Attach) {
+        let handle = self.next_handle;
+        self.next_handle = self.next_handle.wrapping_add(1);
+        self.attach_as(handle, attach).await;
+    }
+
+    async fn attach_as(&mut self, handle: u32, mut attach: v1::Attach) {
         // The client may have attached on its next stream already, which this one would supersede.
         if self.outbox.is_abandoned() {
             return;
         }
-        let handle = self.next_handle;
-        self.next_handle = self.next_handle.wrapping_add(1);
         let request_id = attach.request_id;
+        if attach.delivery() == v1::EventDelivery::Unspecified {
+            attach.set_delivery(match self.with_decisions {
+                true => v1::EventDelivery::WithDecisions,
+                false => v1::EventDelivery::AtOnce,
+            });
+        }
         if !self.has_space() {
             return self.refuse(handle, request_id, &too_many_seats());
         }
@@ -260,7 +389,18 @@ impl Reader {
                     .map(drop),
             };
             if let Err(status) = in_scope {
-                return self.refuse(handle, request_id, &status);
+                return match (is_elsewhere(&status), &mut self.remote) {
+                    (Some(elsewhere), Some(remote)) => {
+                        if let Err(NodeGone) = remote.attach(elsewhere, handle, attach).await {
+                            self.outbox.end(StreamEnd::RoomGone);
+                        }
+                    }
+                    // Another node is about to take over.
+                    _ if status.code() == Code::Unavailable => {
+                        self.outbox.end(StreamEnd::RoomGone);
+                    }
+                    _ => self.refuse(handle, request_id, &status),
+                };
             }
             if let Some(tournament) = tournament {
                 return self.enter(tournament, token, attach, handle).await;
@@ -278,13 +418,16 @@ impl Reader {
 
     /// Whether a seat or participant is attached to the stream.
     pub(super) fn has_attached(&self) -> bool {
-        !(self.seats.is_empty() && self.participants.is_empty())
+        let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
+        !(self.seats.is_empty() && self.participants.is_empty()) || remote > 0
     }
 
     /// Whether the stream can take one more seat.
     pub(super) fn has_space(&mut self) -> bool {
-        let full =
-            |reader: &Self| reader.seats.len() + reader.participants.len() >= MAX_SEATS_PER_STREAM;
+        let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
+        let full = |reader: &Self| {
+            reader.seats.len() + reader.participants.len() + remote >= MAX_SEATS_PER_STREAM
+        };
         if full(self) {
             self.seats.retain(|_, bound| !bound.is_detached());
         }
@@ -304,11 +447,6 @@ impl Reader {
         let Some(room) = self.rooms.get(token.room) else {
             return Ok(None);
         };
-        let at_once = match attach.delivery() {
-            v1::EventDelivery::Unspecified => !self.with_decisions,
-            v1::EventDelivery::WithDecisions => false,
-            v1::EventDelivery::AtOnce => true,
-        };
         let detached = Arc::new(AtomicBool::new(false));
         let from = attach.from_sequence.saturating_sub(1);
         let request = AttachRequest {
@@ -317,21 +455,23 @@ impl Reader {
             outbox: Arc::clone(&self.outbox),
             handle,
             options: DeliveryOptions {
-                at_once,
+                at_once: attach.delivery() == v1::EventDelivery::AtOnce,
                 no_mask: attach.no_mask,
                 snapshot: attach.snapshot,
                 from: usize::try_from(from).unwrap_or(usize::MAX),
             },
+            by_gateway: self.by_gateway,
             entropy: attach.entropy,
             arrived: Instant::now(),
             detached: Arc::clone(&detached),
             assigned_ticket,
         };
         let attached = room.attach(request).await?;
-        Ok(attached.map(|(seat, connection)| BoundSeat {
+        Ok(attached.map(|attached| BoundSeat {
             room,
-            seat,
-            connection,
+            seat: attached.seat,
+            connection: attached.connection,
+            stamp: attached.stamp,
             secret: token.secret,
             detached,
         }))
@@ -356,6 +496,9 @@ impl Reader {
     }
 
     pub(super) async fn leave_all(&mut self) {
+        if let Some(remote) = &mut self.remote {
+            remote.leave().await;
+        }
         for bound in std::mem::take(&mut self.participants).into_values() {
             bound.leave().await;
         }
@@ -368,6 +511,14 @@ impl Reader {
     pub(super) fn announce_stop(&self) {
         for handle in self.participants.keys() {
             self.detach_participant(*handle, v1::DetachReason::ServerStopping);
+        }
+        // The seats of other nodes stay where they are, and their client connects to one of these.
+        if self
+            .remote
+            .as_ref()
+            .is_some_and(|remote| remote.count() > 0)
+        {
+            self.outbox.end(StreamEnd::ShuttingDown);
         }
     }
 
@@ -401,6 +552,8 @@ pub(super) fn too_many_seats() -> Status {
 
 /// First handle of seats that the server attaches.
 pub(super) const FIRST_CALLED: u32 = 1 << 31;
+/// Number of handles of seats that one node attaches to a stream.
+pub(super) const CALLED: u32 = 1 << 24;
 
 /// Ids of connections of participants.
 static CONNECTIONS: AtomicU64 = AtomicU64::new(1);
@@ -499,7 +652,8 @@ impl Reader {
             return;
         }
         let handle = self.next_called;
-        self.next_called = self.next_called.wrapping_add(1).max(FIRST_CALLED);
+        let next = (self.next_called - self.first_called + 1) % CALLED;
+        self.next_called = self.first_called + next;
         // Otherwise the game ended before its seat was attached: there is nothing left to play.
         if let Ok(Some(bound)) = self.bind(attach, handle, Some(ticket)).await {
             self.seats.insert(handle, bound);
@@ -571,9 +725,9 @@ mod tests {
                     command: Some(Command::Answer(v1::Answer::default())),
                 };
                 let commands = vec![command];
-                reader
-                    .execute(v1::PlayRequest { commands }, Instant::now())
-                    .await;
+                let request = v1::PlayRequest { commands };
+                let executed = request.execute(&mut reader, Instant::now());
+                executed.await.expect("few commands");
             }
         });
         // The only thread runs the flood until it yields.

@@ -1,0 +1,356 @@
+//! The seats of a client's stream that other nodes have. For each of these nodes the reader opens
+//! one stream (`chefshat.peer.v1`), passes the commands for its seats on, and queues its updates as
+//! they are. This node is their gateway: here the client's transport takes decision requests and
+//! answers are read, so here the time in between is measured, and the network between nodes costs
+//! no seat its time.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+
+use chefshat_proto::v1::{self, seat_command::Command};
+use futures::StreamExt as _;
+use futures::future::join_all;
+use http::header;
+use tokio::sync::{Notify, mpsc};
+use tokio::time::Instant;
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::task::AbortOnDropHandle;
+use tonic::metadata::MetadataMap;
+use tonic::transport::Channel;
+use tonic::{Request, Status};
+use tracing::debug;
+
+use super::reader::{CALLED, FIRST_CALLED};
+use crate::cluster::{Directory, Elsewhere, FoundBy};
+use crate::config::MAX_PEER_MESSAGE_BYTES;
+use crate::grpc::forward::Gateway;
+use crate::outbox::{OnHandover, OnSpace, Outbox, StreamEnd};
+use crate::wire::peer::peer_service_client::PeerServiceClient;
+use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
+use crate::wire::{Received, Updates};
+use chefshat_room::ids::Id;
+
+/// Inputs that wait for one stream to another node. A client that sends more waits.
+const INPUTS_WAITING: usize = 1_024;
+/// Most inputs in one message.
+const INPUTS_PER_MESSAGE: usize = 64;
+/// Most nodes whose seats one stream has: each needs handles of its own, as this one does.
+const MAX_NODES: usize = ((u32::MAX - FIRST_CALLED) / CALLED) as usize;
+
+/// The seats of a client's stream that other nodes have.
+pub(super) struct RemoteSeats {
+    gateway: Gateway,
+    outbox: Arc<Outbox>,
+    streams: Vec<PeerStream>,
+    /// The number of the stream of each seat that the client attached.
+    attached: BTreeMap<u32, usize>,
+}
+
+/// A stream to another node.
+struct PeerStream {
+    endpoint: Arc<str>,
+    /// `None` once the client's stream has ended.
+    inputs: Option<mpsc::Sender<PlayInput>>,
+    shared: Arc<Shared>,
+    receiving: AbortOnDropHandle<()>,
+}
+
+/// What the reader of the client's stream and the receiver of a peer stream share.
+#[derive(Default)]
+struct Shared {
+    seats: Mutex<BTreeMap<u32, RemoteSeat>>,
+    /// What the client attached there.
+    ids: Mutex<BTreeSet<Id>>,
+}
+
+impl Shared {
+    fn seats(&self) -> MutexGuard<'_, BTreeMap<u32, RemoteSeat>> {
+        (self.seats.lock()).expect("nothing panics under this lock")
+    }
+}
+
+/// A seat or participant at another node that is attached, or about to be.
+#[derive(Default)]
+struct RemoteSeat {
+    is_attached: bool,
+    /// The last decision request.
+    decision: Option<Arc<Handover>>,
+}
+
+/// When the client's transport took a decision request.
+struct Handover {
+    handle: u32,
+    decision_id: u64,
+    at: OnceLock<Instant>,
+    inputs: mpsc::WeakSender<PlayInput>,
+}
+
+impl OnHandover for Handover {
+    fn handed_over(&self, now: Instant) {
+        let _ = self.at.set(now);
+        // Without it, the owner learns of it with the answer.
+        if let Some(inputs) = self.inputs.upgrade() {
+            let handed_over = HandedOver {
+                handle: self.handle,
+                decision_id: self.decision_id,
+            };
+            let _ = inputs.try_send(PlayInput {
+                input: Some(Input::HandedOver(handed_over)),
+                elapsed_us: None,
+            });
+        }
+    }
+}
+
+impl RemoteSeats {
+    /// No seats yet, for the client whose stream has this outbox.
+    pub(super) fn new(gateway: Gateway, outbox: &Arc<Outbox>) -> Self {
+        Self {
+            gateway,
+            outbox: Arc::clone(outbox),
+            streams: Vec::new(),
+            attached: BTreeMap::new(),
+        }
+    }
+
+    /// Number of seats and participants.
+    pub(super) fn count(&self) -> usize {
+        let counts = self
+            .streams
+            .iter()
+            .map(|stream| stream.shared.seats().len());
+        counts.sum()
+    }
+
+    /// Attaches a seat or participant of another node.
+    ///
+    /// # Errors
+    /// The stream to that node has ended, or there are too many.
+    pub(super) async fn attach(
+        &mut self,
+        elsewhere: &Elsewhere,
+        handle: u32,
+        attach: v1::Attach,
+    ) -> Result<(), NodeGone> {
+        let endpoint = &elsewhere.peer.endpoint;
+        let open = |stream: &PeerStream| stream.endpoint == *endpoint;
+        let number = match self.streams.iter().position(open) {
+            Some(number) => number,
+            None if self.streams.len() == MAX_NODES => return Err(NodeGone),
+            None => {
+                let stream = self.open(elsewhere);
+                self.streams.push(stream);
+                self.streams.len() - 1
+            }
+        };
+        let stream = &self.streams[number];
+        if let FoundBy::Id(id) = elsewhere.found_by {
+            let mut ids = (stream.shared.ids.lock()).expect("nothing panics under this lock");
+            ids.insert(id);
+        }
+        stream.shared.seats().insert(handle, RemoteSeat::default());
+        self.attached.insert(handle, number);
+        let command = v1::SeatCommand {
+            handle,
+            command: Some(Command::Attach(attach)),
+        };
+        stream.send(command, None).await
+    }
+
+    /// Passes a command on; gives it back if no other node has its seat.
+    ///
+    /// # Errors
+    /// The stream to the seat's node has ended.
+    pub(super) async fn pass_on(
+        &self,
+        command: v1::SeatCommand,
+        arrived: Instant,
+    ) -> Result<Option<v1::SeatCommand>, NodeGone> {
+        let Some(stream) = self.stream_of(command.handle) else {
+            return Ok(Some(command));
+        };
+        let elapsed = match &command.command {
+            Some(Command::Answer(answer)) => stream.handed_over(command.handle, answer.decision_id),
+            _ => None,
+        };
+        let elapsed = elapsed.map(|at| arrived.saturating_duration_since(at).as_micros());
+        let elapsed_us = elapsed.map(|micros| u64::try_from(micros).unwrap_or(u64::MAX));
+        stream.send(command, elapsed_us).await.map(|()| None)
+    }
+
+    fn stream_of(&self, handle: u32) -> Option<&PeerStream> {
+        let number = match handle.checked_sub(FIRST_CALLED) {
+            None => self.attached.get(&handle).copied()?,
+            // The first handles are those of this node.
+            Some(offset) => usize::try_from(offset / CALLED).ok()?.checked_sub(1)?,
+        };
+        self.streams.get(number)
+    }
+
+    /// Ends the streams to other nodes, and waits until their last updates are queued.
+    pub(super) async fn leave(&mut self) {
+        let outbox = Arc::clone(&self.outbox);
+        let mut streams = std::mem::take(&mut self.streams);
+        let ended = join_all(streams.iter_mut().map(|stream| {
+            stream.inputs = None;
+            &mut stream.receiving
+        }));
+        tokio::select! {
+            _ = ended => {}
+            () = outbox.abandoned() => {}
+        }
+    }
+
+    /// Opens a stream to the node that has something.
+    fn open(&self, elsewhere: &Elsewhere) -> PeerStream {
+        let (inputs, waiting) = mpsc::channel(INPUTS_WAITING);
+        let shared = Arc::new(Shared::default());
+        let number = u32::try_from(self.streams.len()).expect("at most MAX_NODES");
+        let receiver = Receiver {
+            shared: Arc::clone(&shared),
+            inputs: inputs.downgrade(),
+            outbox: Arc::clone(&self.outbox),
+            space: Arc::default(),
+        };
+        let mut first_assigned_handle = FIRST_CALLED + (number + 1) * CALLED;
+        let batches = ReceiverStream::new(waiting).ready_chunks(INPUTS_PER_MESSAGE);
+        let requests = batches.map(move |inputs| PlayRequest {
+            inputs,
+            first_assigned_handle: std::mem::take(&mut first_assigned_handle),
+        });
+        let mut headers = self.gateway.headers().clone();
+        for own in [header::CONTENT_TYPE, header::TE, header::USER_AGENT] {
+            headers.remove(own);
+        }
+        let mut request = Request::new(requests);
+        *request.metadata_mut() = MetadataMap::from_headers(headers);
+        let channel = self.gateway.peers().channel(&elsewhere.peer);
+        let directory = Arc::clone(self.gateway.directory());
+        PeerStream {
+            endpoint: Arc::clone(&elsewhere.peer.endpoint),
+            inputs: Some(inputs),
+            shared,
+            receiving: AbortOnDropHandle::new(tokio::spawn(async move {
+                let ended = receiver.receive(channel, request).await;
+                receiver.ended(ended, &*directory);
+            })),
+        }
+    }
+}
+
+/// The stream to another node has ended; so does the client's.
+pub(super) struct NodeGone;
+
+impl PeerStream {
+    async fn send(
+        &self,
+        command: v1::SeatCommand,
+        elapsed_us: Option<u64>,
+    ) -> Result<(), NodeGone> {
+        let inputs = self.inputs.as_ref().ok_or(NodeGone)?;
+        let input = PlayInput {
+            input: Some(Input::Command(command)),
+            elapsed_us,
+        };
+        inputs.send(input).await.map_err(|_| NodeGone)
+    }
+
+    /// When the client's transport took the request for a decision.
+    fn handed_over(&self, handle: u32, decision_id: u64) -> Option<Instant> {
+        let seats = self.shared.seats();
+        let handover = seats.get(&handle)?.decision.as_ref()?;
+        (handover.decision_id == decision_id)
+            .then(|| handover.at.get().copied())
+            .flatten()
+    }
+}
+
+/// Queues the updates of a peer stream for the client.
+struct Receiver {
+    shared: Arc<Shared>,
+    inputs: mpsc::WeakSender<PlayInput>,
+    outbox: Arc<Outbox>,
+    space: Arc<Space>,
+}
+
+/// Notified when the client's outbox has space.
+#[derive(Default)]
+struct Space(Notify);
+
+impl OnSpace for Space {
+    fn space(&self) {
+        self.0.notify_one();
+    }
+}
+
+impl Receiver {
+    async fn receive<R>(&self, channel: Channel, request: Request<R>) -> Result<(), Status>
+    where
+        R: futures::Stream<Item = PlayRequest> + Send + 'static,
+    {
+        let mut client =
+            PeerServiceClient::new(channel).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
+        let mut responses = client.play(request).await?.into_inner();
+        while let Some(updates) = responses.message().await? {
+            self.queue(updates).await;
+        }
+        Ok(())
+    }
+
+    /// Queues updates, once the outbox has space for them: until then nothing more is received.
+    async fn queue(&self, mut updates: Updates) {
+        let mut handovers = Vec::new();
+        for (handle, update) in updates.received() {
+            handovers.extend(self.follow(handle, update));
+        }
+        let on_space: Arc<dyn OnSpace> = Arc::clone(&self.space) as _;
+        loop {
+            let stamps = handovers.iter().map(|it| Arc::clone(it) as _);
+            if (self.outbox).push(&mut updates, stamps, Some(&on_space)) {
+                return;
+            }
+            self.space.0.notified().await;
+        }
+    }
+
+    /// Notes what an update says about its seat.
+    fn follow(&self, handle: u32, update: Received) -> Option<Arc<Handover>> {
+        let mut seats = self.shared.seats();
+        match update {
+            Received::Attached => seats.entry(handle).or_default().is_attached = true,
+            Received::Detached => drop(seats.remove(&handle)),
+            // Of its attachment, or of another command.
+            Received::Refused => {
+                if seats.get(&handle).is_some_and(|seat| !seat.is_attached) {
+                    seats.remove(&handle);
+                }
+            }
+            Received::Decision(decision_id) => {
+                let handover = Arc::new(Handover {
+                    handle,
+                    decision_id,
+                    at: OnceLock::new(),
+                    inputs: self.inputs.clone(),
+                });
+                let seat = seats.get_mut(&handle)?;
+                seat.decision = Some(Arc::clone(&handover));
+                return Some(handover);
+            }
+            Received::Other => {}
+        }
+        None
+    }
+
+    /// Ends the client's stream, unless the client has ended the stream to the other node.
+    fn ended(&self, ended: Result<(), Status>, directory: &dyn Directory) {
+        if self.inputs.upgrade().is_none() {
+            return;
+        }
+        debug!(?ended, "a stream to another node has ended");
+        let ids = (self.shared.ids.lock()).expect("nothing panics under this lock");
+        for id in ids.iter() {
+            directory.forget(&FoundBy::Id(*id));
+        }
+        self.outbox.end(StreamEnd::RoomGone);
+    }
+}
