@@ -94,7 +94,7 @@ def test_runners_play_different_deals_with_the_given_rules(sample: ModuleType, m
     assert len(set(chances)) == 12
 
 
-def test_a_runner_plays_legally_and_a_lost_server_is_named(sample: ModuleType, anywhere: str | None) -> None:
+def test_a_runner_plays_legally_and_its_errors_name_the_server(sample: ModuleType, anywhere: str | None) -> None:
     plan = Plan(games=4, steps=16)
     setting = {"plan": plan, "addresses": [anywhere] if anywhere else [], "rules": "paper"}
     runner = sample.SelfPlayRunner(config=SimpleNamespace(env_config=setting, seed=1), worker_index=1)

@@ -67,13 +67,11 @@ class Played(NamedTuple):
     Attributes:
         runner: its number, from 1.
         samples: its decisions.
-        seconds: time it took.
-        cpu_seconds: processor time of its process for it.
+        cpu_seconds: processor time that its process took.
     """
 
     runner: int
     samples: Samples
-    seconds: float
     cpu_seconds: float
 
 
@@ -106,9 +104,9 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray is not among the d
     def sample(self, params: Params, iteration: int, **_: Any) -> Played:  # noqa: ANN401 - RLlib's.
         """Plays `plan.steps` steps. The first call starts the games, because RLlib hides errors of the constructor."""
         self._collector = self._collector or self._begin()
-        began, cpu = time.perf_counter(), time.process_time()
+        began = time.process_time()
         samples = play(self._collector, params, jax.random.fold_in(self._key, iteration), self._plan)
-        return Played(self.worker_index, samples, time.perf_counter() - began, time.process_time() - cpu)
+        return Played(self.worker_index, samples, time.process_time() - began)
 
     def assert_healthy(self) -> None:
         """Does nothing: a runner without games starts them."""
