@@ -169,6 +169,9 @@ pub struct ServerConfig {
     pub allowed_hosts: Option<Vec<String>>,
     /// Proxies that are trusted to name their clients in `x-forwarded-for`.
     pub trusted_proxies: TrustedProxies,
+    /// The URL at which clients reach this server directly, if it is one of several behind a load
+    /// balancer.
+    pub client_endpoint: Option<String>,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
@@ -193,6 +196,7 @@ impl Default for ServerConfig {
             max_connection_age: None,
             allowed_hosts: None,
             trusted_proxies: TrustedProxies::default(),
+            client_endpoint: None,
             allowed_origins: Vec::new(),
         }
     }

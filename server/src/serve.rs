@@ -413,6 +413,7 @@ fn routes(
             Arc::clone(rooms),
             recorded.clone(),
             Arc::clone(calls),
+            config.client_endpoint.as_deref(),
         ))
         .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )

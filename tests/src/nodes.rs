@@ -137,6 +137,8 @@ impl TestNodes {
         tls: Option<TlsFiles>,
     ) -> Self {
         let places = Arc::new(Mutex::new(Places::default()));
+        // Finished games are at all nodes.
+        let store = Arc::new(MemoryStore::default());
         let mut sockets = Vec::new();
         for _ in 0..count {
             sockets.push((listen().await, listen().await));
@@ -167,8 +169,7 @@ impl TestNodes {
                 ..ServerConfig::default()
             };
             configure(&mut config);
-            let store = Arc::new(MemoryStore::default());
-            let server = Server::of_node(config, store, Arc::new(view)).await;
+            let server = Server::of_node(config, store.clone(), Arc::new(view)).await;
             let port = PeerPort::new(peer_listener, tls.clone()).expect("usable");
             let server = server.expect("a server").with_peers(port);
             let address = clients.local_addr().expect("it is bound");

@@ -166,16 +166,21 @@ pub const CALLS: &[Call] = &[
     )
     .forwarded(),
     records("/chefshat.v1.RecordService/ListRecords"),
-    records("/chefshat.v1.RecordService/GetRecord").streaming(),
+    records("/chefshat.v1.RecordService/GetRecord")
+        .streaming()
+        .forwarded(),
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
     call("/chefshat.v1.RecordService/ImportRecord", Host, Refused).streaming(),
     call("/chefshat.v1.VectorService/Run", Player, Refused).streaming(),
-    call("/chefshat.v1.AnalysisService/Evaluate", Player, Compared).streaming(),
+    call("/chefshat.v1.AnalysisService/Evaluate", Player, Compared)
+        .streaming()
+        .forwarded(),
     call(
         "/chefshat.v1.AnalysisService/LegalActions",
         Player,
         Compared,
-    ),
+    )
+    .forwarded(),
     call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
     call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
     call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused).forwarded(),

@@ -9,7 +9,7 @@ use tonic::{Code, Status};
 
 use super::access::refused;
 use super::reach::{Reach, Sight};
-use super::status::{self, status};
+use super::status::{self, is_elsewhere, status};
 use crate::access::{Caller, Refusal, Role};
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert::lines_of;
@@ -82,16 +82,31 @@ impl Recorded {
         let stored = (self.rooms().store().finished(game).await)
             .map_err(status::read_failed)?
             .ok_or_else(unknown)?;
+        // While its tournament runs, only the node that has it knows its tickets and which records
+        // it withholds.
+        if let Some(game) = stored.tournament() {
+            self.reach.tournament_here(game.tournament).await?;
+        }
         let sight = self.reach.recorded(caller, &stored, unknown)?;
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
-            return Err(status(
-                Code::FailedPrecondition,
-                SERIES_OPEN,
-                "other games with the same deals are being played; the record is available when they have ended",
-                [("field", "game_id")],
-            ));
+            return Err(series_open());
         }
         in_background(place, move || work(lines_of(&stored).into_owned(), sight)).await
+    }
+
+    /// As [`Recorded::of_game`], for a call that cannot be sent to another node: what another node
+    /// may withhold is withheld.
+    pub(super) async fn of_game_here<T: Send + 'static>(
+        &self,
+        caller: &Caller,
+        game_id: &str,
+        work: impl FnOnce(Vec<v1::RecordLine>, Sight) -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        let done = self.of_game(caller, game_id, work).await;
+        done.map_err(|status| match is_elsewhere(&status) {
+            Some(_) => series_open(),
+            None => status,
+        })
     }
 
     /// Runs work that needs as much memory as a record.
@@ -102,6 +117,16 @@ impl Recorded {
     ) -> Result<T, Status> {
         in_background(self.places.take(key).await, work).await
     }
+}
+
+/// Games with the same deals are being played.
+fn series_open() -> Status {
+    status(
+        Code::FailedPrecondition,
+        SERIES_OPEN,
+        "other games with the same deals are being played; the record is available when they have ended",
+        [("field", "game_id")],
+    )
 }
 
 /// Runs work that takes milliseconds on a blocking thread. The place is free when it ends.

@@ -104,7 +104,7 @@ impl Records {
                 let key = self.key.clone();
                 let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
                 let lines = (self.recorded)
-                    .of_game(caller, &summary.game_id, shown)
+                    .of_game_here(caller, &summary.game_id, shown)
                     .await;
                 let lines = match lines {
                     // Withheld while games with the same deals are being played.

@@ -35,15 +35,24 @@ pub struct RoomCalls {
     rooms: Arc<Rooms>,
     recorded: Recorded,
     calls: Arc<CallLimits>,
+    /// Where clients reach this server directly; empty if it is the only one.
+    endpoint: String,
 }
 
 impl RoomCalls {
-    /// Creates the service for these rooms. New ones may branch from these recorded games.
-    pub fn new(rooms: Arc<Rooms>, recorded: Recorded, calls: Arc<CallLimits>) -> Self {
+    /// Creates the service for these rooms. New ones may branch from these recorded games. Clients
+    /// reach this node of a cluster directly at `endpoint`.
+    pub fn new(
+        rooms: Arc<Rooms>,
+        recorded: Recorded,
+        calls: Arc<CallLimits>,
+        endpoint: Option<&str>,
+    ) -> Self {
         Self {
             rooms,
             recorded,
             calls,
+            endpoint: endpoint.unwrap_or_default().to_owned(),
         }
     }
 
@@ -233,6 +242,7 @@ impl RoomService for RoomCalls {
             room: Some(*joined.room),
             seat: seat_number(joined.seat),
             ticket: joined.ticket.to_text(),
+            preferred_endpoint: self.endpoint.clone(),
         }))
     }
 

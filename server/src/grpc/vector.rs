@@ -310,7 +310,7 @@ impl Runner {
         let (branch, game) = self
             .service
             .recorded
-            .of_game(&self.caller, &point.game_id, move |lines, _| {
+            .of_game_here(&self.caller, &point.game_id, move |lines, _| {
                 let branch = branch_of(&lines, decisions)?;
                 let game = branch.played(branch.later_deals.unwrap_or(Seed([0; 32])));
                 Ok((branch, game))

@@ -9,6 +9,7 @@ use chefshat_proto::v1::{
     self, room_service_client::RoomServiceClient,
     tournament_service_client::TournamentServiceClient,
 };
+use chefshat_server::config::ServerConfig;
 use chefshat_tests::{TestNodes, TestServer, one_shift, patiently};
 use http::{HeaderMap, Request};
 use http_body_util::{BodyExt as _, Full};
@@ -126,6 +127,10 @@ async fn a_tournament_is_joined_followed_and_closed_through_another_node() {
 struct Raw(http::StatusCode, HeaderMap, Bytes, Option<HeaderMap>);
 
 async fn raw(url: &str, path: &str, message: &impl Message) -> Raw {
+    raw_as("application/grpc", url, path, message).await
+}
+
+async fn raw_as(content_type: &str, url: &str, path: &str, message: &impl Message) -> Raw {
     let mut framed = vec![0];
     framed.extend(
         u32::try_from(message.encoded_len())
@@ -134,7 +139,7 @@ async fn raw(url: &str, path: &str, message: &impl Message) -> Raw {
     );
     message.encode(&mut framed).expect("space");
     let request = Request::post(format!("{url}{path}"))
-        .header("content-type", "application/grpc")
+        .header("content-type", content_type)
         .header("te", "trailers")
         .body(Body::new(Full::new(Bytes::from(framed))))
         .expect("a request");
@@ -277,4 +282,38 @@ async fn a_node_that_cannot_be_reached_is_forgotten_and_asked_again() {
 async fn created_room(nodes: &TestNodes) -> String {
     let created = nodes.create_room(1, v1::CreateRoomRequest::default()).await;
     created.room.expect("a room").room_id
+}
+
+#[tokio::test]
+async fn calls_of_browsers_are_sent_on_too() {
+    let nodes = TestNodes::start(2).await;
+    let request = v1::GetRoomRequest {
+        room_id: created_room(&nodes).await,
+        ..v1::GetRoomRequest::default()
+    };
+    let path = "/chefshat.v1.RoomService/GetRoom";
+    let web = "application/grpc-web+proto";
+    let near = raw_as(web, &nodes.nodes[1].url(), path, &request).await;
+    let far = raw_as(web, &nodes.nodes[0].url(), path, &request).await;
+    assert_eq!(far.1["content-type"], web);
+    assert!(far.2.len() > 100, "the room");
+    assert_eq!(far, near);
+}
+
+#[tokio::test]
+async fn a_seat_is_told_where_its_room_is() {
+    let named = |config: &mut ServerConfig| {
+        config.client_endpoint = Some("https://node.example.org".into());
+    };
+    let nodes = TestNodes::with(2, named, None).await;
+    let created = nodes.create_room(1, v1::CreateRoomRequest::default()).await;
+    let client = nodes.nodes[0].client().await;
+    let joined = client.join(join(&created.join_code)).await.expect("a seat");
+    assert_eq!(joined.preferred_endpoint, "https://node.example.org");
+    let alone = TestServer::start().await;
+    let client = alone.client().await;
+    let created = client.create_room(v1::CreateRoomRequest::default()).await;
+    let code = created.expect("a room").join_code;
+    let joined = client.join(join(&code)).await.expect("a seat");
+    assert_eq!(joined.preferred_endpoint, "");
 }

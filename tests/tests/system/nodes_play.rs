@@ -6,13 +6,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::{Client, RandomAgent};
-use chefshat_proto::v1::{self, play_service_client::PlayServiceClient, seat_update::Update};
+use chefshat_proto::v1::{
+    self, play_service_client::PlayServiceClient, seat_update::Update,
+    tournament_service_client::TournamentServiceClient,
+};
 use chefshat_record::replay::replay;
 use chefshat_tests::{
     Ledger, StreamSeat, TestNodes, first_legal, first_update, one_shift, patiently, play_on,
     random_agents,
 };
 use futures::future::join_all;
+
+use crate::tournament_deals::{counted, withheld};
+use crate::tournaments::{create, id_of, join, start, unhurried};
 
 /// A room of one Shift at a node, and the tickets of its seats, joined through another node.
 async fn room(nodes: &TestNodes, node: usize, through: &Client) -> (String, Vec<String>) {
@@ -310,4 +316,36 @@ async fn participants_play_a_tournament_of_another_node() {
             check_record(&nodes, 1, &outcome.game_id).await;
         }
     }
+}
+
+#[tokio::test]
+async fn records_that_the_node_of_a_tournament_withholds_are_withheld_by_all() {
+    let nodes = TestNodes::start(2).await;
+    let owner = nodes.nodes[1].client().await;
+    let mut service = TournamentServiceClient::new(owner.channel());
+    let settings = v1::TournamentSettings {
+        format: v1::TournamentFormat::RoundRobin.into(),
+        rounds: 1,
+        deals: v1::TournamentDeals::SameAtAllTables.into(),
+        built_in_agents: vec!["random".into(); 7],
+        policy: Some(unhurried()),
+        ..v1::TournamentSettings::default()
+    };
+    let created = create(&mut service, settings).await;
+    let id = id_of(&created);
+    nodes.place(1, &id, &created.join_code);
+    let joined = join(&mut service, &created.join_code, "Ada").await;
+    let client = nodes.nodes[0].client().await;
+    let stream = StreamSeat::open(client.channel()).await;
+    let attach = v1::Attach {
+        ticket: joined.ticket,
+        ..v1::Attach::default()
+    };
+    stream.attach(attach).await;
+    start(&mut service, &created).await;
+    // The built-in agents' table ends while this participant does not play.
+    let done = patiently("the other table's end", counted(&mut service, &id)).await;
+    nodes.place(1, &done.room_id, "");
+    withheld(&owner, &done).await;
+    withheld(&client, &done).await;
 }

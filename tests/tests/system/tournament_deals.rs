@@ -19,7 +19,7 @@ use crate::tournaments::{
 use crate::vectors::setup;
 
 /// The first counted game of the tournament.
-async fn counted(service: &mut Tournaments, tournament_id: &str) -> v1::TournamentGame {
+pub(crate) async fn counted(service: &mut Tournaments, tournament_id: &str) -> v1::TournamentGame {
     let request = v1::FollowTournamentRequest {
         tournament_id: tournament_id.to_owned(),
     };
@@ -37,11 +37,11 @@ async fn counted(service: &mut Tournaments, tournament_id: &str) -> v1::Tourname
 }
 
 /// Checks that nothing that could reveal the deals of a game is accessible.
-async fn withheld(server: &TestServer, client: &Client, game: &v1::TournamentGame) {
+pub(crate) async fn withheld(client: &Client, game: &v1::TournamentGame) {
     let id = game.game_id.as_str();
     let refused = client.record(id).await.expect_err("a withheld record");
     assert_eq!(refused.reason(), Some("SERIES_OPEN"));
-    assert_eq!(streamed(server).await, BTreeSet::new());
+    assert_eq!(streamed(client).await, BTreeSet::new());
     let watched = client.spectate(&game.room_id, 0).next().await;
     let refused = watched.expect_err("spectators are refused");
     assert_eq!(refused.reason(), Some("SPECTATORS_NOT_ADMITTED"));
@@ -73,8 +73,8 @@ async fn withheld(server: &TestServer, client: &Client, game: &v1::TournamentGam
 }
 
 /// The games whose records a stream contains.
-async fn streamed(server: &TestServer) -> BTreeSet<String> {
-    let mut service = RecordServiceClient::new(server.channel().await);
+async fn streamed(client: &Client) -> BTreeSet<String> {
+    let mut service = RecordServiceClient::new(client.channel());
     let stream = service.stream_records(v1::StreamRecordsRequest::default());
     let stream = stream.await.expect("a stream").into_inner();
     let parts: Vec<v1::StreamRecordsResponse> =
@@ -91,7 +91,7 @@ async fn streamed(server: &TestServer) -> BTreeSet<String> {
 }
 
 /// Checks that all records of a finished tournament are accessible, and have the same deals.
-async fn open_and_alike(server: &TestServer, client: &Client, games: &[v1::TournamentGame]) {
+async fn open_and_alike(client: &Client, games: &[v1::TournamentGame]) {
     let mut seeds = BTreeSet::new();
     for game in games {
         let lines = client
@@ -111,7 +111,7 @@ async fn open_and_alike(server: &TestServer, client: &Client, games: &[v1::Tourn
     }
     assert_eq!(seeds.len(), 1, "all games had the same deals");
     let all: BTreeSet<String> = games.iter().map(|game| game.game_id.clone()).collect();
-    assert_eq!(streamed(server).await, all);
+    assert_eq!(streamed(client).await, all);
 }
 
 #[tokio::test]
@@ -149,7 +149,7 @@ async fn deals_that_other_tables_still_play_are_withheld() {
     // The built-in agents' table ends without this client.
     let id = id_of(&created);
     let done = patiently("the other table's end", counted(&mut service, &id)).await;
-    withheld(&server, &client, &done).await;
+    withheld(&client, &done).await;
     // Then this client plays on.
     let ended = play_game(&mut stream, CALLED, decision).await;
     match ended.kind {
@@ -159,7 +159,7 @@ async fn deals_that_other_tables_still_play_are_withheld() {
     over(&mut service, &id).await;
     let games = games(&mut service, &id).await;
     assert_eq!(games.len(), 2);
-    open_and_alike(&server, &client, &games).await;
+    open_and_alike(&client, &games).await;
 }
 
 #[tokio::test]
@@ -198,12 +198,12 @@ async fn a_deal_that_is_played_again_is_withheld_until_its_last_game_has_ended()
         assert_eq!(before[game].room_id, room);
         for done in &before[..game] {
             assert_eq!(done.state(), v1::TournamentGameState::Counted);
-            withheld(&server, &client, done).await;
+            withheld(&client, done).await;
         }
         let handle = CALLED + u32::try_from(game).expect("a few");
         play_game(&mut stream, handle, decision).await;
     }
     over(&mut service, &id).await;
     let games = games(&mut service, &id).await;
-    open_and_alike(&server, &client, &games).await;
+    open_and_alike(&client, &games).await;
 }

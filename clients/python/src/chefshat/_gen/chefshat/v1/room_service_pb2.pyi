@@ -301,12 +301,18 @@ class JoinRoomResponse(_message.Message):
     ROOM_FIELD_NUMBER: _builtins.int
     SEAT_FIELD_NUMBER: _builtins.int
     TICKET_FIELD_NUMBER: _builtins.int
+    PREFERRED_ENDPOINT_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
     ticket: _builtins.str
     """Secret that authorises attaching and acting for this seat. Valid as long as the room exists; it
     shows a room that is not public, and its record, as long as that exists (`Visibility`).
     Before the game starts, a seat that was never attached is freed after two minutes.
+    """
+    preferred_endpoint: _builtins.str
+    """Where several servers share their rooms: the URL of the one that has this room at present, if
+    clients can reach it directly. Every server plays every room, so this is advice: a seat that is
+    attached there saves a hop. Empty otherwise.
     """
     @_builtins.property
     def room(self) -> _room_pb2.Room:
@@ -318,10 +324,11 @@ class JoinRoomResponse(_message.Message):
         room: _room_pb2.Room | None = ...,
         seat: _builtins.int = ...,
         ticket: _builtins.str = ...,
+        preferred_endpoint: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["room", b"room"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["room", b"room", "seat", b"seat", "ticket", b"ticket"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["preferred_endpoint", b"preferred_endpoint", "room", b"room", "seat", b"seat", "ticket", b"ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
