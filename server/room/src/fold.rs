@@ -79,6 +79,8 @@ impl Core {
                         .push(at, RoomEvent::Expressed(*seat, expression.clone()));
                 }
             }
+            // A server that takes a room over says so without knowing whether its game was over.
+            Change::ServerRestarted if self.state.is_over() => {}
             Change::ServerRestarted => self.restart(at),
             Change::Reported(reported) => self.fold_report(at, reported),
             Change::Aborted(reason) => {

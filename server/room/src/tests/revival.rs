@@ -9,7 +9,7 @@ use chefshat_engine::{ActionId, Game, RuleSetSpec, Seat, Seed, Stop, TakenOver};
 
 use super::{Answer, Core, OPEN, Table, Verdict, ms, one_shift};
 use crate::ids::Id;
-use crate::journal::{Branch, Change, Fill, GameHeader, ParticipantKind, Source};
+use crate::journal::{Branch, Change, Entry, Fill, GameHeader, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
 use crate::{BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
@@ -297,6 +297,15 @@ fn a_finished_game_stays_finished() {
     table.restart(ms(10));
     assert_eq!(table.core.state(), State::Finished);
     assert_eq!(table.journal.len(), entries);
+    // A server that took the room over said so before it knew that the game was over.
+    let log = table.core.log().len();
+    table.journal.push(Entry {
+        at: table.now,
+        change: Change::ServerRestarted,
+    });
+    table.restart(ms(10));
+    assert_eq!(table.core.state(), State::Finished);
+    assert_eq!(table.core.log().len(), log);
 }
 
 #[test]
