@@ -21,6 +21,7 @@ mod key;
 mod kind;
 mod leaderboard;
 mod listen;
+mod migrate;
 mod narration;
 mod numbers;
 mod output;
@@ -133,6 +134,8 @@ enum Command {
     Backup(backup::Backup),
     /// Create a data directory from a copy that `chefshat backup` made.
     Restore(backup::Restore),
+    /// Create or upgrade the tables of a PostgreSQL database, or move a data directory there.
+    Migrate(migrate::Migrate),
     /// Check that a server answers and takes new games.
     Health(health::Health),
     /// Print a completion script for a shell.
@@ -187,6 +190,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Token(command) => command.run(),
         Command::Backup(command) => in_runtime(command.run()),
         Command::Restore(command) => in_runtime(command.run()),
+        Command::Migrate(command) => in_runtime(command.run()),
         Command::Health(command) => in_runtime(command.run()),
         Command::Completions(command) => command.run(Cli::command()),
         Command::Man(command) => command.run(Cli::command()),

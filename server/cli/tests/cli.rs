@@ -18,6 +18,7 @@ mod cli {
     mod export;
     mod import;
     mod listen;
+    mod migrate;
     mod participant;
     mod ratings;
     mod render;

@@ -20,7 +20,9 @@ use futures::future::{BoxFuture, ready};
 
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
-pub use postgres::{DatabaseError, PostgresOptions, PostgresStore, migrate};
+pub use postgres::{
+    DatabaseError, PostgresOptions, PostgresStore, TransferError, Transferred, migrate, transfer,
+};
 pub use sqlite::{
     DATABASE_FILE, DatabaseCopy, ForgetError, Forgetting, Forgotten, LOCK_FILE, OpenError,
     SqliteStore, check_copy, copy_database,

@@ -1,5 +1,8 @@
 //! Behavior that all stores share. Each test runs with games in memory, in SQLite and in PostgreSQL.
 
+mod lists;
+mod tournaments;
+
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_room::ids::SecretHash;
 use chefshat_room::journal::{Change, Fill, GameStart};
@@ -11,6 +14,11 @@ use super::*;
 /// Runs a check with a new store of each kind.
 async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
     check(&MemoryStore::default()).await;
+    with_each_database(check).await;
+}
+
+/// Runs a check with a new database of each kind.
+async fn with_each_database(check: impl AsyncFn(&dyn Store)) {
     let folder = tempfile::tempdir().expect("a folder");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
     check(&store).await;
@@ -242,6 +250,30 @@ async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
         let taken = store.import(Id([2; 16]), *summary(&forged), Arc::from([]));
         assert_eq!(taken.await, Ok(false));
         assert!(store.failed().now_or_never().is_none(), "no failure");
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_text_that_no_database_can_search_for_is_stored() {
+    with_each_store(async |store| {
+        let strange = header(1, Durability::Durable);
+        let strange = GameHeader {
+            name: "nothing\0behind".into(),
+            ..GameHeader::clone(&strange)
+        };
+        let created = store.create(Arc::new(strange.clone()), vec![entry()]).await;
+        let mut journal = created.expect("a new game");
+        let finished = journal.finish(Some(summary(&strange)), None);
+        finished.await.expect("committed");
+        let by_name = v1::RecordFilter {
+            room_name: strange.name.clone(),
+            ..v1::RecordFilter::default()
+        };
+        let found = store.list(&by_name, Part::FROM_OLDEST, 9).await;
+        let found = found.expect("readable");
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].1.room_name, strange.name);
     })
     .await;
 }

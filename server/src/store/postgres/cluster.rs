@@ -117,7 +117,7 @@ impl PostgresStore {
     async fn try_claim(&self, unit: Id, seen: Epoch) -> Result<Claim, StoreError> {
         let node = self.node()?;
         let expire_after = millis(self.options.expire_after);
-        let claim = self.reader.read(move |connection| {
+        let claim = self.control.read(move |connection| {
             async move {
                 let mut transaction = connection.begin().await?;
                 let seen = integer(seen.0);
@@ -272,7 +272,7 @@ async fn restart(connection: &mut PgConnection, unit: &[u8], epoch: i64) -> sqlx
 impl ClusterStore for PostgresStore {
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
         async move {
-            let node: i64 = (self.reader.read(|connection| {
+            let node: i64 = (self.control.read(|connection| {
                 sqlx::query_scalar(
                     "WITH forgotten AS (
                          DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
@@ -300,7 +300,7 @@ impl ClusterStore for PostgresStore {
     fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             let node = self.node()?;
-            let beat = self.reader.read(move |connection| {
+            let beat = self.control.read(move |connection| {
                 async move {
                     let mut transaction = connection.begin().await?;
                     let drain: Option<bool> = sqlx::query_scalar(
@@ -335,7 +335,7 @@ impl ClusterStore for PostgresStore {
         async move {
             let expire_after = millis(self.options.expire_after);
             let retention = millis(self.options.retention);
-            let units = self.reader.read(move |connection| {
+            let units = self.control.read(move |connection| {
                 async move {
                     tidy(connection, expire_after, retention).await?;
                     sqlx::query(
@@ -380,7 +380,7 @@ impl ClusterStore for PostgresStore {
         async move {
             let node = self.node()?;
             let at = integer(epoch.0);
-            let is_owned: bool = (self.reader.read(move |connection| {
+            let is_owned: bool = (self.control.read(move |connection| {
                 sqlx::query_scalar(
                     "SELECT EXISTS (SELECT FROM owned
                                     WHERE unit = $1 AND epoch = $2 AND node = $3 AND NOT over)",
@@ -420,7 +420,7 @@ impl ClusterStore for PostgresStore {
     fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let node = self.node()?;
-            let released = self.reader.read(move |connection| {
+            let released = self.control.read(move |connection| {
                 async move {
                     let mut transaction = connection.begin().await?;
                     sqlx::query(
@@ -453,7 +453,7 @@ impl ClusterStore for PostgresStore {
     fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
         async move {
             let node = self.node()?;
-            let left = self.reader.read(move |connection| {
+            let left = self.control.read(move |connection| {
                 sqlx::query(
                     "DELETE FROM nodes WHERE node = $1
                        AND NOT EXISTS (SELECT FROM owned WHERE node = $1 AND NOT over)",
@@ -566,7 +566,7 @@ impl ClusterStore for PostgresStore {
 
     fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>> {
         async move {
-            let asked = self.reader.read(move |connection| {
+            let asked = self.control.read(move |connection| {
                 sqlx::query("UPDATE nodes SET drain = true WHERE node = $1")
                     .bind(integer(node.0))
                     .execute(connection)

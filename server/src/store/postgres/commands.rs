@@ -60,6 +60,8 @@ pub(super) enum Command {
     Finish {
         owned: Owned,
         number: i64,
+        /// Number of rows of its journal. An empty row follows, so that no late append can.
+        rows: i64,
         end: Option<End>,
     },
     /// Ends an ephemeral game, and stores it if it has a record.
@@ -140,13 +142,18 @@ impl Command {
     ) -> sqlx::Result<Result<i64, StoreError>> {
         let ended = match self {
             Self::Create { .. } => return self.create(connection, again).await,
-            Self::Finish { owned, number, end } => match end {
-                Some(end) => finish(connection, *owned, *number, end).await?,
-                None => give_up(connection, *owned, *number).await?,
+            Self::Finish {
+                owned,
+                number,
+                rows,
+                end,
+            } => match end {
+                Some(end) => finish(connection, *owned, (*number, *rows), end).await?,
+                None => give_up(connection, *owned, Some((*number, *rows))).await?,
             },
             Self::Whole { owned, game } => match game {
                 Some(game) => whole(connection, *owned, game).await?,
-                None => give_up(connection, *owned, 0).await?,
+                None => give_up(connection, *owned, None).await?,
             },
             Self::Import {
                 game_id,
@@ -351,17 +358,21 @@ async fn not_ended(connection: &mut PgConnection, owned: Owned) -> sqlx::Result<
 async fn finish(
     connection: &mut PgConnection,
     owned: Owned,
-    number: i64,
+    (number, rows): (i64, i64),
     end: &End,
 ) -> sqlx::Result<Ended> {
     let query = sqlx::query(
-        "WITH room AS (
-             UPDATE owned SET over = true, ended_ms = clock_ms()
-             WHERE id = $12 AND epoch = $13 AND NOT over RETURNING id
+        "WITH open AS (
+             SELECT id FROM owned WHERE id = $12 AND epoch = $13 AND NOT over FOR UPDATE
+         ), closed AS (
+             INSERT INTO journal (game, position, epoch, entries) SELECT $14, $15, $13, '' FROM open
+             ON CONFLICT DO NOTHING RETURNING game
+         ), room AS (
+             UPDATE owned SET over = true, ended_ms = clock_ms() FROM closed WHERE id = $12
          ), game AS (
              UPDATE games SET state = $1, summary = $2, origin = $3, room_name = $4, created_at_ms = $5,
                               ended_at_ms = $6, signature = $11
-             FROM room WHERE number = $14 RETURNING number
+             FROM closed WHERE number = game RETURNING number
          ), seats AS (
              INSERT INTO participants (game, seat, name, agent, kind)
              SELECT number, seat.* FROM game,
@@ -375,6 +386,7 @@ async fn finish(
         .bind(owned.id.0.as_slice())
         .bind(owned.epoch)
         .bind(number)
+        .bind(rows)
         .fetch_optional(&mut *connection)
         .await?;
     match finished {
@@ -386,30 +398,40 @@ async fn finish(
     }
 }
 
-/// Ends a game without a record.
-async fn give_up(connection: &mut PgConnection, owned: Owned, number: i64) -> sqlx::Result<Ended> {
+/// Ends a game without a record; a durable one has a number and a journal with some rows.
+async fn give_up(
+    connection: &mut PgConnection,
+    owned: Owned,
+    durable: Option<(i64, i64)>,
+) -> sqlx::Result<Ended> {
+    let (number, rows) = durable.unzip();
     let over = sqlx::query(
-        "WITH room AS (
-             UPDATE owned SET over = true, ended_ms = clock_ms()
-             WHERE id = $1 AND epoch = $2 AND NOT over RETURNING id
+        "WITH open AS (
+             SELECT id FROM owned WHERE id = $1 AND epoch = $2 AND NOT over FOR UPDATE
+         ), closed AS (
+             INSERT INTO journal (game, position, epoch, entries)
+             SELECT $4, $5, $2, '' FROM open WHERE $4 IS NOT NULL
+             ON CONFLICT DO NOTHING RETURNING game
          ), game AS (
-             UPDATE games SET state = $3, ended_at_ms = clock_ms() FROM room WHERE number = $4
+             UPDATE games SET state = $3, ended_at_ms = clock_ms() FROM closed WHERE number = game
          )
-         SELECT FROM room",
+         UPDATE owned SET over = true, ended_ms = clock_ms() FROM open
+         WHERE owned.id = $1 AND ($4 IS NULL OR EXISTS (SELECT FROM closed))",
     )
     .bind(owned.id.0.as_slice())
     .bind(owned.epoch)
     // Only an aborted game can end before the deal.
     .bind(i32::from(v1::RoomState::Aborted))
     .bind(number)
-    .fetch_optional(&mut *connection)
+    .bind(rows)
+    .execute(&mut *connection)
     .await?;
-    match over {
-        Some(_) => Ok(Ended::Now {
-            number,
+    match over.rows_affected() {
+        0 => not_ended(connection, owned).await,
+        _ => Ok(Ended::Now {
+            number: number.unwrap_or_default(),
             has_record: false,
         }),
-        None => not_ended(connection, owned).await,
     }
 }
 

@@ -80,6 +80,7 @@ impl Journal for DurableJournal {
             let finish = Command::Finish {
                 owned: self.owned,
                 number: self.number,
+                rows: self.position,
                 end: end(summary, signed),
             };
             self.commands.commit(Arc::new(finish)).await.map(drop)

@@ -1,6 +1,6 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
 //! reads, `journals`, `appends` and `commands` write through `writer`, `cluster` is about nodes and
-//! ownership, `form` (beside this folder) encodes; this file joins them into a store.
+//! ownership, `transfer` moves an SQLite database here, `form` (beside this folder) encodes; this file joins them into a store.
 
 mod appends;
 mod cluster;
@@ -11,6 +11,7 @@ mod open;
 mod reader;
 #[cfg(test)]
 pub(super) mod tests;
+mod transfer;
 mod writer;
 
 use std::collections::HashMap;
@@ -27,6 +28,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::error;
 
 pub use open::{DatabaseError, migrate};
+pub use transfer::{TransferError, Transferred, transfer};
 
 use super::codec::Codec;
 use super::form;
@@ -46,8 +48,10 @@ use writer::{Queue, Shared};
 const APPENDERS: usize = 2;
 /// Writers of everything else.
 const COMMANDERS: usize = 2;
-/// Connections for reading and for what concerns the cluster.
+/// Connections for reading.
 const READERS: u32 = 6;
+/// Connections for leases and ownership, which must not wait for readers.
+const CONTROLLERS: u32 = 2;
 /// How long a read waits for a connection.
 const ACQUIRE_LIMIT: Duration = Duration::from_secs(5);
 /// The epoch of what has just been created.
@@ -83,6 +87,8 @@ impl Default for PostgresOptions {
 pub struct PostgresStore {
     options: PostgresOptions,
     reader: Reader,
+    /// Over its own connections.
+    control: Reader,
     codec: Codec,
     rows: Queue<Row>,
     commands: Queue<Command>,
@@ -104,26 +110,28 @@ impl PostgresStore {
         let address = open::address(url)?;
         open::check(&address).await?;
         let sessions = open::sessions(address);
-        let pool = PgPoolOptions::new()
-            .max_connections(READERS)
-            .acquire_timeout(ACQUIRE_LIMIT)
-            .connect_lazy_with(sessions.clone());
+        let codec = Codec::new();
+        let reader = |connections| Reader {
+            pool: PgPoolOptions::new()
+                .max_connections(connections)
+                .acquire_timeout(ACQUIRE_LIMIT)
+                .connect_lazy_with(sessions.clone()),
+            codec: codec.clone(),
+        };
+        let (readers, control) = (reader(READERS), reader(CONTROLLERS));
         let metrics = StoreMetrics::default();
         let closing = CancellationToken::new();
         let shared = Shared {
-            options: sessions,
+            options: sessions.clone(),
             retry_for: options.retry_for,
             metrics: metrics.clone(),
             closing: closing.clone(),
         };
         let mut writing = Vec::new();
-        let codec = Codec::new();
         Ok(Self {
             options,
-            reader: Reader {
-                pool,
-                codec: codec.clone(),
-            },
+            reader: readers,
+            control,
             codec,
             rows: writer::start(&shared, APPENDERS, &mut writing),
             commands: writer::start(&shared, COMMANDERS, &mut writing),
@@ -397,6 +405,7 @@ impl Store for PostgresStore {
                 }
             }
             self.reader.pool.close().await;
+            self.control.pool.close().await;
         }
         .boxed()
     }

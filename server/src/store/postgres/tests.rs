@@ -4,6 +4,7 @@
 mod fencing;
 mod model;
 mod opening;
+mod transfer;
 
 use std::sync::Arc;
 

@@ -1,7 +1,8 @@
 //! Stores games in an SQLite database. `open` opens it, `reader` reads, `journals` and `writer`
-//! write, `backup` copies; this file joins them into a store.
+//! write, `backup` copies, `contents` is for moving; this file joins them into a store.
 
 mod backup;
+mod contents;
 mod errors;
 mod forget;
 mod journals;
@@ -9,7 +10,7 @@ mod open;
 mod reader;
 mod rows;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod writer;
 
 use std::fs::File;
@@ -25,6 +26,7 @@ use tokio::task::JoinHandle;
 use tracing::error;
 
 pub use backup::{DatabaseCopy, check_copy, copy_database};
+pub(in crate::store) use contents::{Contents, GameRow, JournalRow, ParticipantRow, TournamentRow};
 pub use errors::FILE as DATABASE_FILE;
 pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::{LOCK_FILE, OpenError};
@@ -41,7 +43,7 @@ use chefshat_room::policy::Durability;
 use errors::explain;
 use journals::{DurableJournal, EphemeralJournal, WriteQueue};
 use reader::Reader;
-use writer::{TournamentRow, WriteCommand};
+use writer::WriteCommand;
 
 /// Disk space reserved for running games: new ones are refused when only this is left. On a small
 /// disk the reserve is a share of its size.
@@ -254,7 +256,7 @@ impl Store for SqliteStore {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let order = WriteCommand::Tournament {
             header: form::tournament_to_bytes(&header),
-            first: TournamentRow::new(header.id, 0, &entries),
+            first: writer::TournamentRow::new(header.id, 0, &entries),
         };
         self.commands.send(order).boxed()
     }
@@ -265,7 +267,7 @@ impl Store for SqliteStore {
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let row = TournamentRow::new(tournament, row, &entries);
+        let row = writer::TournamentRow::new(tournament, row, &entries);
         self.commands
             .send(WriteCommand::TournamentEntries(row))
             .boxed()

@@ -2,9 +2,8 @@
 
 mod damage;
 mod forget;
-mod lists;
 mod opening;
-mod tournaments;
+pub(in crate::store) mod tournaments;
 
 use std::collections::BTreeMap;
 use std::path::Path;

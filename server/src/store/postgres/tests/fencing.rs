@@ -91,41 +91,76 @@ async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
     pair.close().await;
 }
 
+/// Makes an append wait in the database, where it has seen its epoch already.
+struct Late {
+    holder: sqlx::postgres::PgConnection,
+    append: JoinHandle<Result<(), StoreError>>,
+}
+
+impl Late {
+    async fn new(database: &Database, mut journal: Box<dyn Journal>) -> Self {
+        database.run(
+            "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
+             BEGIN
+                 PERFORM pg_advisory_xact_lock(1);
+                 RETURN NEW;
+             END $$;
+             CREATE TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW
+                 WHEN (NEW.epoch = 1 AND NEW.entries <> '') EXECUTE FUNCTION wait()",
+        );
+        let address = open::address(database.url()).expect("an address");
+        let mut holder = open::connect(&address).await.expect("connected");
+        sqlx::query("SELECT pg_advisory_lock(1)")
+            .execute(&mut holder)
+            .await
+            .expect("locked");
+        let append = tokio::spawn(async move { append(&mut journal, 2).await });
+        let waits = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
+        while database.run(waits) != "1" {
+            tokio::task::yield_now().await;
+        }
+        Self { holder, append }
+    }
+
+    /// Lets the append go on.
+    async fn arrive(self) -> Result<(), StoreError> {
+        drop(self.holder);
+        self.append.await.expect("no panic")
+    }
+}
+
 #[tokio::test]
 async fn an_append_that_is_late_finds_its_place_taken() {
     let pair = Pair::new().await;
     let created = pair.first.create(durable(1), vec![entry(1)]);
-    let mut old = created.await.expect("created");
+    let old = created.await.expect("created");
     pair.stall().await;
-    // The append waits in the database, where it has seen the old epoch already, until the claim
-    // is committed.
-    pair.database.run(
-        "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
-         BEGIN
-             IF NEW.epoch = 1 THEN
-                 PERFORM pg_advisory_xact_lock(1);
-             END IF;
-             RETURN NEW;
-         END $$;
-         CREATE TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW EXECUTE FUNCTION wait()",
-    );
-    let address = open::address(pair.database.url()).expect("an address");
-    let mut holder = open::connect(&address).await.expect("connected");
-    sqlx::query("SELECT pg_advisory_lock(1)")
-        .execute(&mut holder)
-        .await
-        .expect("locked");
-    let late = tokio::spawn(async move { append(&mut old, 2).await });
-    let waits = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
-    while pair.database.run(waits) != "1" {
-        tokio::task::yield_now().await;
-    }
+    let late = Late::new(&pair.database, old).await;
     let room = Id([1; 16]);
     assert_eq!(pair.second.claim(room, FIRST).await, Ok(Some(SECOND)));
-    drop(holder);
-    assert_eq!(late.await.expect("no panic"), Err(StoreError::Fenced(room)));
+    assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
     let game = resumed(&pair.second, 1, SECOND).await;
     assert_eq!(numbers(&game.entries), [1, 0]);
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn an_append_that_is_late_does_not_follow_the_end_of_its_game() {
+    let pair = Pair::new().await;
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    let old = created.await.expect("created");
+    let late = Late::new(&pair.database, old).await;
+    // The same owner has read the room again, for example after its lease had expired.
+    let mut game = resumed(&pair.first, 1, FIRST).await;
+    let finished = game.journal.finish(Some(summary(1)), None);
+    finished.await.expect("committed");
+    let room = Id([1; 16]);
+    assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
+    let stored = pair.first.finished(room).await.expect("readable");
+    let Some(StoredGame::Hosted(_, entries, _)) = stored else {
+        panic!("{stored:?}");
+    };
+    assert_eq!(numbers(&entries), [1]);
     pair.close().await;
 }
 

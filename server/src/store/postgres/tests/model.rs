@@ -198,10 +198,10 @@ impl Worlds {
             }
             Operation::Finish(node, room) => {
                 let server = &mut self.servers[node];
-                let Some((journal, epoch, _)) = server.journals.get_mut(&room) else {
+                let Some((journal, epoch, rows)) = server.journals.get_mut(&room) else {
                     return;
                 };
-                let kept = self.tables.finish(id(room), *epoch);
+                let kept = self.tables.finish(id(room), *epoch, *rows);
                 let finished = journal.finish(Some(summary(room)), None).await;
                 assert_eq!(finished.is_ok(), kept == Kept::Kept, "{finished:?}");
             }

@@ -8,7 +8,7 @@ use super::*;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::journal::TournamentGame;
 
-pub(super) fn cup(number: u8) -> TournamentHeader {
+pub(in crate::store) fn cup(number: u8) -> TournamentHeader {
     TournamentHeader {
         id: Id([number; 16]),
         settings: v1::TournamentSettings {
@@ -25,7 +25,7 @@ pub(super) fn cup(number: u8) -> TournamentHeader {
 }
 
 /// One entry of every kind.
-pub(super) fn every_entry() -> Vec<TournamentEntry> {
+pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
     let entrant = Entrant {
         name: "Bruna".into(),
         kind: ParticipantKind::Robot,
@@ -200,42 +200,5 @@ fn a_game_keeps_the_id_of_its_tournament() {
         };
         let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
         assert_eq!(read.tournament, Some(game));
-    }
-}
-
-#[tokio::test]
-async fn only_the_newest_ended_tournaments_are_read() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let store = SqliteStore::open(folder.path()).await.expect("a store");
-    let change = TournamentEntry::Change;
-    let ends = [
-        (1, Some(Change::Finished)),
-        (2, None),
-        (3, Some(Change::Closed)),
-        (4, Some(Change::Finished)),
-        (5, None),
-    ];
-    for (number, end) in ends {
-        let id = Id([number; 16]);
-        let header = Arc::new(cup(number));
-        let begun = vec![change(Change::Begun { rounds: 1 })];
-        let made = store.create_tournament(header, begun);
-        made.await.expect("committed");
-        // The end is not the last entry of its commit.
-        let last = end.into_iter().chain([Change::Voided { game: 0 }]);
-        let stored = store.append_tournament(id, 1, last.map(change).collect());
-        stored.await.expect("committed");
-    }
-    for (newest_over, expected) in [
-        (0, &[2, 5][..]),
-        (1, &[2, 4, 5]),
-        (2, &[2, 3, 4, 5]),
-        (9, &[1, 2, 3, 4, 5]),
-        (usize::MAX, &[1, 2, 3, 4, 5]),
-    ] {
-        let found = store.tournaments(newest_over).await.expect("readable");
-        let numbers: Vec<u8> = found.iter().map(|stored| stored.header.id.0[0]).collect();
-        assert_eq!(numbers, expected, "{newest_over}");
-        assert!(found.iter().all(|stored| stored.rows == 2));
     }
 }

@@ -4,24 +4,51 @@ use super::*;
 
 #[tokio::test]
 async fn lists_are_filtered_and_paged() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = opened(folder.path()).await;
+    with_each_store(check).await;
+}
+
+/// A summary with a robot and a built-in agent.
+fn with_seats(header: &GameHeader) -> Box<v1::RecordSummary> {
+    let number = header.game_id.0[0];
+    let seats = vec![
+        v1::Participant {
+            name: format!("player of {number}"),
+            kind: v1::ParticipantKind::Robot.into(),
+            ..v1::Participant::default()
+        },
+        v1::Participant {
+            seat: 1,
+            name: format!("name of {number}"),
+            built_in_agent: format!("agent of {number}"),
+            kind: v1::ParticipantKind::Agent.into(),
+            ..v1::Participant::default()
+        },
+    ];
+    Box::new(v1::RecordSummary {
+        origin: v1::GameOrigin::Dealt.into(),
+        seats,
+        ..*summary(header)
+    })
+}
+
+async fn check(store: &dyn Store) {
     for game in 1..=5 {
-        let mut header = header(game, Durability::Durable);
-        header.created_at_ms = u64::from(game) * 1_000;
-        let header = Arc::new(header);
+        let header = Arc::new(GameHeader {
+            created_at_ms: u64::from(game) * 1_000,
+            ..GameHeader::clone(&header(game, Durability::Durable))
+        });
         let mut journal = store
             .create(Arc::clone(&header), Vec::new())
             .await
             .expect("committed");
         journal
-            .finish(Some(summary(&header)), None)
+            .finish(Some(with_seats(&header)), None)
             .await
             .expect("committed");
     }
     let abandoned = {
         let mut journal = store
-            .create(Arc::new(header(6, Durability::Durable)), Vec::new())
+            .create(header(6, Durability::Durable), Vec::new())
             .await
             .expect("committed");
         // Nothing was dealt in it, so it has no record.
@@ -110,6 +137,16 @@ async fn lists_are_filtered_and_paged() {
             0,
             9,
             vec![],
+        ),
+        (
+            v1::RecordFilter {
+                room_name: "game 2".into(),
+                origin: v1::GameOrigin::Dealt.into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![2],
         ),
         (
             v1::RecordFilter {

@@ -1,0 +1,192 @@
+//! Everything in the database of a data directory, for moving it to another store. No server has it
+//! open meanwhile.
+
+use std::path::Path;
+
+use futures::stream::BoxStream;
+use futures::{StreamExt as _, TryStreamExt as _};
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
+
+use super::errors::explain;
+use super::open::{self, OpenError, Opened};
+use super::rows::with_own_rows;
+use crate::store::StoreError;
+
+/// A game as stored.
+pub(in crate::store) struct GameRow {
+    pub(in crate::store) number: i64,
+    pub(in crate::store) game_id: Vec<u8>,
+    pub(in crate::store) form: i64,
+    pub(in crate::store) state: i32,
+    pub(in crate::store) ended_at_ms: Option<i64>,
+    pub(in crate::store) filed: bool,
+    pub(in crate::store) origin: Option<i32>,
+    pub(in crate::store) room_name: Option<String>,
+    pub(in crate::store) created_at_ms: Option<i64>,
+    pub(in crate::store) added: bool,
+    pub(in crate::store) summary: Option<Vec<u8>>,
+    pub(in crate::store) header: Option<Vec<u8>>,
+    pub(in crate::store) listed: Option<i64>,
+    pub(in crate::store) signature: Option<Vec<u8>>,
+    /// The record of a game that was played elsewhere.
+    pub(in crate::store) record: Option<Vec<u8>>,
+    last_row: Option<i64>,
+}
+
+/// A row of the journal of a game or tournament.
+pub(in crate::store) struct JournalRow {
+    /// The number of the game or tournament.
+    pub(in crate::store) of: i64,
+    pub(in crate::store) position: i64,
+    pub(in crate::store) entries: Vec<u8>,
+}
+
+/// A participant of a finished game.
+pub(in crate::store) struct ParticipantRow {
+    pub(in crate::store) game: i64,
+    pub(in crate::store) seat: i64,
+    pub(in crate::store) name: String,
+    pub(in crate::store) agent: String,
+    pub(in crate::store) kind: i32,
+}
+
+/// A tournament as stored.
+pub(in crate::store) struct TournamentRow {
+    pub(in crate::store) number: i64,
+    pub(in crate::store) id: Vec<u8>,
+    pub(in crate::store) form: i64,
+    pub(in crate::store) over: bool,
+    pub(in crate::store) header: Vec<u8>,
+}
+
+/// The database of a data directory.
+pub(in crate::store) struct Contents(Opened);
+
+type Rows<'a, T> = BoxStream<'a, Result<T, StoreError>>;
+
+impl Contents {
+    /// Opens the database, and upgrades it to this version's.
+    pub(in crate::store) async fn open(data_dir: &Path) -> Result<Self, OpenError> {
+        open::open(data_dir).await.map(Self)
+    }
+
+    /// Number of games.
+    pub(in crate::store) async fn count(&self) -> Result<u64, StoreError> {
+        let count: i64 = sqlx::query_scalar("SELECT count(*) FROM games")
+            .fetch_one(&self.0.readers)
+            .await
+            .map_err(failure)?;
+        Ok(count.cast_unsigned())
+    }
+
+    /// The games, in the order of their numbers.
+    pub(in crate::store) fn games(&self) -> Rows<'_, GameRow> {
+        self.rows(
+            "SELECT number, game_id, form, state, ended_at_ms, filed, origin, room_name, created_at_ms, added, summary,
+                    header, listed, signature, record, last_row
+             FROM games LEFT JOIN added_records ON game = number ORDER BY number",
+            |row| GameRow {
+                number: row.get(0),
+                game_id: row.get(1),
+                form: row.get(2),
+                state: row.get(3),
+                ended_at_ms: row.get(4),
+                filed: row.get(5),
+                origin: row.get(6),
+                room_name: row.get(7),
+                created_at_ms: row.get(8),
+                added: row.get(9),
+                summary: row.get(10),
+                header: row.get(11),
+                listed: row.get(12),
+                signature: row.get(13),
+                record: row.get(14),
+                last_row: row.get(15),
+            },
+        )
+    }
+
+    /// The journal of a game that is over.
+    pub(in crate::store) async fn journal(
+        &self,
+        game: &GameRow,
+    ) -> Result<Vec<JournalRow>, StoreError> {
+        let rows = sqlx::query(with_own_rows!(
+            "row = $1 AND game = $2",
+            "SELECT game, position, entries FROM journal WHERE row IN (SELECT row FROM own) ORDER BY row"
+        ))
+        .bind(game.last_row)
+        .bind(game.number)
+        .fetch_all(&self.0.readers)
+        .await
+        .map_err(failure)?;
+        Ok(rows.into_iter().map(journal_row).collect())
+    }
+
+    /// The journals of all games that are not over, in the order in which they were written.
+    pub(in crate::store) fn running_journals(&self) -> Rows<'_, JournalRow> {
+        self.rows(
+            "SELECT game, position, entries FROM journal
+             WHERE row >= (SELECT min(first_row) FROM games WHERE state = 0)
+               AND game IN (SELECT number FROM games WHERE state = 0)
+             ORDER BY row",
+            journal_row,
+        )
+    }
+
+    /// The participants of finished games.
+    pub(in crate::store) fn participants(&self) -> Rows<'_, ParticipantRow> {
+        self.rows(
+            "SELECT game, seat, name, agent, kind FROM participants",
+            |row| ParticipantRow {
+                game: row.get(0),
+                seat: row.get(1),
+                name: row.get(2),
+                agent: row.get(3),
+                kind: row.get(4),
+            },
+        )
+    }
+
+    /// The tournaments, in the order of their numbers.
+    pub(in crate::store) fn tournaments(&self) -> Rows<'_, TournamentRow> {
+        self.rows(
+            "SELECT number, tournament_id, form, over, header FROM tournaments ORDER BY number",
+            |row| TournamentRow {
+                number: row.get(0),
+                id: row.get(1),
+                form: row.get(2),
+                over: row.get(3),
+                header: row.get(4),
+            },
+        )
+    }
+
+    /// The journals of all tournaments.
+    pub(in crate::store) fn tournament_journals(&self) -> Rows<'_, JournalRow> {
+        self.rows(
+            "SELECT tournament, position, entries FROM tournament_entries ORDER BY tournament, position",
+            journal_row,
+        )
+    }
+
+    fn rows<T: 'static>(&self, query: &'static str, row: fn(SqliteRow) -> T) -> Rows<'_, T> {
+        (sqlx::query(query).fetch(&self.0.readers))
+            .map_ok(row)
+            .map_err(failure)
+            .boxed()
+    }
+}
+
+fn journal_row(row: SqliteRow) -> JournalRow {
+    JournalRow {
+        of: row.get(0),
+        position: row.get(1),
+        entries: row.get(2),
+    }
+}
+
+fn failure(error: sqlx::Error) -> StoreError {
+    StoreError::Failed(explain(&error))
+}
