@@ -114,6 +114,9 @@ pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
 pub const LEADERBOARD_SHARE: u32 = 10;
 /// How long open streams and connections may delay a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
+/// Longest time for which a node of a cluster that ends hands over what it owns, after the grace for
+/// games that no other node can resume.
+pub const HAND_OVER_LIMIT: Duration = Duration::from_secs(20);
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and highest target in points.

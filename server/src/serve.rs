@@ -8,26 +8,33 @@ use std::future::Future;
 use std::io;
 use std::sync::Arc;
 
+use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use futures::future::{Either, try_join};
 use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::watch;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tonic::body::Body;
 use tonic::service::Routes;
 use tonic::transport;
 use tonic::transport::server::{Connected, TcpConnectInfo};
+use tonic_health::ServingStatus;
+use tonic_health::server::HealthReporter;
 use tower::util::{MapRequestLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
-use crate::cluster::{CONNECTION_WINDOW, Directory, PeerPort, STREAM_WINDOW, SingleServer};
+use crate::cluster::{
+    CONNECTION_WINDOW, ClusterNode, Directory, NodeLease, PeerPort, STREAM_WINDOW, SingleServer,
+};
 use crate::config::{
-    DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION,
-    MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
+    DRAIN_LIMIT, HAND_OVER_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES,
+    MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
 };
 use crate::connections::{self, Connections, Limits, Listener};
 use crate::forwarded::ForwardedLayer;
@@ -38,6 +45,7 @@ use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
 use crate::rooms::Rooms;
 use crate::scrape;
+use crate::store::cluster::{ClusterStore, NodeInfo};
 use crate::store::{Store, StoreError};
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
@@ -98,6 +106,7 @@ pub struct Server {
     access: Arc<Access>,
     tls: Option<Arc<Tls>>,
     peers: Option<PeerPort>,
+    node: Option<ClusterNode>,
     calls: Arc<CallLimits>,
     connections: Arc<Connections>,
     tracker: TaskTracker,
@@ -123,13 +132,57 @@ impl Server {
         store: Arc<dyn Store>,
         directory: Arc<dyn Directory>,
     ) -> Result<Self, ServeError> {
+        let mut server = Self::new(config, store, directory, None)?;
+        server.games = server.rooms.restore().await?;
+        server.tournaments.restore().await?;
+        Ok(server)
+    }
+
+    /// Creates a node of a cluster, and joins. From here on it runs what nobody else owns.
+    ///
+    /// # Errors
+    /// The database cannot be reached.
+    pub async fn joined(
+        config: ServerConfig,
+        store: Arc<dyn ClusterStore>,
+        directory: Arc<dyn Directory>,
+        info: NodeInfo,
+    ) -> Result<Self, ServeError> {
+        let lease = Arc::new(NodeLease::new());
+        let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
+        let mut server = Self::new(config, stored, directory, Some(lease))?;
+        let grace = server.config.grace;
+        let id = store.join(info.clone()).await?;
+        info!(node = id.0, name = info.name, "joined the cluster");
+        server.node = Some(ClusterNode::start(
+            id,
+            info,
+            LeaseTimes::DEFAULT,
+            grace,
+            store,
+            Arc::clone(&server.rooms),
+            Arc::clone(&server.tournaments),
+        ));
+        Ok(server)
+    }
+
+    fn new(
+        config: ServerConfig,
+        store: Arc<dyn Store>,
+        directory: Arc<dyn Directory>,
+        lease: Option<Arc<NodeLease>>,
+    ) -> Result<Self, ServeError> {
         let access = Access::open(&config.access, config.data_dir.as_ref())?;
         let tls = config.tls.clone().map(Tls::open).transpose()?;
         let tracker = TaskTracker::new();
-        let rooms = Rooms::of_node(&config, Arc::clone(&store), directory, tracker.clone())?;
-        let games = rooms.restore().await?;
+        let rooms = Rooms::of_node(
+            &config,
+            Arc::clone(&store),
+            directory,
+            lease,
+            tracker.clone(),
+        )?;
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
-        tournaments.restore().await?;
         scrape::add_state(&rooms, &tournaments);
         let limits = Limits {
             max_connections: config.max_connections,
@@ -146,8 +199,9 @@ impl Server {
             access: Arc::new(access),
             tls,
             peers: None,
+            node: None,
             tracker,
-            games,
+            games: 0,
         })
     }
 
@@ -215,11 +269,13 @@ impl Server {
             access,
             tls,
             peers,
+            mut node,
             calls,
             connections,
             tracker,
             ..
         } = self;
+        let is_node = node.is_some();
         let closing = CancellationToken::new();
         tracker.spawn(
             closing
@@ -235,8 +291,8 @@ impl Server {
             );
         }
         // Above any encryption, because it reads frames.
-        let timeout = config.first_bytes_timeout;
-        let incoming = incoming.map_ok(move |connection| Metered::new(connection, timeout));
+        let first_bytes = config.first_bytes_timeout;
+        let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));
         let (health, health_service) = tonic_health::server::health_reporter();
         let routes = routes(
             &rooms,
@@ -248,9 +304,11 @@ impl Server {
         )?
         .add_service(health_service)
         .add_service(reflection());
-        health
-            .set_service_status("", tonic_health::ServingStatus::Serving)
-            .await;
+        health.set_service_status("", ServingStatus::Serving).await;
+        let following = node.as_ref().map(|node| {
+            let lease = node.may_publish();
+            tracker.spawn(follow_lease(health.clone(), lease, closing.clone()))
+        });
 
         tracker.spawn(
             closing
@@ -326,15 +384,36 @@ impl Server {
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
 
         let ending = async {
-            shutdown.await;
+            match &node {
+                None => shutdown.await,
+                Some(node) => tokio::select! {
+                    () = shutdown => {}
+                    () = node.asked_to_drain() => info!("asked to hand over to the other nodes"),
+                },
+            }
             info!(
                 grace_seconds = config.grace.as_secs(),
                 open_rooms = rooms.open_count(),
                 "shutting down: no new rooms; running games may finish"
             );
+            if let Some(following) = following {
+                following.abort();
+            }
             health
-                .set_service_status("", tonic_health::ServingStatus::NotServing)
+                .set_service_status("", ServingStatus::NotServing)
                 .await;
+            if let Some(node) = &mut node {
+                rooms.refuse_new();
+                if timeout(config.grace + HAND_OVER_LIMIT, node.drain())
+                    .await
+                    .is_err()
+                {
+                    warn!(
+                        "not everything was handed over; other nodes take it over when the lease expires"
+                    );
+                    rooms.fence_all();
+                }
+            }
             // Games that end from here on count when the server is restarted.
             tournaments.stop();
             rooms.shut_down(config.grace).await;
@@ -355,9 +434,33 @@ impl Server {
         tournaments.end();
         drop((rooms, tournaments));
         tracker.close();
-        tracker.wait().await;
+        if is_node {
+            // The database may be away, for which a node does not wait.
+            let _ = timeout(DRAIN_LIMIT, tracker.wait()).await;
+        } else {
+            tracker.wait().await;
+        }
         store.close().await;
         Ok(())
+    }
+}
+
+/// Reports a node as healthy while it has a lease.
+async fn follow_lease(
+    health: HealthReporter,
+    mut lease: watch::Receiver<bool>,
+    closing: CancellationToken,
+) {
+    loop {
+        let status = match *lease.borrow_and_update() {
+            true => ServingStatus::Serving,
+            false => ServingStatus::NotServing,
+        };
+        health.set_service_status("", status).await;
+        tokio::select! {
+            () = closing.cancelled() => return,
+            changed = lease.changed() => if changed.is_err() { return },
+        }
     }
 }
 

@@ -176,13 +176,15 @@ impl<K: Ord + Copy> Node<K> {
         self.owned.iter().map(|(id, epoch)| (*id, *epoch))
     }
 
-    /// When it wants to be woken with [`Input::Time`].
-    pub fn wakes_at_ms(&self) -> u64 {
-        match self.suspended {
-            true if self.owned.is_empty() => self.beats_at_ms,
-            true => self.beats_at_ms.min(self.expires_ms()),
-            false => self.beats_at_ms.min(self.lease.ends_ms()),
-        }
+    /// When it wants to be woken with [`Input::Time`]; `None` if only answers matter.
+    pub fn wakes_at_ms(&self) -> Option<u64> {
+        let beats_at_ms = (!self.beating).then_some(self.beats_at_ms);
+        let ends_ms = match (self.suspended, self.owned.is_empty()) {
+            (false, _) => Some(self.lease.ends_ms()),
+            (true, false) => Some(self.expires_ms()),
+            (true, true) => None,
+        };
+        beats_at_ms.into_iter().chain(ends_ms).min()
     }
 
     /// From when on others may take over what it owns, on its own clock.

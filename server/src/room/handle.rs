@@ -7,6 +7,7 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
 
 use super::message::{
     Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, Ruled, SeatAction,
@@ -31,6 +32,7 @@ pub struct Handle {
     id: Id,
     mailbox: mpsc::Sender<Message>,
     resting: Arc<Resting<Room>>,
+    fence: CancellationToken,
 }
 
 /// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
@@ -43,11 +45,13 @@ pub fn spawn_room(
     context: TaskContext,
 ) -> Handle {
     let id = core.header().room_id;
-    let (mailbox, resting) = task::spawn(core, clock, over_since, journal, context);
+    let fence = CancellationToken::new();
+    let (mailbox, resting) = task::spawn(core, clock, over_since, journal, fence.clone(), context);
     Handle {
         id,
         mailbox,
         resting,
+        fence,
     }
 }
 
@@ -118,7 +122,7 @@ impl Handle {
         let is_first = || self.mailbox.capacity() == self.mailbox.max_capacity();
         let needs_task = self.resting.handle(
             answer,
-            |room| is_first() && room.answers_in_place,
+            |room| is_first() && room.may_answer_in_place(),
             |room, answer| room.answer_in_place(seat, connection, answer, arrived),
         )?;
         if needs_task {
@@ -246,6 +250,14 @@ impl Handle {
         };
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(message).await;
+    }
+
+    /// Stops the room at once, unless its game is over: another node of the cluster may have it.
+    /// Nothing more is published.
+    pub fn fence(&self) {
+        self.fence.cancel();
+        // If the mailbox is full, the task will run anyway.
+        let _ = self.mailbox.try_send(Message::Wake);
     }
 
     /// Reports something from the physical table; `None` if its ticket is another.

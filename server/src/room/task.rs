@@ -23,8 +23,9 @@ use futures::stream::FuturesUnordered;
 use futures::{FutureExt as _, StreamExt as _};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
+use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
-use tracing::{Instrument as _, debug, error, info};
+use tracing::{Instrument as _, debug, error, info, warn};
 
 use super::clients::Clients;
 use super::message::{
@@ -38,6 +39,7 @@ use super::subscriber::{
 };
 use super::table_view::TableView;
 use crate::clock::RoomClock;
+use crate::cluster::{News, NodeLease};
 use crate::config::{HINT_TIME, ROOM_MAILBOX};
 use crate::convert::{self, Deck};
 use crate::limits::{Background, Held, Hint, Key, Places, Searches, Shares, Turn};
@@ -78,6 +80,8 @@ pub struct TaskContext {
     pub background: Arc<Background>,
     /// Searches for built-in agents.
     pub searches: Arc<Searches>,
+    /// What lets a node of a cluster publish; `None` in a single server, which always may.
+    pub lease: Option<Arc<NodeLease>>,
     /// Who created the room.
     pub owner: Key,
     /// How much of each limit one caller may use.
@@ -99,6 +103,7 @@ pub(super) fn spawn(
     clock: RoomClock,
     over_since: Option<Duration>,
     journal: Box<dyn Journal>,
+    fence: CancellationToken,
     context: TaskContext,
 ) -> (mpsc::Sender<Message>, Arc<Resting<Room>>) {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
@@ -125,6 +130,7 @@ pub(super) fn spawn(
         backlog_due_at: 0,
         over_since,
         suspended: false,
+        fence,
         place: None,
         timer_at: None,
         answers_in_place: false,
@@ -193,11 +199,13 @@ pub(super) struct Room {
     /// Whether the room ends while its game is unfinished; the game resumes when the server is
     /// restarted.
     suspended: bool,
+    /// Cancelled when another node of the cluster may have the room.
+    fence: CancellationToken,
     /// The place among the games that built-in agents play.
     place: Option<Held>,
     /// When the timer of the task fires.
     timer_at: Option<Duration>,
-    pub(super) answers_in_place: bool,
+    answers_in_place: bool,
     /// The physical table, if the room has one.
     table: Option<Box<TableView>>,
     observed: Observed,
@@ -238,6 +246,9 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
     while room.commit_and_publish().await {
         if room.suspended && room.over_since.is_none() {
             room.subscribers().for_each(Subscriber::stop);
+            break;
+        }
+        if room.is_fenced() {
             break;
         }
         if !room.plays_in_background() {
@@ -343,6 +354,17 @@ impl Room {
         }
         self.publish();
         !self.timer_covers(self.core.deadline())
+    }
+
+    /// Whether an answer can be handled while the task waits.
+    pub(super) fn may_answer_in_place(&self) -> bool {
+        let lease = self.context.lease.as_ref();
+        self.answers_in_place && lease.is_none_or(|lease| lease.holds())
+    }
+
+    /// Whether another node of the cluster may have the room.
+    fn is_fenced(&self) -> bool {
+        self.over_since.is_none() && self.fence.is_cancelled()
     }
 
     /// Whether the timer fires no later than a deadline, if there is one.
@@ -711,7 +733,10 @@ impl Room {
     /// must stop.
     async fn commit_and_publish(&mut self) -> bool {
         if !self.commit_now() {
-            if let Err(error) = self.journal.append(self.core.pending()).await {
+            let room = self.core.header().room_id;
+            let appended = self.journal.append(self.core.pending());
+            let appended = unless_fenced(&self.context, &self.fence, room, appended);
+            if let Err(error) = appended.await {
                 self.fail(&error);
                 return false;
             }
@@ -722,12 +747,28 @@ impl Room {
         if ends && !self.conclude().await {
             return false;
         }
+        if !self.wait_for_lease().await {
+            return false;
+        }
         self.publish();
         if ends {
             // A shutdown that waits for games to end may close streams at once: everything has been
             // queued.
             self.context.watcher.game_over(self.core.header().room_id);
         }
+        true
+    }
+
+    /// Waits until the server may publish. Returns `false` if the room must stop instead.
+    async fn wait_for_lease(&mut self) -> bool {
+        let Some(lease) = self.context.lease.as_ref().filter(|lease| !lease.holds()) else {
+            return true;
+        };
+        tokio::select! {
+            () = self.fence.cancelled() => return false,
+            () = lease.held() => {}
+        }
+        self.now = self.clock.now();
         true
     }
 
@@ -890,7 +931,9 @@ impl Room {
             false => None,
         };
         let finished = self.journal.finish(summary.map(Box::new), signed);
+        let finished = unless_fenced(&self.context, &self.fence, header.room_id, finished);
         if let Err(error) = finished.await {
+            self.over_since = None;
             self.fail(&error);
             return false;
         }
@@ -920,11 +963,19 @@ impl Room {
     }
 
     /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that
-    /// agents reconnect and find the game as the restarted server finds it.
+    /// agents reconnect and find the game as the restarted server, or the node that owns it, finds
+    /// it.
     fn fail(&mut self, error: &StoreError) {
-        error!(room = %self.core.header().room_id, %error, "the store failed; the room stops");
+        let room = self.core.header().room_id;
         self.releases.clear();
-        self.end_streams(StreamEnd::StoreFailed);
+        match (error, &self.context.lease) {
+            (StoreError::Fenced(_), _) => info!(%room, %error, "the room stops here"),
+            (_, Some(_)) => warn!(%room, %error, "the room stops until its node resumes it"),
+            (_, None) => {
+                error!(%room, %error, "the store failed; the room stops");
+                self.end_streams(StreamEnd::StoreFailed);
+            }
+        }
     }
 
     /// Ends the streams of all subscribers, which may reconnect.
@@ -943,7 +994,32 @@ impl Room {
 impl Drop for Room {
     fn drop(&mut self) {
         self.end_streams(StreamEnd::RoomGone);
-        self.context.watcher.gone(self.core.header().room_id);
+        let header = self.core.header();
+        self.context.watcher.gone(header.room_id);
+        let is_expected = self.suspended || self.fence.is_cancelled();
+        if let Some(lease) = &self.context.lease
+            && !is_expected
+            && self.over_since.is_none()
+        {
+            lease.report(header.unit(), News::Stopped);
+        }
+    }
+}
+
+/// The result of a write, unless the room is fenced before. In a single server it never is.
+async fn unless_fenced(
+    context: &TaskContext,
+    fence: &CancellationToken,
+    room: Id,
+    written: impl Future<Output = Result<(), StoreError>>,
+) -> Result<(), StoreError> {
+    if context.lease.is_none() {
+        return written.await;
+    }
+    tokio::select! {
+        biased;
+        written = written => written,
+        () = fence.cancelled() => Err(StoreError::Fenced(room)),
     }
 }
 

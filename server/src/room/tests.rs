@@ -101,6 +101,7 @@ async fn room_of(
         None,
         change(journal),
         TaskContext {
+            lease: None,
             signer: Signer::new(Some(Arc::new(SigningKey::from_seed(&[7; 32])))),
             record_writer: RecordWriter::new(
                 store.clone(),

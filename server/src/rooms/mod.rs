@@ -1,9 +1,11 @@
-//! The rooms of a server: creates, finds and shuts them down. `restore` resumes them.
+//! The rooms of a server: creates, finds and shuts them down. `restore` resumes them, `unit` stops
+//! those that another node takes over.
 
 mod restore;
 mod table;
 #[cfg(test)]
 mod tests;
+mod unit;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,7 +22,7 @@ use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
-use crate::cluster::{Directory, SingleServer};
+use crate::cluster::{Directory, News, NodeLease, SingleServer};
 use crate::config::ServerConfig;
 use crate::limits::{Background, Held, Key, Places, Refused, Searches, Shares};
 use crate::metrics::Metrics;
@@ -123,10 +125,11 @@ impl Rooms {
         store: Arc<dyn Store>,
         tracker: TaskTracker,
     ) -> Result<Arc<Self>, ThreadPoolBuildError> {
-        Self::of_node(config, store, Arc::new(SingleServer), tracker)
+        Self::of_node(config, store, Arc::new(SingleServer), None, tracker)
     }
 
-    /// Creates an empty set, of a node of a cluster. `directory` knows the other nodes' rooms.
+    /// Creates an empty set, of a node of a cluster. `directory` knows the other nodes' rooms. If
+    /// rooms can be taken over by other nodes, they publish while `lease` holds.
     ///
     /// # Errors
     /// See [`Rooms::new`].
@@ -134,6 +137,7 @@ impl Rooms {
         config: &ServerConfig,
         store: Arc<dyn Store>,
         directory: Arc<dyn Directory>,
+        lease: Option<Arc<NodeLease>>,
         tracker: TaskTracker,
     ) -> Result<Arc<Self>, ThreadPoolBuildError> {
         let metrics = Arc::new(Metrics::default());
@@ -165,6 +169,7 @@ impl Rooms {
                 watcher: Arc::new(Watcher(Weak::clone(rooms))),
                 background,
                 searches,
+                lease,
                 owner: Key::Resumed,
                 shares: config.shares,
             },
@@ -193,7 +198,7 @@ impl Rooms {
         let reservation = loop {
             // A repetition of a request whose room is still being created waits for it.
             let created = self.created.notified();
-            match Reservation::of(self, owner, new.charged)? {
+            match Reservation::of(self, owner, &new)? {
                 Claim::Reserved(reservation) => break reservation,
                 Claim::Created(created) => return Ok(created),
                 Claim::InProgress => created.await,
@@ -266,6 +271,11 @@ impl Rooms {
         self.room_of(game).is_some()
     }
 
+    /// Whether a room has stopped before its game is over.
+    pub fn is_suspended(&self, id: Id) -> bool {
+        self.lock().get(id).is_some_and(|entry| entry.suspended)
+    }
+
     /// Whether the game of a room is over; `None` if the room is unknown or suspended.
     pub fn is_over(&self, id: Id) -> Option<bool> {
         let table = self.lock();
@@ -311,6 +321,16 @@ impl Rooms {
             .values()
             .filter(|entry| entry.is_open())
             .count()
+    }
+
+    /// What lets this node publish; `None` in a single server.
+    pub fn lease(&self) -> Option<&Arc<NodeLease>> {
+        self.context.lease.as_ref()
+    }
+
+    /// Accepts no new rooms from here on.
+    pub fn refuse_new(&self) {
+        self.lock().shutting_down = true;
     }
 
     /// Whether the server accepts no new rooms.
@@ -373,7 +393,7 @@ impl Rooms {
     /// then suspended until the server is restarted, or aborted if they cannot resume. Returns when
     /// no game is open any more.
     pub async fn shut_down(&self, grace: Duration) {
-        self.lock().shutting_down = true;
+        self.refuse_new();
         let mut playing = HashSet::new();
         for (handle, durable) in self.open() {
             let waits = match handle.describe().await {
@@ -472,7 +492,10 @@ struct Reservation {
 
 impl Reservation {
     /// Reserves space for the room of this owner token.
-    fn of(rooms: &Arc<Rooms>, owner: Token, charged: Key) -> Result<Claim, CreateError> {
+    fn of(rooms: &Arc<Rooms>, owner: Token, new: &NewRoom) -> Result<Claim, CreateError> {
+        let charged = new.charged;
+        let seating = new.seating.as_ref();
+        let unit = seating.map_or(owner.room, |seating| seating.game.tournament);
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.room) {
             return match entry.header.owner.matches(&owner.secret) {
@@ -484,12 +507,12 @@ impl Reservation {
                 false => Err(CreateError::RequestIdUsed),
             };
         }
-        if table.in_creation.contains(&owner.room) {
+        if table.in_creation.contains_key(&owner.room) {
             return Ok(Claim::InProgress);
         }
         let place = rooms.places.try_take(charged);
         let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
-        table.reserve(owner.room, rooms.max_rooms)?;
+        table.reserve(owner.room, unit, rooms.max_rooms)?;
         drop(table);
         Ok(Claim::Reserved(Self {
             rooms: Arc::clone(rooms),
@@ -548,6 +571,9 @@ impl Reservation {
                 ..rooms.context.clone()
             };
             let handle = spawn_room(core, clock, None, journal, context);
+            if let Some(lease) = rooms.lease().filter(|_| header.tournament.is_none()) {
+                lease.report(header.unit(), News::Created);
+            }
             table.enter(Entry {
                 handle: handle.clone(),
                 durable: rooms.is_durable(&header),

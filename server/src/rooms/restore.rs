@@ -40,18 +40,8 @@ impl Rooms {
             error!(%error, "removing unfinished record files failed");
         }
         let without_record_file = self.context.store.without_record_file().await?;
-        let mut players = Players::default();
-        let mut restored = 0;
-        for game in self.context.store.resumable_games(ended_since_ms).await? {
-            let id = game.header.game_id;
-            let goes_on = !game.concluded;
-            match self.resume(game, &mut players).await {
-                Ok(()) => restored += usize::from(goes_on),
-                Err(problem) => {
-                    error!(game = %id, %problem, "a game cannot be resumed; it is left unchanged");
-                }
-            }
-        }
+        let games = self.context.store.resumable_games(ended_since_ms).await?;
+        let restored = self.resume_all(games).await;
         if restored > 0 {
             info!(games = restored, "games resumed");
         }
@@ -59,6 +49,24 @@ impl Rooms {
             self.context.record_writer.write_record(game, Key::Resumed);
         }
         Ok(restored)
+    }
+
+    /// Resumes games and returns how many are not over. One that cannot be resumed is logged and left
+    /// unchanged.
+    pub(crate) async fn resume_all(&self, games: Vec<ResumableGame>) -> usize {
+        let mut players = Players::default();
+        let mut resumed = 0;
+        for game in games {
+            let id = game.header.game_id;
+            let goes_on = !game.concluded;
+            match self.resume(game, &mut players).await {
+                Ok(()) => resumed += usize::from(goes_on),
+                Err(problem) => {
+                    error!(game = %id, %problem, "a game cannot be resumed; it is left unchanged");
+                }
+            }
+        }
+        resumed
     }
 
     async fn resume(&self, game: ResumableGame, players: &mut Players) -> Result<(), String> {
@@ -79,6 +87,10 @@ impl Rooms {
             .map_err(|problem| problem.to_string())?;
         let clock = RoomClock::of_age(age);
         let mut table = self.lock();
+        if table.get(header.room_id).is_some() {
+            // A node shows the end of a game that it has played and resumes the rest of its unit.
+            return Ok(());
+        }
         let over_since = game.concluded.then_some(age);
         let handle = spawn_room(core, clock, over_since, game.journal, self.context.clone());
         table.enter(Entry {

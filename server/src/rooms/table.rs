@@ -1,6 +1,6 @@
 //! The table of rooms, in the order of their creation, with look-up by id and join code.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use crate::limits::{Held, Refused};
@@ -39,8 +39,8 @@ pub(super) struct Table {
     pub(super) by_number: BTreeMap<u64, Entry>,
     pub(super) numbers: HashMap<Id, u64>,
     pub(super) codes: HashMap<String, u64>,
-    /// Rooms that are being created, for which space is reserved.
-    pub(super) in_creation: HashSet<Id>,
+    /// Rooms that are being created, for which space is reserved, with their units.
+    pub(super) in_creation: HashMap<Id, Id>,
     pub(super) shutting_down: bool,
 }
 
@@ -70,7 +70,12 @@ impl Table {
     }
 
     /// Reserves space for a room that will be created.
-    pub(super) fn reserve(&mut self, id: Id, max_rooms: usize) -> Result<(), CreateError> {
+    pub(super) fn reserve(
+        &mut self,
+        id: Id,
+        unit: Id,
+        max_rooms: usize,
+    ) -> Result<(), CreateError> {
         if self.shutting_down {
             return Err(CreateError::ShuttingDown);
         }
@@ -81,7 +86,7 @@ impl Table {
                 return Err(CreateError::TooMany(max_rooms));
             }
         }
-        self.in_creation.insert(id);
+        self.in_creation.insert(id, unit);
         Ok(())
     }
 

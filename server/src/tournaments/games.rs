@@ -54,6 +54,10 @@ impl Task {
                 self.seen.insert(game);
                 continue;
             }
+            if self.rooms.lease().is_some() && self.rooms.is_suspended(room) {
+                // It has stopped, and the tournament will be: this node does not own it any more.
+                continue;
+            }
             match self.ended(game, room, game_id).await? {
                 Some(ended) => {
                     let change = self.state.core.ended(game, ended);

@@ -7,6 +7,7 @@ use chefshat_proto::v1;
 use chefshat_tournament::{BeginProblem, Entrant, GameState, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio_util::sync::CancellationToken;
 
 use super::shared::{AsOf, Shared};
 use crate::access::{Secrets, Standing};
@@ -215,6 +216,8 @@ pub struct TournamentHandle {
     /// The state with only committed changes.
     pub(super) committed: Mutex<TournamentState>,
     pub(super) mailbox: mpsc::Sender<Message>,
+    /// Cancelled when its task ends.
+    pub(super) end: CancellationToken,
     /// Counts changes.
     pub(super) changes: watch::Sender<u64>,
     pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,

@@ -25,6 +25,7 @@ pub use leaderboard::Leaderboard;
 pub use shared::ComputeError;
 
 use crate::clock::since_epoch_ms;
+use crate::cluster::News;
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
 use crate::limits::{Held, Key, Places, Refused};
@@ -141,26 +142,65 @@ impl Tournaments {
     /// # Errors
     /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
-        let mut unfinished = 0;
-        for stored in self.rooms.store().tournaments(MAX_TOURNAMENTS).await? {
-            let id = stored.header.id;
-            match restored(&stored) {
-                Ok((plan, state)) => {
-                    unfinished += usize::from(state.core.state() == State::Playing);
-                    let charged = (Key::Tournament(id), None);
-                    self.start_task(stored.header, stored.rows, plan, state, charged);
-                }
-                Err(problem) => {
-                    // The deals it would withhold are unknown.
-                    self.rooms.withhold(id, true);
-                    error!(tournament = %id, %problem, "a tournament cannot be resumed; it is left unchanged");
-                }
-            }
-        }
+        let stored = self.rooms.store().tournaments(MAX_TOURNAMENTS).await?;
+        let playing = stored.into_iter().map(|stored| self.resume(stored));
+        let unfinished: usize = playing.map(usize::from).sum();
         if unfinished > 0 {
             info!(tournaments = unfinished, "tournaments resumed");
         }
         Ok(unfinished)
+    }
+
+    /// Resumes a tournament, whose rooms must be restored already. Returns whether it is playing. One
+    /// that cannot be resumed is logged and left unchanged.
+    pub(crate) fn resume(&self, stored: StoredTournament) -> bool {
+        let id = stored.header.id;
+        match restored(&stored) {
+            Ok((plan, state)) => {
+                let is_playing = state.core.state() == State::Playing;
+                let charged = (Key::Tournament(id), None);
+                self.start_task(stored.header, stored.rows, plan, state, charged);
+                is_playing
+            }
+            Err(problem) => {
+                // The deals it would withhold are unknown.
+                self.rooms.withhold(id, true);
+                error!(tournament = %id, %problem, "a tournament cannot be resumed; it is left unchanged");
+                false
+            }
+        }
+    }
+
+    /// Whether this tournament runs here, or is being created.
+    pub(crate) fn runs(&self, id: Id) -> bool {
+        let table = self.lock();
+        let running = |handle: &Arc<TournamentHandle>| !handle.mailbox.is_closed();
+        table.get(id).is_some_and(running) || table.is_in_creation(id)
+    }
+
+    /// Makes the task of a tournament end without publishing anything more.
+    pub(crate) fn fence(&self, id: Id) {
+        if let Some(handle) = self.get(id) {
+            handle.end.cancel();
+        }
+    }
+
+    /// Ends the task of a tournament, and forgets it unless it is over: another node may have it. The
+    /// records that it withholds stay withheld here.
+    pub(crate) async fn stop_one(&self, id: Id) {
+        loop {
+            let created = self.created.notified();
+            if !self.lock().is_in_creation(id) {
+                break;
+            }
+            created.await;
+        }
+        let Some(handle) = self.get(id) else { return };
+        handle.end.cancel();
+        handle.mailbox.closed().await;
+        if !handle.is_over() {
+            self.lock().remove_id(id);
+        }
     }
 
     /// Stops calling and counting games; those that end from here on count when the server is
@@ -237,7 +277,12 @@ impl Tournaments {
         (charged, place): (Key, Option<Held>),
     ) -> Arc<TournamentHandle> {
         let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
+        let stop = Stop {
+            end: self.stop.end.child_token(),
+            ..self.stop.clone()
+        };
         let handle = Arc::new(TournamentHandle {
+            end: stop.end.clone(),
             header,
             plan,
             charged,
@@ -256,7 +301,7 @@ impl Tournaments {
             return handle;
         }
         let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
-        self.tracker.spawn(task.run(inbox, self.stop.clone()));
+        self.tracker.spawn(task.run(inbox, stop));
         handle
     }
 
@@ -328,6 +373,9 @@ impl Reservation {
             .await?;
         let mut state = TournamentState::new(core);
         entries.iter().for_each(|entry| state.apply(entry));
+        if let Some(lease) = tournaments.rooms.lease() {
+            lease.report(header.id, News::Created);
+        }
         let charged = (charged, place);
         let handle = tournaments.start_task(header, 1, plan, state, charged);
         Ok((handle, owner))

@@ -75,6 +75,13 @@ impl Table {
         self.by_number.insert(number, handle);
     }
 
+    /// Removes a tournament that another node may have.
+    pub(super) fn remove_id(&mut self, id: Id) {
+        if let Some(number) = self.numbers.get(&id).copied() {
+            self.remove(number);
+        }
+    }
+
     fn remove(&mut self, number: u64) {
         if let Some(handle) = self.by_number.remove(&number) {
             self.numbers.remove(&handle.id());

@@ -9,13 +9,15 @@ use chefshat_tournament::{Change, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info};
+use tracing::{error, info, warn};
 
 use super::handle::{
     Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
 };
+use crate::cluster::News;
 use crate::config::TOURNAMENT_OPEN_TIME;
 use crate::limits::Held;
+use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
@@ -103,8 +105,7 @@ impl Task {
             // From here on no end of a game is missed.
             changed.as_mut().enable();
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
-                error!(tournament = %self.handle.id(), %error, "the store failed; the tournament stops");
-                return;
+                return self.fail(&error);
             }
             if self.handle.is_over() {
                 self.conclude(inbox).await;
@@ -115,21 +116,68 @@ impl Task {
                 .filter(|_| !stop.no_more_games.is_cancelled());
             let alarm = sleep_until(wake.unwrap_or(self.began));
             tokio::select! {
-                () = stop.end.cancelled() => return,
+                () = stop.end.cancelled() => return self.end_streams(),
                 received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
                     if received == 0 {
                         return;
                     }
                     for message in messages.drain(..) {
                         if let Err(error) = self.receive(message).await {
-                            error!(tournament = %self.handle.id(), %error, "the store failed; the tournament stops");
-                            return;
+                            return self.fail(&error);
                         }
                     }
                 }
                 () = changed => {}
                 () = alarm, if wake.is_some() => self.expire(),
             }
+        }
+    }
+
+    /// Handles a failure of the store: nothing uncommitted is published. The tournament resumes from
+    /// its journal when the server is restarted, or at the node that owns it.
+    fn fail(&mut self, error: &StoreError) {
+        let tournament = self.handle.id();
+        match (error, self.rooms.lease()) {
+            (StoreError::Fenced(_), _) => info!(%tournament, %error, "the tournament stops here"),
+            (_, Some(_)) => warn!(%tournament, %error, "the tournament stops until it is resumed"),
+            (_, None) => error!(%tournament, %error, "the store failed; the tournament stops"),
+        }
+        if let Some(lease) = self.rooms.lease()
+            && !self.handle.end.is_cancelled()
+        {
+            lease.report(tournament, News::Stopped);
+        }
+        self.end_streams();
+    }
+
+    /// Ends the streams of all participants, which may reconnect, unless the whole server ends.
+    fn end_streams(&mut self) {
+        if self.rooms.lease().is_none() {
+            return;
+        }
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.outbox.end(StreamEnd::RoomGone);
+        }
+    }
+
+    /// The result of a write, once this server may publish it. The tournament must stop if another
+    /// node may have it.
+    async fn published<T>(
+        &self,
+        written: impl Future<Output = Result<T, StoreError>>,
+    ) -> Result<T, StoreError> {
+        let Some(lease) = self.rooms.lease() else {
+            return written.await;
+        };
+        let written = async {
+            let written = written.await?;
+            lease.held().await;
+            Ok(written)
+        };
+        tokio::select! {
+            biased;
+            written = written => written,
+            () = self.handle.end.cancelled() => Err(StoreError::Fenced(self.handle.id())),
         }
     }
 
@@ -321,7 +369,9 @@ impl Task {
             if has_entries {
                 let entries = std::mem::take(&mut self.pending);
                 let store = self.rooms.store();
-                (store.append_tournament(self.handle.id(), self.rows, entries.clone())).await?;
+                let id = self.handle.id();
+                let appended = store.append_tournament(id, self.rows, entries.clone());
+                self.published(appended).await?;
                 self.rows += 1;
                 self.handle.publish(&entries);
             }

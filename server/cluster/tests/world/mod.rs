@@ -591,7 +591,7 @@ impl Model for Cluster {
             let Some(it) = it.as_ref().filter(|it| !it.left) else {
                 continue;
             };
-            if world.now >= it.node.wakes_at_ms() {
+            if (it.node.wakes_at_ms()).is_some_and(|at| at <= world.now) {
                 actions.push(Happening::Wake(server));
             }
             if world.serves(server) {

@@ -56,6 +56,7 @@ impl TournamentHandle {
         }
         let id = Id::random();
         Arc::new(Self {
+            end: tokio_util::sync::CancellationToken::new(),
             header: crate::store::tournaments::TournamentHeader {
                 id,
                 settings: convert::settings_to_proto(&"🍕".repeat(MAX_NAME_CHARS), &plan),

@@ -1,0 +1,88 @@
+//! What the rooms and tournaments of a node share with its task: until when they may publish, and
+//! which of them are new or have stopped by themselves.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, MutexGuard};
+
+use chefshat_room::ids::Id;
+use tokio::sync::{Notify, watch};
+use tokio::time::Instant;
+
+/// The lease of a node, as its rooms and tournaments see it.
+///
+/// It is checked before anything is published, on the clock and not by a message from the task: a
+/// process that was stopped for a while must not publish before that task runs again.
+#[derive(Debug)]
+pub struct NodeLease {
+    until: watch::Sender<Instant>,
+    news: Mutex<BTreeSet<(Id, News)>>,
+    has_news: Notify,
+}
+
+/// What the task of a node learns about a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum News {
+    /// It was created here.
+    Created,
+    /// Something of it has stopped by itself: it was fenced, or it failed.
+    Stopped,
+}
+
+impl NodeLease {
+    /// No lease yet.
+    pub fn new() -> Self {
+        Self {
+            until: watch::Sender::new(Instant::now()),
+            news: Mutex::default(),
+            has_news: Notify::new(),
+        }
+    }
+
+    /// Whether the node may publish now.
+    pub fn holds(&self) -> bool {
+        Instant::now() < *self.until.borrow()
+    }
+
+    /// Waits until the node may publish.
+    pub async fn held(&self) {
+        let mut until = self.until.subscribe();
+        let held = until.wait_for(|until| Instant::now() < *until).await;
+        held.expect("the sender is borrowed");
+    }
+
+    /// Sets until when the node may publish.
+    pub(super) fn set(&self, until: Instant) {
+        self.until.send_if_modified(|known| {
+            let is_new = *known != until;
+            *known = until;
+            is_new
+        });
+    }
+
+    /// Tells the task of the node about a unit.
+    pub fn report(&self, unit: Id, news: News) {
+        self.all_news().insert((unit, news));
+        self.has_news.notify_one();
+    }
+
+    /// Waits until there is news, and returns it.
+    pub(super) async fn news(&self) -> BTreeSet<(Id, News)> {
+        loop {
+            let news = std::mem::take(&mut *self.all_news());
+            if !news.is_empty() {
+                return news;
+            }
+            self.has_news.notified().await;
+        }
+    }
+
+    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(Id, News)>> {
+        (self.news.lock()).expect("nothing panics under this lock")
+    }
+}
+
+impl Default for NodeLease {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,350 @@
+//! The task of a node: does what the core (`chefshat_cluster::Node`) puts out, and brings the
+//! answers in. Requests to the database run beside each other; what is done with one unit is done
+//! one after another.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, LeaseTimes, Node, Output, Phase};
+use futures::future::pending;
+use tokio::sync::{Semaphore, oneshot, watch};
+use tokio::task::{JoinHandle, JoinSet};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, sleep_until, timeout};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info, warn};
+
+use super::lease::{News, NodeLease};
+use super::units::Units;
+use crate::rooms::Rooms;
+use crate::store::StoreError;
+use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
+use crate::tournaments::Tournaments;
+use chefshat_room::ids::Id;
+
+/// How long an answer of the database is awaited. After that, the next beat says what happened.
+const ANSWER_TIME: Duration = Duration::from_secs(4);
+/// Time between two looks for units that nobody owns, so that those of a drained node soon run again.
+const FIND_INTERVAL: Duration = Duration::from_millis(500);
+/// Most orphans that are looked for at a time, so that several nodes share them.
+const ORPHANS_AT_ONCE: usize = 64;
+/// Units that are handed over at a time: each is away only from its own last commit on.
+const RELEASES_AT_ONCE: usize = 8;
+/// Pause before a node that was removed from the database tries again to join.
+const REJOIN_PAUSE: Duration = Duration::from_secs(1);
+
+/// A server as a node of a cluster. Dropping it ends its task without handing anything over.
+#[derive(Debug)]
+pub struct ClusterNode {
+    drain: CancellationToken,
+    is_asked_to_drain: watch::Receiver<bool>,
+    may_publish: watch::Receiver<bool>,
+    task: JoinHandle<()>,
+}
+
+impl ClusterNode {
+    /// Starts the task of a node that has joined. When it is drained, ephemeral games may continue
+    /// for `grace`.
+    pub fn start(
+        id: NodeId,
+        info: NodeInfo,
+        times: LeaseTimes,
+        grace: Duration,
+        store: Arc<dyn ClusterStore>,
+        rooms: Arc<Rooms>,
+        tournaments: Arc<Tournaments>,
+    ) -> Self {
+        let drain = CancellationToken::new();
+        let (asked, is_asked_to_drain) = watch::channel(false);
+        let (publishes, may_publish) = watch::channel(false);
+        let lease = rooms.lease().expect("the rooms of a node have a lease");
+        let lease = Arc::clone(lease);
+        let units = Units::new(Arc::clone(&store), rooms, tournaments, grace);
+        let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
+        let task = Task {
+            node: Node::new(id, times, capacity),
+            times,
+            capacity,
+            info,
+            store,
+            lease,
+            units: Arc::new(units),
+            began: Instant::now(),
+            running: BTreeMap::new(),
+            work: BTreeMap::new(),
+            answers: JoinSet::new(),
+            releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
+            asked,
+            publishes,
+        };
+        Self {
+            task: tokio::spawn(task.run(drain.clone())),
+            drain,
+            is_asked_to_drain,
+            may_publish,
+        }
+    }
+
+    /// Completes when somebody asks the node, in the database, to hand over what it owns.
+    pub async fn asked_to_drain(&self) {
+        let mut asked = self.is_asked_to_drain.clone();
+        if asked.wait_for(|asked| *asked).await.is_err() {
+            pending().await
+        }
+    }
+
+    /// Whether the node has a lease, and each change of that.
+    pub fn may_publish(&self) -> watch::Receiver<bool> {
+        self.may_publish.clone()
+    }
+
+    /// Takes nothing over any more, hands everything over, and leaves the cluster. The rooms and
+    /// tournaments must accept no new ones.
+    pub async fn drain(&mut self) {
+        self.drain.cancel();
+        if let Err(problem) = (&mut self.task).await {
+            error!(%problem, "the task of the node has failed");
+        }
+    }
+}
+
+impl Drop for ClusterNode {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+/// What a request to the database, or work with a unit, comes to.
+enum Event {
+    Answer(Input<Id>),
+    /// A beat was answered, and the node was asked to hand over what it owns.
+    AskedToDrain(Input<Id>),
+    /// A unit runs here at this epoch.
+    Runs(Id, Epoch),
+    /// A unit was stopped, or nothing follows.
+    Nothing,
+    /// The node is removed from the database.
+    Left,
+}
+
+struct Task {
+    node: Node<Id>,
+    times: LeaseTimes,
+    capacity: usize,
+    info: NodeInfo,
+    store: Arc<dyn ClusterStore>,
+    units: Arc<Units>,
+    lease: Arc<NodeLease>,
+    began: Instant,
+    /// The epochs at which units were resumed here.
+    running: BTreeMap<Id, Epoch>,
+    /// The end of the latest work with each unit.
+    work: BTreeMap<Id, oneshot::Receiver<Infallible>>,
+    answers: JoinSet<Event>,
+    releases: Arc<Semaphore>,
+    asked: watch::Sender<bool>,
+    publishes: watch::Sender<bool>,
+}
+
+impl Task {
+    async fn run(mut self, drain: CancellationToken) {
+        let mut finding = interval(FIND_INTERVAL);
+        finding.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        self.put_in(Input::Time);
+        loop {
+            let is_draining = self.node.phase() != Phase::Serving;
+            let wakes_at = self.node.wakes_at_ms();
+            let alarm = self.began + Duration::from_millis(wakes_at.unwrap_or_default());
+            tokio::select! {
+                Some(event) = self.answers.join_next() => match event {
+                    Ok(Event::Answer(input)) => self.put_in(input),
+                    Ok(Event::AskedToDrain(input)) => {
+                        self.asked.send_replace(true);
+                        self.put_in(input);
+                    }
+                    Ok(Event::Runs(unit, epoch)) => drop(self.running.insert(unit, epoch)),
+                    Ok(Event::Nothing) => {}
+                    Ok(Event::Left) => return,
+                    Err(problem) => error!(%problem, "work for the cluster has failed"),
+                },
+                news = self.lease.news() => {
+                    for (unit, news) in news {
+                        match news {
+                            News::Created => self.put_in(Input::Created(unit)),
+                            News::Stopped => self.has_stopped(unit),
+                        }
+                    }
+                }
+                () = sleep_until(alarm), if wakes_at.is_some() => self.put_in(Input::Time),
+                _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
+                () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
+            }
+            if self.node.phase() == Phase::Left && !drain.is_cancelled() {
+                self.rejoin().await;
+            }
+        }
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn put_in(&mut self, input: Input<Id>) {
+        let now_ms = self.now_ms();
+        for output in self.node.handle(input, now_ms) {
+            self.put_out(output);
+        }
+        let until_ms = self.node.publishes_until_ms();
+        self.lease.set(self.began + Duration::from_millis(until_ms));
+        let publishes = self.node.may_publish(now_ms);
+        self.publishes.send_if_modified(|known| {
+            let is_new = *known != publishes;
+            *known = publishes;
+            is_new
+        });
+    }
+
+    fn put_out(&mut self, output: Output<Id>) {
+        let store = Arc::clone(&self.store);
+        match output {
+            Output::Beat => {
+                self.work.retain(|_, work| !work.is_terminated());
+                let sent_ms = self.now_ms();
+                self.answers
+                    .spawn(async move { beat(&*store, sent_ms).await });
+            }
+            Output::FindOrphans(count) => self.find_orphans(count),
+            Output::Claim(unit, seen) => {
+                self.answers.spawn(async move {
+                    let answer = match answer("claim", store.claim(unit, seen)).await {
+                        Some(Some(epoch)) => ClaimAnswer::Won(epoch),
+                        Some(None) => ClaimAnswer::Lost,
+                        None => ClaimAnswer::None,
+                    };
+                    Event::Answer(Input::Claimed(unit, answer))
+                });
+            }
+            Output::Serve(unit, epoch) => {
+                self.units.want(unit, epoch);
+                let units = Arc::clone(&self.units);
+                self.queue(unit, async move {
+                    units.resume(unit, epoch).await;
+                    Event::Runs(unit, epoch)
+                });
+            }
+            Output::Stop(unit) => self.stop(unit),
+            Output::Suspend => warn!("the node has no lease; it publishes nothing until it has"),
+            Output::Resume => info!("the node has a lease"),
+            Output::Release(unit, epoch) => {
+                self.units.unwant(unit);
+                let (units, releases) = (Arc::clone(&self.units), Arc::clone(&self.releases));
+                self.queue(unit, async move {
+                    units.until_ephemeral_over(unit).await;
+                    let _permit = releases.acquire().await.expect("it is never closed");
+                    let is_released = units.release(unit, epoch).await;
+                    Event::Answer(Input::Released(unit, is_released))
+                });
+            }
+            Output::Leave => {
+                self.answers.spawn(async move {
+                    // If no answer comes, the node is removed when its lease has expired.
+                    answer("leave", store.leave()).await;
+                    Event::Left
+                });
+            }
+        }
+    }
+
+    fn find_orphans(&mut self, count: usize) {
+        if !self.node.may_create(self.now_ms()) {
+            return;
+        }
+        let store = Arc::clone(&self.store);
+        self.answers.spawn(async move {
+            let orphans = answer("look for orphans", store.orphans(count)).await;
+            Event::Answer(Input::Orphans(orphans.unwrap_or_default()))
+        });
+    }
+
+    /// Stops a unit at once.
+    fn stop(&mut self, unit: Id) {
+        self.units.fence(unit);
+        self.running.remove(&unit);
+        let units = Arc::clone(&self.units);
+        self.queue(unit, async move {
+            units.stop(unit).await;
+            Event::Nothing
+        });
+    }
+
+    /// Something of a unit has stopped by itself, so all of it stops. If the node still owns it, it
+    /// resumes it after its next beat.
+    fn has_stopped(&mut self, unit: Id) {
+        // What was created here is at the first epoch.
+        let epoch = self.running.get(&unit).copied().unwrap_or(Epoch::FIRST);
+        self.stop(unit);
+        self.put_in(Input::Fenced(unit, epoch));
+    }
+
+    /// Does something with a unit after what is done with it already.
+    fn queue(&mut self, unit: Id, work: impl Future<Output = Event> + Send + 'static) {
+        let (done, ended) = oneshot::channel::<Infallible>();
+        let before = self.work.insert(unit, ended);
+        self.answers.spawn(async move {
+            if let Some(before) = before {
+                // Ends when its sender is dropped.
+                let _ = before.await;
+            }
+            let event = work.await;
+            drop(done);
+            event
+        });
+    }
+
+    /// Joins as a new node: the database has removed this one, which was away for long.
+    async fn rejoin(&mut self) {
+        warn!("the node was removed from the database; it joins again");
+        let id = loop {
+            match self.store.join(self.info.clone()).await {
+                Ok(id) => break id,
+                Err(error) => {
+                    warn!(%error, "joining failed; trying again");
+                    sleep(REJOIN_PAUSE).await;
+                }
+            }
+        };
+        self.began = Instant::now();
+        self.node = Node::new(id, self.times, self.capacity);
+        self.put_in(Input::Time);
+    }
+}
+
+/// Beats, and reads what the node owns.
+async fn beat(store: &dyn ClusterStore, sent_ms: u64) -> Event {
+    let (answer, drain) = match answer("beat", store.beat()).await {
+        Some(Some(beat)) => (BeatAnswer::Kept(beat.owned), beat.drain),
+        Some(None) => (BeatAnswer::Unknown, false),
+        None => (BeatAnswer::None, false),
+    };
+    let input = Input::Beat { sent_ms, answer };
+    match drain {
+        true => Event::AskedToDrain(input),
+        false => Event::Answer(input),
+    }
+}
+
+/// The answer of the database; `None` if it failed or none came.
+async fn answer<T>(what: &str, asked: impl Future<Output = Result<T, StoreError>>) -> Option<T> {
+    match timeout(ANSWER_TIME, asked).await {
+        Ok(Ok(answer)) => Some(answer),
+        Ok(Err(error)) => {
+            warn!(what, %error, "the database did not do what the cluster needs");
+            None
+        }
+        Err(_) => {
+            warn!(what, "the database did not answer");
+            None
+        }
+    }
+}

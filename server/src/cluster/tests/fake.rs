@@ -1,0 +1,531 @@
+//! A database of a cluster in memory, made from the reference of the core, and the store of each
+//! node on it. A node can be cut off from it, or its beats alone.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use chefshat_cluster::{Created, Kept, LeaseTimes, Tables};
+use chefshat_proto::v1;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Entry, GameHeader};
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, pending};
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+use crate::store::cluster::{
+    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
+};
+use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::store::{
+    Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
+};
+
+#[derive(Clone)]
+enum Row {
+    Game(Vec<Entry>),
+    Tournament(Vec<TournamentEntry>),
+}
+
+/// What all nodes share.
+pub(super) struct Database {
+    began: Instant,
+    tables: Mutex<Tables<Id, Row>>,
+    games: Mutex<BTreeMap<Id, Arc<GameHeader>>>,
+    tournaments: Mutex<BTreeMap<Id, TournamentHeader>>,
+    nodes: Mutex<BTreeMap<NodeId, NodeInfo>>,
+    drain: Mutex<Option<NodeId>>,
+    finished: Arc<MemoryStore>,
+}
+
+impl Database {
+    pub(super) fn new() -> Arc<Self> {
+        Arc::new(Self {
+            began: Instant::now(),
+            tables: Mutex::new(Tables::new(LeaseTimes::DEFAULT)),
+            games: Mutex::default(),
+            tournaments: Mutex::default(),
+            nodes: Mutex::default(),
+            drain: Mutex::default(),
+            finished: Arc::default(),
+        })
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).expect("not that long")
+    }
+
+    fn tables(&self) -> MutexGuard<'_, Tables<Id, Row>> {
+        self.tables.lock().expect("no test panics here")
+    }
+
+    /// The owner of a unit.
+    pub(super) fn owner(&self, unit: Id) -> Option<NodeId> {
+        self.tables().owner(unit)
+    }
+
+    /// Gives a unit to another node although its owner has a lease.
+    pub(super) fn take_away(&self, unit: Id, node: NodeId) {
+        let mut tables = self.tables();
+        let epoch = tables.epoch(unit).expect("it exists");
+        tables.release(unit, epoch);
+        let now_ms = self.now_ms();
+        (tables.claim(unit, epoch, node, now_ms, |_| None)).expect("it was released");
+    }
+
+    /// Removes the nodes whose leases have expired, once they own nothing.
+    pub(super) fn remove_expired(&self) {
+        self.tables().remove_expired(self.now_ms());
+    }
+
+    pub(super) fn ask_to_drain(&self, node: NodeId) {
+        *self.drain.lock().expect("no test panics here") = Some(node);
+    }
+
+    pub(super) fn knows(&self, node: NodeId) -> bool {
+        self.tables().last_beat(node).is_some()
+    }
+
+    /// The names of those seated by the journal of a room, in order.
+    pub(super) fn seated(&self, room: Id) -> Vec<String> {
+        let tables = self.tables();
+        let rows = tables.journal(room).iter();
+        let entries = rows.flat_map(|row| match &row.entries {
+            Row::Game(entries) => entries.as_slice(),
+            Row::Tournament(_) => &[],
+        });
+        let names = entries.filter_map(|entry| match &entry.change {
+            Change::Seated { participant, .. } => Some(participant.name.clone()),
+            _ => None,
+        });
+        names.collect()
+    }
+}
+
+/// The store of one node.
+pub(super) struct FakeStore {
+    database: Arc<Database>,
+    node: Mutex<NodeId>,
+    /// The epochs of the tournaments of this node.
+    epochs: Mutex<BTreeMap<Id, Epoch>>,
+    /// Whether the database cannot be reached.
+    pub(super) cut_off: watch::Sender<bool>,
+    /// Whether beats do not reach it.
+    pub(super) beats_lost: watch::Sender<bool>,
+}
+
+impl FakeStore {
+    pub(super) fn new(database: &Arc<Database>) -> Arc<Self> {
+        Arc::new(Self {
+            database: Arc::clone(database),
+            node: Mutex::new(NodeId(0)),
+            epochs: Mutex::default(),
+            cut_off: watch::Sender::new(false),
+            beats_lost: watch::Sender::new(false),
+        })
+    }
+
+    pub(super) fn node(&self) -> NodeId {
+        *self.node.lock().expect("no test panics here")
+    }
+
+    async fn reached(&self) {
+        let mut cut_off = self.cut_off.subscribe();
+        (cut_off.wait_for(|cut_off| !cut_off).await).expect("the sender is here");
+    }
+
+    fn journal(
+        &self,
+        header: &Arc<GameHeader>,
+        epoch: Epoch,
+        rows: u64,
+        entries: Vec<Entry>,
+    ) -> Box<dyn Journal> {
+        Box::new(FakeJournal {
+            database: Arc::clone(&self.database),
+            header: Arc::clone(header),
+            epoch,
+            rows,
+            entries,
+            cut_off: self.cut_off.subscribe(),
+        })
+    }
+}
+
+struct FakeJournal {
+    database: Arc<Database>,
+    header: Arc<GameHeader>,
+    epoch: Epoch,
+    rows: u64,
+    entries: Vec<Entry>,
+    cut_off: watch::Receiver<bool>,
+}
+
+impl FakeJournal {
+    async fn reached(&mut self) {
+        if self.cut_off.wait_for(|cut_off| !cut_off).await.is_err() {
+            pending().await
+        }
+    }
+
+    fn written(&self, kept: Kept) -> Result<(), StoreError> {
+        match kept {
+            Kept::Kept => Ok(()),
+            Kept::Refused => Err(StoreError::Fenced(self.header.room_id)),
+        }
+    }
+}
+
+impl Journal for FakeJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            let row = Row::Game(entries.clone());
+            let room = self.header.room_id;
+            let kept = (self.database.tables()).append(room, self.epoch, self.rows, row);
+            self.written(kept)?;
+            self.rows += 1;
+            self.entries.append(entries);
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        async move { Ok(self.entries.clone()) }.boxed()
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            let room = self.header.room_id;
+            let kept = (self.database.tables()).finish(room, self.epoch, self.rows);
+            self.written(kept)?;
+            let finished = &self.database.finished;
+            let game = finished.create(Arc::clone(&self.header), self.entries.clone());
+            game.await?.finish(summary, signed).await
+        }
+        .boxed()
+    }
+}
+
+fn created(created: Created, id: Id) -> Result<(), StoreError> {
+    match created {
+        Created::Created => Ok(()),
+        Created::Taken => Err(StoreError::Taken(id)),
+        Created::Refused => Err(StoreError::Fenced(id)),
+    }
+}
+
+impl Store for FakeStore {
+    fn outlives_server(&self) -> bool {
+        true
+    }
+
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+        entries: Vec<Entry>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        async move {
+            self.reached().await;
+            let room = header.room_id;
+            let row = Row::Game(entries.clone());
+            let epoch = match header.tournament {
+                None => {
+                    let made = (self.database.tables()).create(room, self.node(), row);
+                    created(made, room)?;
+                    Epoch::FIRST
+                }
+                Some(game) => {
+                    let epochs = self.epochs.lock().expect("no test panics here");
+                    let epoch = epochs.get(&game.tournament).copied();
+                    let epoch = epoch.ok_or(StoreError::Fenced(room))?;
+                    let made =
+                        (self.database.tables()).create_in(game.tournament, epoch, room, row);
+                    created(made, room)?;
+                    epoch
+                }
+            };
+            let mut games = self.database.games.lock().expect("no test panics here");
+            games.insert(room, Arc::clone(&header));
+            Ok(self.journal(&header, epoch, 1, entries))
+        }
+        .boxed()
+    }
+
+    fn resumable_games(&self, _: u64) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+        unreachable!("a node resumes units")
+    }
+
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+        self.database.finished.finished(game)
+    }
+
+    fn list<'a>(
+        &'a self,
+        filter: &'a v1::RecordFilter,
+        part: Part,
+        count: usize,
+    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+        self.database.finished.list(filter, part, count)
+    }
+
+    fn import(
+        &self,
+        game: Id,
+        summary: v1::RecordSummary,
+        lines: Arc<[v1::RecordLine]>,
+    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+        self.database.finished.import(game, summary, lines)
+    }
+
+    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
+        self.database.finished.finished_games()
+    }
+
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.database.finished.without_record_file()
+    }
+
+    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.database.finished.mark_record_written(game)
+    }
+
+    fn create_tournament(
+        &self,
+        header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            let row = Row::Tournament(entries);
+            let made = (self.database.tables()).create(header.id, self.node(), row);
+            created(made, header.id)?;
+            let id = header.id;
+            let mut epochs = self.epochs.lock().expect("no test panics here");
+            epochs.insert(id, Epoch::FIRST);
+            let mut all = (self.database.tournaments.lock()).expect("no test panics here");
+            all.insert(id, Arc::unwrap_or_clone(header));
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn append_tournament(
+        &self,
+        tournament: Id,
+        row: u64,
+        entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            let fenced = StoreError::Fenced(tournament);
+            let epochs = self.epochs.lock().expect("no test panics here");
+            let epoch = *epochs.get(&tournament).ok_or(fenced.clone())?;
+            let ends = entries.iter().any(TournamentEntry::is_end);
+            let mut tables = self.database.tables();
+            let kept = tables.append(tournament, epoch, row, Row::Tournament(entries));
+            if kept == Kept::Kept && ends {
+                tables.finish(tournament, epoch, row + 1);
+            }
+            match kept {
+                Kept::Kept => Ok(()),
+                Kept::Refused => Err(fenced),
+            }
+        }
+        .boxed()
+    }
+
+    fn tournaments(
+        &self,
+        _newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
+        unreachable!("a node resumes units")
+    }
+
+    fn failed(&self) -> BoxFuture<'static, StoreError> {
+        pending().boxed()
+    }
+
+    fn close(&self) -> BoxFuture<'_, ()> {
+        async {}.boxed()
+    }
+}
+
+impl ClusterStore for FakeStore {
+    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
+        async move {
+            self.reached().await;
+            let node = self.database.tables().join(self.database.now_ms());
+            *self.node.lock().expect("no test panics here") = node;
+            let mut nodes = self.database.nodes.lock().expect("no test panics here");
+            nodes.insert(node, info);
+            Ok(node)
+        }
+        .boxed()
+    }
+
+    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+        async move {
+            self.reached().await;
+            let mut lost = self.beats_lost.subscribe();
+            (lost.wait_for(|lost| !lost).await).expect("the sender is here");
+            let mut tables = self.database.tables();
+            let node = self.node();
+            if !tables.beat(node, self.database.now_ms()) {
+                return Ok(None);
+            }
+            let drain = *self.database.drain.lock().expect("no test panics here");
+            Ok(Some(Beat {
+                owned: tables.owned_by(node),
+                drain: drain == Some(node),
+            }))
+        }
+        .boxed()
+    }
+
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
+        async move {
+            self.reached().await;
+            let now_ms = self.database.now_ms();
+            Ok(self.database.tables().orphans(now_ms, count))
+        }
+        .boxed()
+    }
+
+    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+        async move {
+            self.reached().await;
+            let games = self.database.games.lock().expect("no test panics here");
+            let restarted = |id| {
+                let at = Duration::ZERO;
+                let change = Change::ServerRestarted;
+                games
+                    .get(&id)
+                    .map(|_| Row::Game(vec![Entry { at, change }]))
+            };
+            let now_ms = self.database.now_ms();
+            let mut tables = self.database.tables();
+            Ok(tables.claim(unit, seen, self.node(), now_ms, restarted))
+        }
+        .boxed()
+    }
+
+    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
+        async move {
+            self.reached().await;
+            let tables = self.database.tables();
+            if tables.owner(unit) != Some(self.node()) || tables.epoch(unit) != Some(epoch) {
+                return Ok(None);
+            }
+            let (mut games, mut tournament) = (Vec::new(), None);
+            let headers = self.database.games.lock().expect("no test panics here");
+            for id in tables.open_items(unit) {
+                let journal = tables.journal(id);
+                let rows = journal.len() as u64;
+                if let Some(header) = headers.get(&id) {
+                    let entries = journal.iter().flat_map(|row| match &row.entries {
+                        Row::Game(entries) => entries.clone(),
+                        Row::Tournament(_) => Vec::new(),
+                    });
+                    let entries: Vec<_> = entries.collect();
+                    games.push(ResumableGame {
+                        header: GameHeader::clone(header),
+                        journal: self.journal(header, epoch, rows, entries.clone()),
+                        entries,
+                        concluded: false,
+                    });
+                    continue;
+                }
+                let mut epochs = self.epochs.lock().expect("no test panics here");
+                epochs.insert(id, epoch);
+                let entries = journal.iter().flat_map(|row| match &row.entries {
+                    Row::Tournament(entries) => entries.clone(),
+                    Row::Game(_) => Vec::new(),
+                });
+                let all = (self.database.tournaments.lock()).expect("no test panics here");
+                tournament = Some(StoredTournament {
+                    header: all[&id].clone(),
+                    entries: entries.collect(),
+                    rows,
+                });
+            }
+            Ok(Some(Unit { tournament, games }))
+        }
+        .boxed()
+    }
+
+    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            self.database.tables().release(unit, epoch);
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
+        async move {
+            self.reached().await;
+            self.database.tables().leave(self.node());
+            Ok(!self.database.knows(self.node()))
+        }
+        .boxed()
+    }
+
+    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+        async move {
+            let tables = self.database.tables();
+            let epoch = tables.epoch(id);
+            Ok(epoch.map(|epoch| Location {
+                id,
+                kind: Kind::Room,
+                unit: id,
+                node: tables.owner(id),
+                epoch,
+                over: false,
+            }))
+        }
+        .boxed()
+    }
+
+    fn locate_code<'a>(
+        &'a self,
+        _join_code: &'a str,
+    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>> {
+        async { Ok(None) }.boxed()
+    }
+
+    fn ended_room(&self, _: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        async { Ok(None) }.boxed()
+    }
+
+    fn tournament(&self, _: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
+        async { Ok(None) }.boxed()
+    }
+
+    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>> {
+        async move { Ok(self.database.tables().journal(id).len() as u64) }.boxed()
+    }
+
+    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
+        async { Ok(Vec::new()) }.boxed()
+    }
+
+    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>> {
+        async move {
+            self.database.ask_to_drain(node);
+            Ok(self.database.knows(node))
+        }
+        .boxed()
+    }
+}

@@ -1,0 +1,375 @@
+//! Two nodes on a database in memory, under tokio's paused clock: takeover, fencing, suspension and
+//! drain, of rooms and of a tournament.
+
+mod fake;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_cluster::LeaseTimes;
+use chefshat_engine::RuleSetSpec;
+use chefshat_proto::v1;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Fill, GameStart, ParticipantKind};
+use chefshat_room::policy::{Durability, Policy};
+use futures::FutureExt as _;
+use tokio::time::{Instant, sleep, timeout};
+use tokio_util::task::TaskTracker;
+
+use super::{ClusterNode, NodeLease, SingleServer};
+use crate::config::ServerConfig;
+use crate::convert;
+use crate::limits::Key;
+use crate::room::{Handle, JoinRequest, RoomGone};
+use crate::rooms::{NewRoom, Rooms};
+use crate::store::Store;
+use crate::store::cluster::{ClusterStore as _, NodeInfo};
+use crate::tournaments::{Entry, TournamentHandle, Tournaments};
+use fake::{Database, FakeStore};
+
+/// Longest time that anything takes, on the paused clock.
+const SOON: Duration = Duration::from_secs(60);
+
+/// A server without sockets.
+struct TestNode {
+    store: Arc<FakeStore>,
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    node: ClusterNode,
+}
+
+impl TestNode {
+    async fn start(database: &Arc<Database>) -> Self {
+        let store = FakeStore::new(database);
+        let tracker = TaskTracker::new();
+        let lease = Some(Arc::new(NodeLease::new()));
+        let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
+        let directory = Arc::new(SingleServer);
+        let config = ServerConfig::default();
+        let rooms = Rooms::of_node(&config, stored, directory, lease, tracker.clone());
+        let rooms = rooms.expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker);
+        let info = NodeInfo {
+            capacity: 1_000,
+            ..NodeInfo::default()
+        };
+        let id = store
+            .join(info.clone())
+            .await
+            .expect("the database is there");
+        let node = ClusterNode::start(
+            id,
+            info,
+            LeaseTimes::DEFAULT,
+            Duration::ZERO,
+            Arc::clone(&store) as Arc<dyn crate::store::cluster::ClusterStore>,
+            Arc::clone(&rooms),
+            Arc::clone(&tournaments),
+        );
+        let mut publishes = node.may_publish();
+        soon(publishes.wait_for(|it| *it)).await.expect("it runs");
+        Self {
+            store,
+            rooms,
+            tournaments,
+            node,
+        }
+    }
+
+    /// Creates a durable room for four.
+    async fn create_room(&self) -> Handle {
+        let made = self.rooms.create(NewRoom {
+            name: "a room".into(),
+            rules: RuleSetSpec::default().validate().expect("the standard"),
+            policy: Policy {
+                durability: Durability::Durable,
+                ..Policy::default()
+            },
+            fills: vec![Fill::Open { reserved_for: None }; 4],
+            display_names: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: None,
+            physical: false,
+            request: None,
+            charged: Key::Local,
+            seating: None,
+        });
+        made.await.expect("a room").handle
+    }
+
+    /// Waits until a room runs here.
+    async fn has(&self, room: Id) -> Handle {
+        let found = async {
+            loop {
+                match self.rooms.get(room) {
+                    Some(handle) => return handle,
+                    None => sleep(Duration::from_millis(10)).await,
+                }
+            }
+        };
+        soon(found).await
+    }
+
+    /// Waits until a room does not run here any more.
+    async fn loses(&self, room: Id) {
+        let lost = async {
+            while self.rooms.get(room).is_some() {
+                sleep(Duration::from_millis(10)).await;
+            }
+        };
+        soon(lost).await;
+    }
+
+    /// Waits until a tournament runs here.
+    async fn has_tournament(&self, id: Id) -> Arc<TournamentHandle> {
+        let found = async {
+            loop {
+                match self.tournaments.get(id) {
+                    Some(handle) => return handle,
+                    None => sleep(Duration::from_millis(10)).await,
+                }
+            }
+        };
+        soon(found).await
+    }
+}
+
+async fn soon<T>(future: impl Future<Output = T>) -> T {
+    timeout(SOON, future)
+        .await
+        .expect("it does not take that long")
+}
+
+/// Takes a seat. The answer says that this is committed.
+async fn join(room: &Handle, name: &str) -> Result<(), RoomGone> {
+    let request = JoinRequest {
+        name: name.into(),
+        kind: ParticipantKind::Agent,
+        seat: None,
+        request_id: None,
+        client: None,
+    };
+    room.join(request).await.map(|joined| {
+        joined.expect("a free seat");
+    })
+}
+
+/// The names on the seats of a room.
+async fn names(room: &Handle) -> Vec<String> {
+    let room = room.describe().await.expect("it runs");
+    let names = room.seats.into_iter().map(|seat| seat.name);
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_room_of_a_dead_node_continues_at_another() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    let id = room.id();
+    let died = Instant::now();
+    drop(first);
+
+    let room = second.has(id).await;
+    assert!(
+        died.elapsed() <= Duration::from_secs(10),
+        "{:?}",
+        died.elapsed()
+    );
+    assert_eq!(names(&room).await, ["Ada"]);
+    soon(join(&room, "Bo")).await.expect("it runs");
+    assert_eq!(database.seated(id), ["Ada", "Bo"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_returns_too_late_publishes_nothing() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let old = first.create_room().await;
+    let id = old.id();
+    first.store.cut_off.send_replace(true);
+    let late = tokio::spawn({
+        let old = old.clone();
+        async move { join(&old, "Ada").await }
+    });
+
+    let new = second.has(id).await;
+    soon(join(&new, "Bo")).await.expect("it runs");
+    // Its clients reconnect before it reaches the database again.
+    let late = soon(late).await.expect("no panic");
+    assert_eq!(late, Err(RoomGone));
+    first.store.cut_off.send_replace(false);
+    first.loses(id).await;
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    assert_eq!(database.seated(id), ["Bo"]);
+    assert_eq!(names(&new).await, ["Bo"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_fenced_room_stops_alone() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = FakeStore::new(&database);
+    let other = second.join(NodeInfo::default()).await.expect("it joins");
+    let (taken, kept) = (first.create_room().await, first.create_room().await);
+    database.take_away(taken.id(), other);
+
+    assert_eq!(soon(join(&taken, "Ada")).await, Err(RoomGone));
+    first.loses(taken.id()).await;
+    soon(join(&kept, "Bo")).await.expect("it runs");
+    assert_eq!(database.seated(taken.id()), [""; 0]);
+    assert_eq!(database.owner(kept.id()), Some(first.store.node()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_a_lease_nothing_is_published_until_it_is_back() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    let mut publishes = first.node.may_publish();
+    first.store.beats_lost.send_replace(true);
+    soon(publishes.wait_for(|it| !it)).await.expect("it runs");
+
+    let joining = join(&room, "Ada");
+    tokio::pin!(joining);
+    let mut committed = false;
+    while !committed {
+        assert_eq!(joining.as_mut().now_or_never(), None, "it is not published");
+        sleep(Duration::from_millis(1)).await;
+        committed = database.seated(room.id()) == ["Ada"];
+    }
+    for _ in 0..100 {
+        assert_eq!(joining.as_mut().now_or_never(), None, "it is not published");
+        sleep(Duration::from_millis(1)).await;
+    }
+    first.store.beats_lost.send_replace(false);
+    soon(joining).await.expect("the room continues");
+    assert_eq!(names(&room).await, ["Ada"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_database_that_was_away_for_long_ends_no_node() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    first.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    assert!(
+        first.rooms.get(room.id()).is_none(),
+        "its clients reconnect"
+    );
+    first.store.cut_off.send_replace(false);
+
+    let room = first.has(room.id()).await;
+    assert_eq!(names(&room).await, ["Ada"]);
+    soon(join(&room, "Bo")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_was_removed_joins_again() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    let before = first.store.node();
+    first.store.cut_off.send_replace(true);
+    second.has(room).await;
+    database.remove_expired();
+    assert!(!database.knows(before));
+    first.store.cut_off.send_replace(false);
+
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    assert_ne!(first.store.node(), before);
+    let created = first.create_room().await.id();
+    assert_eq!(database.owner(created), Some(first.store.node()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drained_node_hands_over_and_leaves() {
+    let database = Database::new();
+    let mut first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let mut rooms = Vec::new();
+    for _ in 0..20 {
+        let room = first.create_room().await;
+        soon(join(&room, "Ada")).await.expect("it runs");
+        rooms.push(room);
+    }
+    let began = Instant::now();
+    database.ask_to_drain(first.store.node());
+    soon(first.node.asked_to_drain()).await;
+    first.rooms.refuse_new();
+    soon(first.node.drain()).await;
+
+    assert!(!database.knows(first.store.node()), "it has left");
+    for old in rooms {
+        assert_eq!(old.describe().await.err(), Some(RoomGone));
+        let new = second.has(old.id()).await;
+        assert_eq!(names(&new).await, ["Ada"]);
+        soon(join(&new, "Bo")).await.expect("it runs");
+    }
+    // No lease had to expire, as it would have after 8 s.
+    assert!(
+        began.elapsed() < Duration::from_secs(6),
+        "{:?}",
+        began.elapsed()
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_tournament_changes_hands_with_its_rooms() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let settings = v1::TournamentSettings {
+        format: v1::TournamentFormat::Swiss.into(),
+        rounds: 1,
+        physical_tables: 1,
+        ..Default::default()
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let made = (first.tournaments).create("Coppa", plan, None, Key::Local);
+    let (old, _) = made.await.expect("made");
+    for name in ["Ada", "Bo", "Cy", "Di"] {
+        let entry = Entry {
+            name: name.into(),
+            kind: ParticipantKind::Human,
+            max_games: 1,
+            stateless: false,
+            at_table: true,
+            request_id: None,
+        };
+        soon(old.join(entry))
+            .await
+            .expect("it runs")
+            .expect("joined");
+    }
+    soon(old.begin()).await.expect("it runs").expect("begun");
+    let playing = async {
+        while first.rooms.open_count() == 0 {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(playing).await;
+    let room = first.rooms.newest(None, None, 1)[0].1.id();
+    first.store.cut_off.send_replace(true);
+
+    let new = second.has_tournament(old.id()).await;
+    assert_eq!(new.describe().participants.len(), 4);
+    let taken = second.has(room).await;
+    assert_eq!(names(&taken).await.len(), 4);
+    first.store.cut_off.send_replace(false);
+    first.loses(room).await;
+    assert!(first.tournaments.get(old.id()).is_none());
+    assert_eq!(second.rooms.open_count(), 1, "no game is played twice");
+}

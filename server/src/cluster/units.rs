@@ -1,0 +1,124 @@
+//! The units that a node runs: resumes, stops and suspends their rooms and tournaments.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use tracing::{info, warn};
+
+use crate::rooms::Rooms;
+use crate::store::StoreError;
+use crate::store::cluster::{ClusterStore, Epoch};
+use crate::tournaments::Tournaments;
+use chefshat_room::ids::Id;
+use tokio::time::{Duration, sleep, timeout};
+
+/// Pause before a unit that could not be read is read again.
+const RETRY: Duration = Duration::from_secs(1);
+
+/// The units of a node. What is done with one unit is done one after another, by the caller.
+pub(super) struct Units {
+    store: Arc<dyn ClusterStore>,
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    /// How long ephemeral games may continue when the node hands over.
+    grace: Duration,
+    /// The units that are to run here, with their epochs.
+    wanted: Mutex<BTreeMap<Id, Epoch>>,
+}
+
+impl Units {
+    pub(super) fn new(
+        store: Arc<dyn ClusterStore>,
+        rooms: Arc<Rooms>,
+        tournaments: Arc<Tournaments>,
+        grace: Duration,
+    ) -> Self {
+        Self {
+            grace,
+            store,
+            rooms,
+            tournaments,
+            wanted: Mutex::default(),
+        }
+    }
+
+    /// From here on, a unit is to run here at this epoch.
+    pub(super) fn want(&self, unit: Id, epoch: Epoch) {
+        self.wanted().insert(unit, epoch);
+    }
+
+    /// From here on, a unit is not to run here.
+    pub(super) fn unwant(&self, unit: Id) {
+        self.wanted().remove(&unit);
+    }
+
+    /// Prevents a unit from publishing anything from here on. It ends with [`Units::stop`].
+    pub(super) fn fence(&self, unit: Id) {
+        self.unwant(unit);
+        self.tournaments.fence(unit);
+        self.rooms.fence_unit(unit);
+    }
+
+    fn wanted(&self) -> MutexGuard<'_, BTreeMap<Id, Epoch>> {
+        (self.wanted.lock()).expect("nothing panics under this lock")
+    }
+
+    /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
+    /// database cannot be read.
+    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) {
+        // It was created here, and its node learns of it from its beat.
+        let is_new = epoch == Epoch::FIRST;
+        if is_new && (self.rooms.runs(unit) || self.tournaments.runs(unit)) {
+            return;
+        }
+        self.stop(unit).await;
+        while self.wanted().get(&unit) == Some(&epoch) {
+            match self.load(unit, epoch).await {
+                Ok(()) => return,
+                Err(error) => {
+                    warn!(%unit, %error, "a room or tournament cannot be read; trying again");
+                    sleep(RETRY).await;
+                }
+            }
+        }
+    }
+
+    async fn load(&self, unit: Id, epoch: Epoch) -> Result<(), StoreError> {
+        let Some(loaded) = self.store.load(unit, epoch).await? else {
+            return Ok(());
+        };
+        let games = self.rooms.resume_all(loaded.games).await;
+        if let Some(tournament) = loaded.tournament {
+            self.tournaments.resume(tournament);
+        }
+        info!(%unit, epoch = epoch.0, games, "taken over");
+        Ok(())
+    }
+
+    /// Ends everything of a unit that runs here.
+    pub(super) async fn stop(&self, unit: Id) {
+        self.tournaments.stop_one(unit).await;
+        self.rooms.stop_unit(unit).await;
+    }
+
+    /// Waits until a unit is not an ephemeral room in which a game is running, or for the grace: no
+    /// other node can resume it.
+    pub(super) async fn until_ephemeral_over(&self, unit: Id) {
+        // If it is not over in time, it is ended.
+        let _ = timeout(self.grace, self.rooms.until_ephemeral_over(unit)).await;
+    }
+
+    /// Ends everything of a unit after its next commits, and gives it up. Returns whether the
+    /// database knows.
+    pub(super) async fn release(&self, unit: Id, epoch: Epoch) -> bool {
+        self.tournaments.stop_one(unit).await;
+        self.rooms.suspend_unit(unit).await;
+        match self.store.release(unit, epoch).await {
+            Ok(()) => true,
+            Err(error) => {
+                warn!(%unit, %error, "a room or tournament cannot be released");
+                false
+            }
+        }
+    }
+}
