@@ -66,6 +66,8 @@ impl Default for RoomKind {
 pub struct BusyRooms {
     /// What they received.
     pub ledger: Arc<Ledger>,
+    /// How many decisions of each room have been acknowledged, over all its games.
+    progress: Arc<watch::Sender<Vec<u64>>>,
     leaving: watch::Sender<bool>,
     rooms: JoinSet<Vec<String>>,
 }
@@ -73,22 +75,51 @@ pub struct BusyRooms {
 impl BusyRooms {
     /// Starts a room for each habit, on the server with this URL, which may be down at times.
     pub fn start(url: &str, kinds: Vec<RoomKind>) -> Self {
+        Self::start_apart(url, url, kinds)
+    }
+
+    /// Starts a room for each habit, which is opened at one URL and played at another.
+    pub fn start_apart(opened_at: &str, played_at: &str, kinds: Vec<RoomKind>) -> Self {
         let ledger = Arc::new(Ledger::default());
+        let progress = Arc::new(watch::Sender::new(vec![0; kinds.len()]));
         let leaving = watch::Sender::new(false);
         let mut rooms = JoinSet::new();
-        for (kind, number) in kinds.into_iter().zip(0..) {
+        for (number, kind) in kinds.into_iter().enumerate() {
             let room = Room {
-                url: url.to_owned(),
+                opened_at: opened_at.to_owned(),
+                played_at: played_at.to_owned(),
                 kind,
                 ledger: Arc::clone(&ledger),
-                random: SmallRng::seed_from_u64(number),
+                number,
+                progress: Arc::clone(&progress),
+                random: SmallRng::seed_from_u64(number as u64),
             };
             rooms.spawn(room.always_play(leaving.subscribe()));
         }
         Self {
             ledger,
+            progress,
             leaving,
             rooms,
+        }
+    }
+
+    /// How many decisions of each room have been acknowledged so far, over all its games.
+    pub fn progress(&self) -> watch::Receiver<Vec<u64>> {
+        self.progress.subscribe()
+    }
+
+    /// Waits until at least one more decision of every room has been acknowledged.
+    pub async fn all_go_on(&self) {
+        let mut progress = self.progress();
+        let before = progress.borrow_and_update().clone();
+        let went_on = |now: &Vec<u64>| now.iter().zip(&before).all(|(now, before)| now > before);
+        if tokio::time::timeout(PATIENCE, progress.wait_for(went_on))
+            .await
+            .is_err()
+        {
+            let now = self.progress.borrow();
+            panic!("rooms stand still: {before:?} decisions became {now:?}");
         }
     }
 
@@ -103,19 +134,23 @@ impl BusyRooms {
 }
 
 struct Room {
-    url: String,
+    opened_at: String,
+    played_at: String,
     kind: RoomKind,
     ledger: Arc<Ledger>,
+    number: usize,
+    progress: Arc<watch::Sender<Vec<u64>>>,
     random: SmallRng,
 }
 
 impl Room {
     async fn always_play(mut self, leaving: watch::Receiver<bool>) -> Vec<String> {
-        let url = self.url.clone();
-        let client = again("connecting", || Client::connect(url.clone())).await;
+        let connect = async |url: &str| again("connecting", || Client::connect(url)).await;
+        let host = connect(&self.opened_at).await;
+        let client = connect(&self.played_at).await;
         let mut games = Vec::new();
         while !*leaving.borrow() {
-            let Some((game, tickets)) = self.open(&client).await else {
+            let Some((game, tickets)) = self.open(&host).await else {
                 continue;
             };
             for outcome in self.play(&client, tickets).await {
@@ -188,6 +223,8 @@ impl Room {
             let agent = Paced {
                 agent: RandomAgent::new(self.random.random()),
                 pace: self.kind.pace,
+                room: self.number,
+                progress: Arc::clone(&self.progress),
                 random: SmallRng::seed_from_u64(self.random.random()),
             };
             seats.push((ticket, self.ledger.wrap(agent)));
@@ -228,10 +265,12 @@ where
     patiently(what, reaching).await
 }
 
-/// An agent that takes some time to decide.
+/// An agent that takes some time to decide, and whose decisions are counted.
 struct Paced<A> {
     agent: A,
     pace: Duration,
+    room: usize,
+    progress: Arc<watch::Sender<Vec<u64>>>,
     random: SmallRng,
 }
 
@@ -244,5 +283,10 @@ impl<A: Agent> Agent for Paced<A> {
 
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.agent.on_event(event);
+    }
+
+    fn on_result(&mut self, result: &v1::AnswerResult) {
+        self.agent.on_result(result);
+        self.progress.send_modify(|rooms| rooms[self.room] += 1);
     }
 }

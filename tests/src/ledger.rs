@@ -2,10 +2,12 @@
 //! server has stored.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use chefshat_client::{ActionId, Agent, Outcome};
-use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use tokio::sync::watch;
 
 /// A decision: its game, its seat, its number.
@@ -16,6 +18,10 @@ type Key = (String, u32, u64);
 pub struct Ledger {
     sent: Mutex<BTreeMap<Key, u32>>,
     accepted: Mutex<BTreeMap<Key, u32>>,
+    /// When an answer was acknowledged, and after which time.
+    times: Mutex<BTreeMap<Key, (Instant, Duration)>>,
+    /// By game, seat and number.
+    received: Mutex<BTreeMap<Key, v1::GameEvent>>,
     unexpected: Mutex<Vec<String>>,
     count: watch::Sender<u64>,
 }
@@ -27,6 +33,7 @@ impl Ledger {
             agent,
             game: String::new(),
             seat: 0,
+            sent_at: Instant::now(),
             ledger: Arc::clone(self),
         }
     }
@@ -45,6 +52,19 @@ impl Ledger {
             .expect("the ledger holds the sender");
     }
 
+    /// When the decisions of a game were acknowledged, and after which time each, in the order of
+    /// the seats.
+    pub fn times(&self, game: &str) -> Vec<(Instant, Duration)> {
+        let times = self.times.lock().expect("no panic");
+        times.range(all_of(game)).map(|(_, times)| *times).collect()
+    }
+
+    /// The games of which decisions have been acknowledged.
+    pub fn games(&self) -> BTreeSet<String> {
+        let accepted = self.accepted.lock().expect("no panic");
+        accepted.keys().map(|(game, ..)| game.clone()).collect()
+    }
+
     /// Records something that must not happen.
     pub fn unexpected(&self, what: String) {
         self.unexpected.lock().expect("no panic").push(what);
@@ -60,15 +80,15 @@ impl Ledger {
     }
 
     /// Compares the record of a game with the clients' knowledge: it contains every acknowledged
-    /// decision once, unchanged, and every decision it attributes to their agents was taken by one.
-    /// Returns the number of acknowledged decisions. every decision that it says an agent of theirs
-    /// took is one that the agent took. Gives the number of acknowledged decisions.
+    /// decision once, unchanged, every decision it attributes to their agents was taken by one, and
+    /// every event that they received. Returns the number of acknowledged decisions.
     ///
     /// # Panics
     /// At the first difference.
     pub fn assert_committed(&self, game: &str, record: &[v1::RecordLine]) -> usize {
         let sent = self.sent.lock().expect("no panic");
         let accepted = self.accepted.lock().expect("no panic");
+        self.assert_received(game, record);
         let mut found = BTreeSet::new();
         let mut acknowledged = 0;
         for line in record {
@@ -95,6 +115,46 @@ impl Ledger {
         assert_eq!(lost, None, "an acknowledged decision is lost");
         acknowledged
     }
+
+    /// Checks that what the agents of a game received is in its record.
+    fn assert_received(&self, game: &str, record: &[v1::RecordLine]) {
+        let received = self.received.lock().expect("no panic");
+        let recorded: BTreeMap<u64, &v1::GameEvent> = (record.iter())
+            .filter_map(|line| match &line.line {
+                Some(Line::Event(event)) => Some((event.sequence, event)),
+                _ => None,
+            })
+            .collect();
+        for ((_, seat, number), event) in received.range(all_of(game)) {
+            let recorded = recorded.get(number).map(|event| as_seen_by(event, *seat));
+            assert_eq!(
+                recorded.as_ref(),
+                Some(event),
+                "what seat {seat} of {game} received is not in the record"
+            );
+        }
+    }
+}
+
+/// The keys of a game.
+fn all_of(game: &str) -> RangeInclusive<Key> {
+    (game.to_owned(), 0, 0)..=(game.to_owned(), u32::MAX, u64::MAX)
+}
+
+/// An event of a record as a seat receives it.
+fn as_seen_by(event: &v1::GameEvent, seat: u32) -> v1::GameEvent {
+    let mut event = event.clone();
+    event.rewards.retain(|reward| reward.seat == seat);
+    match &mut event.kind {
+        Some(Kind::ShiftStarted(started)) => started.hands.retain(|hand| hand.seat == seat),
+        Some(Kind::CardsExchanged(exchanged))
+            if ![exchanged.giver, exchanged.receiver].contains(&seat) =>
+        {
+            exchanged.cards.clear();
+        }
+        _ => {}
+    }
+    event
 }
 
 /// An agent whose answers and acknowledgements are recorded.
@@ -103,6 +163,7 @@ pub struct Recorded<A> {
     agent: A,
     game: String,
     seat: u32,
+    sent_at: Instant,
     ledger: Arc<Ledger>,
 }
 
@@ -124,6 +185,7 @@ impl<A: Agent> Agent for Recorded<A> {
             self.ledger
                 .unexpected(format!("{key:?} was requested twice"));
         }
+        self.sent_at = Instant::now();
         action
     }
 
@@ -139,6 +201,14 @@ impl<A: Agent> Agent for Recorded<A> {
 
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.agent.on_event(event);
+        let key = self.key(event.sequence);
+        let mut received = self.ledger.received.lock().expect("no panic");
+        let before = received.insert(key.clone(), event.clone());
+        drop(received);
+        if before.is_some_and(|before| before != *event) {
+            let unexpected = format!("event {key:?} was received in two forms");
+            self.ledger.unexpected(unexpected);
+        }
     }
 
     fn on_result(&mut self, result: &v1::AnswerResult) {
@@ -151,6 +221,10 @@ impl<A: Agent> Agent for Recorded<A> {
         let mut accepted = self.ledger.accepted.lock().expect("no panic");
         let before = accepted.insert(key.clone(), result.action);
         drop(accepted);
+        let now = Instant::now();
+        let mut times = self.ledger.times.lock().expect("no panic");
+        (times.entry(key.clone())).or_insert((now, now - self.sent_at));
+        drop(times);
         match before {
             None => self.ledger.count.send_modify(|count| *count += 1),
             Some(action) if action == result.action => {}

@@ -10,16 +10,20 @@ pub struct Readme;
 mod busy_rooms;
 mod disk;
 mod ledger;
+mod link;
 mod nodes;
 mod process;
+mod scores;
 mod seat;
 mod server;
 
 pub use busy_rooms::{BusyRooms, RoomKind};
 pub use disk::{SmallDisk, skip};
 pub use ledger::{Ledger, Recorded};
-pub use nodes::{Link, TestNode, TestNodes};
+pub use link::{Held, Link, Way};
+pub use nodes::{TestNode, TestNodes};
 pub use process::{Ended, Launch, Process, own_address, set_up};
+pub use scores::scores;
 pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
 pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
 

@@ -4,8 +4,7 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -20,15 +19,10 @@ use chefshat_server::store::MemoryStore;
 use chefshat_server::tls::TlsFiles;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Notify, mpsc};
 use tokio::task::JoinHandle;
-use tokio::time::Instant;
 use tokio_util::sync::{CancellationToken, DropGuard};
 
-/// Bytes that a link reads at a time.
-const LINK_BUFFER: usize = 16 * 1024;
+use crate::link::{Link, listen};
 
 /// Where rooms and tournaments are, for all nodes.
 #[derive(Debug, Default)]
@@ -221,112 +215,5 @@ impl TestNodes {
         let id = &created.room.as_ref().expect("a room").room_id;
         self.place(node, id, &created.join_code);
         created
-    }
-}
-
-async fn listen() -> TcpListener {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
-    listener.expect("a free port")
-}
-
-/// A way over TCP that can delay and break.
-#[derive(Debug)]
-pub struct Link {
-    address: SocketAddr,
-    delay_us: Arc<AtomicU64>,
-    cut: Arc<Notify>,
-    accepting: JoinHandle<()>,
-}
-
-impl Link {
-    async fn to(target: SocketAddr) -> Self {
-        let listener = listen().await;
-        let address = listener.local_addr().expect("it is bound");
-        let (delay_us, cut) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
-        let accepting = {
-            let (delay_us, cut) = (Arc::clone(&delay_us), Arc::clone(&cut));
-            async move {
-                while let Ok((near, _)) = listener.accept().await {
-                    let (delay_us, cut) = (Arc::clone(&delay_us), Arc::clone(&cut));
-                    tokio::spawn(async move {
-                        // Asked first, so that no cut is missed.
-                        let cut = cut.notified();
-                        let Ok(far) = TcpStream::connect(target).await else {
-                            return;
-                        };
-                        let _ = (near.set_nodelay(true), far.set_nodelay(true));
-                        let (near_read, near_write) = near.into_split();
-                        let (far_read, far_write) = far.into_split();
-                        tokio::select! {
-                            () = cut => {}
-                            _ = carry(near_read, far_write, &delay_us) => {}
-                            _ = carry(far_read, near_write, &delay_us) => {}
-                        }
-                    });
-                }
-            }
-        };
-        Self {
-            address,
-            delay_us,
-            cut,
-            accepting: tokio::spawn(accepting),
-        }
-    }
-
-    /// Delays everything in both directions from now on.
-    pub fn delay(&self, delay: Duration) {
-        let micros = u64::try_from(delay.as_micros()).expect("short");
-        self.delay_us.store(micros, Ordering::Relaxed);
-    }
-
-    /// Breaks the connections. New ones are possible.
-    pub fn cut(&self) {
-        self.cut.notify_waiters();
-    }
-}
-
-impl Link {
-    /// Breaks the connections, and refuses new ones.
-    pub fn close(&self) {
-        self.accepting.abort();
-        self.cut();
-    }
-}
-
-impl Drop for Link {
-    fn drop(&mut self) {
-        self.close();
-    }
-}
-
-/// Carries what arrives, each part after its delay, in order.
-async fn carry(
-    mut from: tokio::net::tcp::OwnedReadHalf,
-    mut to: tokio::net::tcp::OwnedWriteHalf,
-    delay_us: &AtomicU64,
-) -> io::Result<()> {
-    let (sender, mut receiver) = mpsc::unbounded_channel::<(Instant, Vec<u8>)>();
-    let reading = async {
-        let mut buffer = vec![0; LINK_BUFFER];
-        loop {
-            let count = from.read(&mut buffer).await?;
-            if count == 0 {
-                return Ok(());
-            }
-            let delay = Duration::from_micros(delay_us.load(Ordering::Relaxed));
-            let _ = sender.send((Instant::now() + delay, buffer[..count].to_vec()));
-        }
-    };
-    let writing = async {
-        while let Some((due, bytes)) = receiver.recv().await {
-            tokio::time::sleep_until(due).await;
-            to.write_all(&bytes).await?;
-        }
-        Ok(())
-    };
-    tokio::select! {
-        ended = reading => ended,
-        ended = writing => ended,
     }
 }

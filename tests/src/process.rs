@@ -174,9 +174,23 @@ impl Process {
 
     /// Sends SIGTERM.
     pub async fn request_stop(&self) {
+        self.send("-TERM").await;
+    }
+
+    /// Stops it in the middle of whatever it does, until it is thawed.
+    pub async fn freeze(&self) {
+        self.send("-STOP").await;
+    }
+
+    /// Lets a frozen process go on.
+    pub async fn thaw(&self) {
+        self.send("-CONT").await;
+    }
+
+    async fn send(&self, signal: &str) {
         let id = self.id().to_string();
-        let asked = Command::new("kill").args(["-TERM", &id]).status().await;
-        assert!(asked.expect("kill runs").success());
+        let sent = Command::new("kill").args([signal, &id]).status().await;
+        assert!(sent.expect("kill runs").success());
     }
 
     /// Sends SIGTERM and waits until it has exited.

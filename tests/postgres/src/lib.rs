@@ -23,24 +23,24 @@ const USER: &str = "chefshat";
 const NOBODY: u32 = 65_534;
 /// How long a server may take to start or stop.
 const LIMIT: Duration = Duration::from_secs(60);
-/// Nothing here is to survive a crash of the machine.
-const SETTINGS: [&str; 6] = [
-    "fsync=off",
-    "full_page_writes=off",
+/// The settings of a server of which nothing is to survive a crash of the machine.
+const FAST: &[&str] = &["fsync=off", "full_page_writes=off"];
+/// The settings of every server.
+const SETTINGS: [&str; 4] = [
     "listen_addresses=127.0.0.1",
     "max_connections=200",
     "shared_buffers=32MB",
     "unix_socket_directories=",
 ];
-/// Runs a server until a line or the end of the input arrives. It ends when the test's process ends,
-/// in whatever way; then the folder is removed too.
+/// Runs a server until a line with a signal or the end of the input arrives. It ends when the
+/// test's process ends, in whatever way; then the folder is removed too.
 const KEEPER: &str = r#"
 "$1" -D "$2/data" &
 server=$!
-read -r stop
-kill -QUIT $server
+read -r signal
+kill -"${signal:-QUIT}" $server
 wait $server
-[ -n "$stop" ] || rm -rf "$2"
+[ -n "$signal" ] || rm -rf "$2"
 "#;
 
 /// A server.
@@ -49,6 +49,7 @@ pub struct Server {
     folder: TempDir,
     programs: PathBuf,
     port: u16,
+    settings: &'static [&'static str],
     keeper: Option<Child>,
 }
 
@@ -74,6 +75,18 @@ impl Server {
     /// # Panics
     /// If PostgreSQL is missing or does not start.
     pub fn start() -> Self {
+        Self::with(FAST)
+    }
+
+    /// Starts a new server that syncs what it commits, for measurements.
+    ///
+    /// # Panics
+    /// If PostgreSQL is missing or does not start.
+    pub fn syncing() -> Self {
+        Self::with(&[])
+    }
+
+    fn with(settings: &'static [&'static str]) -> Self {
         let programs = programs().expect(
             "the tests need PostgreSQL: install it, for example with `apt-get install postgresql`",
         );
@@ -88,6 +101,7 @@ impl Server {
             port: free_port(),
             programs,
             folder,
+            settings,
             keeper: None,
         };
         let data = server.data();
@@ -132,10 +146,19 @@ impl Server {
 
     /// Ends the server at once, as a crash does.
     pub fn stop(&mut self) {
+        self.end("QUIT");
+    }
+
+    /// Ends the server as an administrator does: it ends all connections first.
+    pub fn shut_down(&mut self) {
+        self.end("INT");
+    }
+
+    fn end(&mut self, signal: &str) {
         if let Some(mut keeper) = self.keeper.take() {
             if let Some(mut input) = keeper.stdin.take() {
                 // If it has ended already, so has the server.
-                let _ = input.write_all(b"stop\n");
+                let _ = writeln!(input, "{signal}");
             }
             let _ = keeper.wait();
         }
@@ -147,7 +170,7 @@ impl Server {
     /// If it does not start.
     pub fn resume(&mut self) {
         let deadline = Instant::now() + LIMIT;
-        let settings: String = (SETTINGS.iter())
+        let settings: String = (SETTINGS.iter().chain(self.settings))
             .map(|setting| {
                 format!("{setting}\n")
                     .replacen('=', " = '", 1)
@@ -280,6 +303,11 @@ mod tests {
         assert!(!server.is_ready());
         server.resume();
         assert_eq!(first.run("SELECT name FROM dishes"), "pizza");
+        first.run("INSERT INTO dishes VALUES ('gelato')");
+        server.shut_down();
+        assert!(!server.is_ready());
+        server.resume();
+        assert_eq!(first.run("SELECT count(*) FROM dishes"), "2");
     }
 
     #[test]

@@ -2,17 +2,16 @@
 //! crashes, one that is silent, one that floods, one that never joins its games; and a server that
 //! is killed twice in the middle.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::collections::BTreeSet;
 use std::process::Stdio;
 use std::time::Duration;
 
 use chefshat_client::{Backoff, Client, Outcome, PlayError, PlayOptions, RandomAgent};
 use chefshat_proto::v1::{
-    self, Answer, game_event::Kind, play_service_client::PlayServiceClient, record_line::Line,
+    self, Answer, play_service_client::PlayServiceClient, record_line::Line,
     seat_command::Command as SeatDoes,
 };
-use chefshat_tests::{Launch, PATIENCE, one_shift, patiently, set_up};
+use chefshat_tests::{Launch, PATIENCE, one_shift, patiently, scores, set_up};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
@@ -225,46 +224,6 @@ async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
     patiently("the middle", reached).await;
 }
 
-/// Places by seat of a finished game, from nothing but its record.
-fn places(lines: &[v1::RecordLine]) -> BTreeMap<u32, u32> {
-    let events = lines.iter().filter_map(|line| match &line.line {
-        Some(Line::Event(event)) => event.kind.as_ref(),
-        _ => None,
-    });
-    let mut ends = events.filter_map(|kind| match kind {
-        Kind::GameEnded(ended) => Some(&ended.standings),
-        _ => None,
-    });
-    let standings = ends.next().expect("the game ended");
-    assert!(ends.next().is_none(), "only once");
-    let placed = standings
-        .iter()
-        .map(|standing| (standing.seat, standing.place));
-    placed.collect()
-}
-
-/// The score of every participant, from nothing but the records of the games.
-fn scores(data: &Path, games: &[v1::TournamentGame]) -> BTreeMap<u32, u64> {
-    let mut scores = BTreeMap::new();
-    for game in games {
-        let path = chefshat_record::jsonl::path_of(data, &game.game_id);
-        let lines = chefshat_record::jsonl::read(&path).expect("a record file");
-        chefshat_record::replay::replay(&lines).expect("a valid record");
-        let mut placed: Vec<(bool, u32, u32)> = (places(&lines).into_iter())
-            .map(|(seat, place)| {
-                let line = &game.seats[seat as usize];
-                (line.forfeited, place, line.participant)
-            })
-            .collect();
-        // Participants who were present are placed before absent ones, in the order of the game.
-        placed.sort_unstable();
-        for ((forfeited, _, participant), score) in placed.into_iter().zip([5, 3, 1, 0]) {
-            *scores.entry(participant).or_default() += if forfeited { 0 } else { score };
-        }
-    }
-    scores
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_tournament_of_sixteen_resumes_after_sigkill_and_counts_every_game_once() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -344,7 +303,14 @@ async fn a_tournament_of_sixteen_resumes_after_sigkill_and_counts_every_game_onc
 
     let results = client.tournament_results(&id).await.expect("results");
     let participants = &results.tournament.as_ref().expect("it").participants;
-    let scores = scores(folder.path(), &games);
+    let with_records: Vec<_> = (games.iter())
+        .map(|game| {
+            let path = chefshat_record::jsonl::path_of(folder.path(), &game.game_id);
+            let lines = chefshat_record::jsonl::read(&path).expect("a record file");
+            (game.clone(), lines)
+        })
+        .collect();
+    let scores = scores(&with_records);
     assert_eq!(results.standings.len(), PARTICIPANTS as usize);
     for standing in &results.standings {
         assert_eq!(standing.score, scores[&standing.participant]);

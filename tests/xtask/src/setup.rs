@@ -182,12 +182,18 @@ pub(crate) fn proxies() -> Result<(), Failure> {
     if !succeeds("openssl", &["version"]) {
         debian_package("openssl")?;
     }
-    for name in ["nginx", "haproxy"] {
-        if !succeeds(format!("/usr/sbin/{name}"), &["-v"]) {
-            debian_package(name)?;
-        }
+    if !succeeds("/usr/sbin/nginx", &["-v"]) {
+        debian_package("nginx")?;
     }
-    Ok(())
+    haproxy()
+}
+
+/// HAProxy, which spreads clients over the nodes of a cluster in tests.
+pub(crate) fn haproxy() -> Result<(), Failure> {
+    if succeeds("/usr/sbin/haproxy", &["-v"]) {
+        return Ok(());
+    }
+    debian_package("haproxy")
 }
 
 /// Builds images, and the systems they are based on.

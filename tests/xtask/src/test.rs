@@ -76,6 +76,7 @@ pub(crate) fn run(
     let mut tests = Vec::new();
     if wants(Part::Rust) {
         steps.run("PostgreSQL", setup::postgresql)?;
+        steps.run("HAProxy", setup::haproxy)?;
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
