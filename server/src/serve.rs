@@ -340,7 +340,7 @@ impl Server {
                         .max_concurrent_streams(None)
                         .initial_stream_window_size(STREAM_WINDOW)
                         .initial_connection_window_size(CONNECTION_WINDOW)
-                        .layer(MapRequestLayer::new(without_address))
+                        .layer(MapRequestLayer::new(from_peer))
                         .layer(ForwardedLayer::new(TrustedProxies::new([
                             TrustedProxy::UnixSocket,
                         ])))
@@ -464,9 +464,11 @@ async fn follow_lease(
     }
 }
 
-/// A request of another node, without that node's address: it names the client's, if it has one.
-fn without_address(mut request: http::Request<Body>) -> http::Request<Body> {
+/// Marks a request of another node, and removes that node's address: it names the client's, if it
+/// has one.
+fn from_peer(mut request: http::Request<Body>) -> http::Request<Body> {
     request.extensions_mut().remove::<TcpConnectInfo>();
+    request.extensions_mut().insert(grpc::FromPeer);
     request
 }
 

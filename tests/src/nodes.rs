@@ -56,6 +56,16 @@ impl View {
 }
 
 impl Directory for View {
+    fn node(&self) -> &str {
+        &self.peers[self.node].node
+    }
+
+    fn peers(&self) -> BoxFuture<'_, Vec<Peer>> {
+        let others = (self.peers.iter().enumerate()).filter(|(number, _)| *number != self.node);
+        let others: Vec<_> = others.map(|(_, peer)| peer.clone()).collect();
+        ready(others).boxed()
+    }
+
     fn locate(&self, id: Id) -> BoxFuture<'_, Location> {
         let places = self.places.lock().expect("nothing panics under this lock");
         let stale = places.stale.get(&(self.node, id)).map(|(node, _)| *node);

@@ -54,6 +54,16 @@ pub enum FoundBy {
 /// is not the owner any more says so, and is then forgotten. That nobody has something is never
 /// remembered.
 pub trait Directory: Send + Sync + 'static {
+    /// The name of this node.
+    fn node(&self) -> &str {
+        ""
+    }
+
+    /// The other nodes that are alive.
+    fn peers(&self) -> BoxFuture<'_, Vec<Peer>> {
+        ready(Vec::new()).boxed()
+    }
+
     /// The location of a room or tournament that is not in memory.
     fn locate(&self, id: Id) -> BoxFuture<'_, Location>;
 

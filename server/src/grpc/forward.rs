@@ -18,6 +18,7 @@ use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
 use http_body::{Frame, SizeHint};
 use tonic::Status;
 use tonic::body::Body;
+use tonic::metadata::MetadataMap;
 use tower::{Layer, Service, ServiceExt as _};
 use tracing::debug;
 
@@ -63,8 +64,11 @@ fn passed_headers<B>(request: &Request<B>) -> HeaderMap {
     passed
 }
 
-/// What the stream of a client needs to reach its seats at other nodes, in the extensions of its
-/// request.
+/// In the extensions of requests of other nodes.
+#[derive(Debug, Clone, Copy)]
+pub struct FromPeer;
+
+/// What a call needs to ask other nodes itself, in the extensions of its request.
 #[derive(Clone)]
 pub(super) struct Gateway {
     layer: ForwardLayer,
@@ -82,9 +86,15 @@ impl Gateway {
         &self.layer.directory
     }
 
-    /// The headers with which the client's stream is continued at other nodes.
-    pub(super) fn headers(&self) -> &HeaderMap {
-        &self.headers
+    /// A request to another node, for the client of this one.
+    pub(super) fn request<T>(&self, message: T) -> tonic::Request<T> {
+        let mut headers = self.headers.clone();
+        for own in [header::CONTENT_TYPE, header::TE, header::USER_AGENT] {
+            headers.remove(own);
+        }
+        let mut request = tonic::Request::new(message);
+        *request.metadata_mut() = MetadataMap::from_headers(headers);
+        request
     }
 }
 
@@ -135,18 +145,13 @@ where
     }
 
     fn call(&mut self, mut request: Request<Body>) -> Self::Future {
-        let Some(call) = Call::find(request.uri().path()) else {
-            return Either::Left(self.services.call(request));
-        };
-        if !call.forwarded {
-            // A stream of seats opens its own streams to other nodes.
-            if call.streams {
-                let gateway = Gateway {
-                    layer: self.layer.clone(),
-                    headers: passed_headers(&request),
-                };
-                request.extensions_mut().insert(gateway);
-            }
+        if !Call::find(request.uri().path()).is_some_and(|call| call.forwarded) {
+            // Streams of seats, and lists of everything, ask other nodes themselves.
+            let gateway = Gateway {
+                layer: self.layer.clone(),
+                headers: passed_headers(&request),
+            };
+            request.extensions_mut().insert(gateway);
             return Either::Left(self.services.call(request));
         }
         // The clone that is ready serves this call.

@@ -5,12 +5,16 @@ use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
-use chefshat_proto::v1::{self, server_service_server::ServerService};
+use chefshat_proto::v1::{
+    self, server_service_client::ServerServiceClient, server_service_server::ServerService,
+};
 use chefshat_record::convert::{FieldProblem, action_space, rules_to_proto};
 use chefshat_simulation::vector::MAX_SEATS_PLAYED;
 use chefshat_tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use tonic::{Request, Response, Status};
 
+use super::forward::Gateway;
+use super::lists;
 use super::status::field;
 use crate::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_HOSTED_SHIFTS,
@@ -95,8 +99,19 @@ impl Info {
 impl ServerService for Info {
     async fn get_server_info(
         &self,
-        _request: Request<v1::GetServerInfoRequest>,
+        request: Request<v1::GetServerInfoRequest>,
     ) -> Result<Response<v1::GetServerInfoResponse>, Status> {
+        let mut open_rooms = convert::number(self.rooms.open_count());
+        if let Some(gateway) = request.extensions().get::<Gateway>() {
+            let ask = |channel| async move {
+                let request = gateway.request(v1::GetServerInfoRequest {});
+                ServerServiceClient::new(channel)
+                    .get_server_info(request)
+                    .await
+            };
+            let others = lists::of_others(gateway, ask).await;
+            open_rooms += others.map(|info| info.open_rooms).sum::<u32>();
+        }
         let presets = RuleSetSpec::PRESETS
             .iter()
             .map(|name| {
@@ -118,7 +133,7 @@ impl ServerService for Info {
                 .map(|kind| kind.name().to_owned())
                 .collect(),
             limits: self.limits.clone(),
-            open_rooms: convert::number(self.rooms.open_count()),
+            open_rooms,
             shutting_down: self.rooms.is_shutting_down(),
             signing_key: (self.rooms.signing_key()).map_or_else(String::new, |key| key.to_string()),
         }))

@@ -24,8 +24,11 @@ pub(super) fn last_shown(page_token: &str) -> Result<Option<u64>, Status> {
     if page_token.is_empty() {
         return Ok(None);
     }
-    page_token.parse().map(Some).map_err(|_| {
-        let problem = FieldProblem::new("page_token", "not a token of this server");
-        field("PAGE_TOKEN_REFUSED", &problem)
-    })
+    page_token.parse().map(Some).map_err(|_| token_refused())
+}
+
+/// A page token is not one of this server.
+pub(super) fn token_refused() -> Status {
+    let problem = FieldProblem::new("page_token", "not a token of this server");
+    field("PAGE_TOKEN_REFUSED", &problem)
 }

@@ -3,12 +3,17 @@
 use std::pin::pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{self, room_service_server::RoomService};
+use chefshat_proto::v1::{
+    self, room_service_client::RoomServiceClient, room_service_server::RoomService,
+};
 use chefshat_record::convert::{FieldProblem, seat_number};
 use futures::{Stream, StreamExt as _};
+use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
+use super::forward::Gateway;
 use super::limits::charged;
+use super::lists::{self, Listing, Page, Part};
 use super::new_room::new_room;
 use super::pages;
 use super::reach::Reach;
@@ -93,6 +98,83 @@ impl RoomCalls {
     }
 }
 
+/// The rooms that a caller finds.
+struct RoomList<'a> {
+    reach: &'a Reach,
+    caller: &'a Caller,
+    message: &'a v1::ListRoomsRequest,
+    /// Whether those whose games are over are listed, or the others.
+    over: Option<bool>,
+}
+
+impl Listing for RoomList<'_> {
+    type Entry = v1::Room;
+    type Response = v1::ListRoomsResponse;
+
+    async fn here(&self, before: Option<u64>) -> Result<Part<v1::Room>, Status> {
+        let page_size = pages::page_size(self.message.page_size);
+        // Rooms in other states are skipped, up to a limit for one page.
+        let looked_at = (self.reach.rooms()).newest(before, self.over, ROOMS_LOOKED_AT);
+        let mut more = looked_at.len() == ROOMS_LOOKED_AT;
+        let mut last = before;
+        let describe = |handle: Handle| async move {
+            match self.reach.lists_room(self.caller, &handle).await {
+                true => handle.describe().await.ok(),
+                false => None,
+            }
+        };
+        let mut entries = Vec::new();
+        let mut rooms = pin!(described(looked_at, describe));
+        while let Some((number, room)) = rooms.next().await {
+            if entries.len() == page_size {
+                more = true;
+                break;
+            }
+            last = Some(number);
+            // A room that has just gone, or that the caller does not see, is not listed.
+            if let Some(room) = room
+                && (self.message.state == 0 || self.message.state == room.state)
+            {
+                entries.push((number, room));
+            }
+        }
+        let rest = last.filter(|_| more);
+        Ok(Part { entries, rest })
+    }
+
+    async fn there(
+        &self,
+        gateway: &Gateway,
+        channel: Channel,
+        page_token: String,
+    ) -> Result<Response<v1::ListRoomsResponse>, Status> {
+        let request = v1::ListRoomsRequest {
+            page_token,
+            ..self.message.clone()
+        };
+        let mut service = RoomServiceClient::new(channel);
+        service.list_rooms(gateway.request(request)).await
+    }
+
+    fn page(response: v1::ListRoomsResponse) -> Page<v1::Room> {
+        Page {
+            entries: response.rooms,
+            next_page_token: response.next_page_token,
+        }
+    }
+
+    fn response(page: Page<v1::Room>) -> v1::ListRoomsResponse {
+        v1::ListRoomsResponse {
+            rooms: page.entries,
+            next_page_token: page.next_page_token,
+        }
+    }
+
+    fn created_at_ms(room: &v1::Room) -> u64 {
+        room.created_at_ms
+    }
+}
+
 /// Describes numbered rooms in order, [`ROOMS_ASKED`] of them at a time.
 fn described<H, R, D: Future<Output = R>>(
     rooms: Vec<(u64, H)>,
@@ -164,11 +246,9 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
-        let request = request.into_inner();
+        let (_, extensions, message) = request.into_parts();
         let _turn = self.calls.list(key).await;
-        let page_size = pages::page_size(request.page_size);
-        let before = pages::last_shown(&request.page_token)?;
-        let over = match v1::RoomState::try_from(request.state) {
+        let over = match v1::RoomState::try_from(message.state) {
             Ok(v1::RoomState::Unspecified) => None,
             Ok(v1::RoomState::Waiting | v1::RoomState::Playing) => Some(false),
             Ok(v1::RoomState::Finished | v1::RoomState::Aborted) => Some(true),
@@ -177,36 +257,14 @@ impl RoomService for RoomCalls {
                 return Err(field("STATE_REFUSED", &problem));
             }
         };
-        let mut response = v1::ListRoomsResponse::default();
-        // Rooms in other states are skipped, up to a limit for one page.
-        let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
-        let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
-        let mut last = before;
-        let (reach, caller) = (self.reach(), &caller);
-        let describe = |handle: Handle| async move {
-            match reach.lists_room(caller, &handle).await {
-                true => handle.describe().await.ok(),
-                false => None,
-            }
+        let listing = RoomList {
+            reach: self.reach(),
+            caller: &caller,
+            message: &message,
+            over,
         };
-        let mut rooms = pin!(described(looked_at, describe));
-        while let Some((number, room)) = rooms.next().await {
-            if response.rooms.len() == page_size {
-                rest = true;
-                break;
-            }
-            last = Some(number);
-            // A room that has just gone, or that the caller does not see, is not listed.
-            if let Some(room) = room
-                && (request.state == 0 || request.state == room.state)
-            {
-                response.rooms.push(room);
-            }
-        }
-        if let (true, Some(last)) = (rest, last) {
-            response.next_page_token = last.to_string();
-        }
-        Ok(Response::new(response))
+        let size = pages::page_size(message.page_size);
+        lists::list(&listing, &extensions, &message.page_token, size).await
     }
 
     async fn join_room(

@@ -3,19 +3,25 @@
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
+use chefshat_proto::v1::{
+    self, tournament_service_client::TournamentServiceClient,
+    tournament_service_server::TournamentService,
+};
 use chefshat_record::convert::FieldProblem;
-use chefshat_tournament::{BeginProblem, JoinProblem};
+use chefshat_tournament::{BeginProblem, JoinProblem, State};
 use futures::Stream;
 use prost::Message as _;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
+use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
 use super::access::check;
 use super::follow::{compute_failed, end, follow};
+use super::forward::Gateway;
 use super::limits::charged;
+use super::lists::{self, Listing, Page, Part};
 use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
@@ -139,6 +145,67 @@ impl TournamentCalls {
     }
 }
 
+/// The tournaments that a caller finds.
+struct TournamentList<'a> {
+    service: &'a TournamentCalls,
+    caller: &'a Caller,
+    message: &'a v1::ListTournamentsRequest,
+    /// The state of those that are listed.
+    state: Option<State>,
+}
+
+impl Listing for TournamentList<'_> {
+    type Entry = v1::Tournament;
+    type Response = v1::ListTournamentsResponse;
+
+    async fn here(&self, before: Option<u64>) -> Result<Part<v1::Tournament>, Status> {
+        let size = pages::page_size(self.message.page_size);
+        let service = self.service;
+        let mut found = (service.tournaments).newest(before, self.state, size + 1);
+        let more = found.len() > size;
+        found.truncate(size);
+        let rest = found.last().map(|(last, _)| *last).filter(|_| more);
+        let reach = service.recorded.reach();
+        let entries = (found.iter())
+            .filter(|(_, handle)| reach.lists_tournament(self.caller, handle))
+            .map(|(number, handle)| (*number, handle.describe_briefly()))
+            .collect();
+        Ok(Part { entries, rest })
+    }
+
+    async fn there(
+        &self,
+        gateway: &Gateway,
+        channel: Channel,
+        page_token: String,
+    ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
+        let request = v1::ListTournamentsRequest {
+            page_token,
+            ..self.message.clone()
+        };
+        let mut service = TournamentServiceClient::new(channel);
+        service.list_tournaments(gateway.request(request)).await
+    }
+
+    fn page(response: v1::ListTournamentsResponse) -> Page<v1::Tournament> {
+        Page {
+            entries: response.tournaments,
+            next_page_token: response.next_page_token,
+        }
+    }
+
+    fn response(page: Page<v1::Tournament>) -> v1::ListTournamentsResponse {
+        v1::ListTournamentsResponse {
+            tournaments: page.entries,
+            next_page_token: page.next_page_token,
+        }
+    }
+
+    fn created_at_ms(tournament: &v1::Tournament) -> u64 {
+        tournament.created_at_ms
+    }
+}
+
 #[tonic::async_trait]
 impl TournamentService for TournamentCalls {
     type FollowTournamentStream =
@@ -208,26 +275,17 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::ListTournamentsRequest>,
     ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
-        let before = pages::last_shown(&request.page_token)?;
-        let size = pages::page_size(request.page_size);
-        let state = convert::tournament_state_from_proto("state", request.state)
+        let (_, extensions, message) = request.into_parts();
+        let state = convert::tournament_state_from_proto("state", message.state)
             .map_err(|problem| field("STATE_REFUSED", &problem))?;
-        let mut found = self.tournaments.newest(before, state, size + 1);
-        let more = found.len() > size;
-        found.truncate(size);
-        let next_page_token = match found.last() {
-            Some((last, _)) if more => last.to_string(),
-            _ => String::new(),
+        let listing = TournamentList {
+            service: self,
+            caller: &caller,
+            message: &message,
+            state,
         };
-        let tournaments = (found.iter())
-            .filter(|(_, handle)| self.recorded.reach().lists_tournament(&caller, handle))
-            .map(|(_, handle)| handle.describe_briefly())
-            .collect();
-        Ok(Response::new(v1::ListTournamentsResponse {
-            tournaments,
-            next_page_token,
-        }))
+        let size = pages::page_size(message.page_size);
+        lists::list(&listing, &extensions, &message.page_token, size).await
     }
 
     async fn join_tournament(

@@ -3,6 +3,7 @@
 //! single server.
 
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_proto::v1::{
@@ -316,4 +317,82 @@ async fn a_seat_is_told_where_its_room_is() {
     let code = created.expect("a room").join_code;
     let joined = client.join(join(&code)).await.expect("a seat");
     assert_eq!(joined.preferred_endpoint, "");
+}
+
+#[tokio::test]
+async fn lists_have_the_rooms_and_tournaments_of_all_nodes() {
+    let nodes = TestNodes::start(3).await;
+    let mut created = Vec::new();
+    for number in 0..7 {
+        let request = v1::CreateRoomRequest {
+            name: format!("room {number}"),
+            ..v1::CreateRoomRequest::default()
+        };
+        let room = nodes.create_room(number % 3, request).await;
+        created.push(room.room.expect("a room").room_id);
+        // Lists are ordered by the time of creation, in milliseconds.
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+    let private = v1::CreateRoomRequest {
+        policy: Some(v1::RoomPolicy {
+            visibility: v1::Visibility::Private.into(),
+            ..v1::RoomPolicy::default()
+        }),
+        ..v1::CreateRoomRequest::default()
+    };
+    let private = nodes.create_room(2, private).await;
+    created.reverse();
+    let client = nodes.nodes[0].client().await;
+    for page_size in [0, 1, 2, 7] {
+        let mut listed = Vec::new();
+        let mut page_token = String::new();
+        // Each page is asked for at another node, as behind a load balancer.
+        for node in nodes.nodes.iter().cycle() {
+            let request = v1::ListRoomsRequest {
+                page_size,
+                page_token,
+                ..v1::ListRoomsRequest::default()
+            };
+            let page = node.client().await.list_rooms(request).await;
+            let page = page.expect("a page");
+            assert!(page_size == 0 || page.rooms.len() <= page_size as usize);
+            listed.extend(page.rooms.into_iter().map(|room| room.room_id));
+            page_token = page.next_page_token;
+            if page_token.is_empty() {
+                break;
+            }
+        }
+        assert_eq!(listed, created, "{page_size}");
+    }
+    let owner = client
+        .with_secrets([&private.owner_token])
+        .expect("a secret");
+    let all = owner.list_rooms(v1::ListRoomsRequest::default()).await;
+    assert_eq!(all.expect("a page").rooms.len(), 8);
+    assert_eq!(
+        client.server_info().await.expect("it answers").open_rooms,
+        8
+    );
+    let elsewhere = nodes.nodes[2].client().await;
+    let settings = v1::TournamentSettings {
+        name: "Coppa".into(),
+        format: v1::TournamentFormat::Swiss.into(),
+        ..v1::TournamentSettings::default()
+    };
+    elsewhere
+        .create_tournament(settings)
+        .await
+        .expect("created");
+    let listed = client.list_tournaments(v1::ListTournamentsRequest::default());
+    assert_eq!(listed.await.expect("a page").tournaments.len(), 1);
+    let wrong = v1::ListRoomsRequest {
+        page_token: "7".into(),
+        ..v1::ListRoomsRequest::default()
+    };
+    let refused = client.list_rooms(wrong).await.expect_err("of no node");
+    assert_eq!(refused.reason(), Some("PAGE_TOKEN_REFUSED"));
+    // A node that cannot be reached is left out.
+    nodes.link(0, 2).close();
+    let listed = patiently("a page", client.list_rooms(v1::ListRoomsRequest::default())).await;
+    assert_eq!(listed.expect("a page").rooms.len(), 5);
 }

@@ -10,12 +10,10 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use chefshat_proto::v1::{self, seat_command::Command};
 use futures::StreamExt as _;
 use futures::future::join_all;
-use http::header;
 use tokio::sync::{Notify, mpsc};
 use tokio::time::Instant;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::task::AbortOnDropHandle;
-use tonic::metadata::MetadataMap;
 use tonic::transport::Channel;
 use tonic::{Request, Status};
 use tracing::debug;
@@ -218,12 +216,7 @@ impl RemoteSeats {
             inputs,
             first_assigned_handle: std::mem::take(&mut first_assigned_handle),
         });
-        let mut headers = self.gateway.headers().clone();
-        for own in [header::CONTENT_TYPE, header::TE, header::USER_AGENT] {
-            headers.remove(own);
-        }
-        let mut request = Request::new(requests);
-        *request.metadata_mut() = MetadataMap::from_headers(headers);
+        let request = self.gateway.request(requests);
         let channel = self.gateway.peers().channel(&elsewhere.peer);
         let directory = Arc::clone(self.gateway.directory());
         PeerStream {
