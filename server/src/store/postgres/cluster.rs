@@ -8,28 +8,23 @@ use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection as _, Row as _};
-use tracing::error;
 
-use super::commands::text;
-use super::journals::encode;
-use super::{PostgresStore, integer, lock};
-use crate::clock::since_epoch_ms;
+use super::claims::{Claim, claim};
+use super::owned::rooms;
+use super::values::{integer, millis, text};
+use super::{PostgresStore, lock};
 use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
-use crate::store::form::{self, FORM};
+use crate::store::form::FORM;
 use crate::store::tournaments::StoredTournament;
 use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Change, Entry};
 
 /// Nodes that own nothing and have not beaten for this long are forgotten.
 const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
 /// How often a claim is tried again because the last owner has just written something.
 const CLAIM_ATTEMPTS: usize = 5;
-/// Most ended games that are read at once.
-const MAX_ENDED: i64 = 256;
-
 /// The columns of `location`.
 macro_rules! locations {
     ($rest:literal) => {
@@ -40,79 +35,7 @@ macro_rules! locations {
     };
 }
 
-/// The columns of `Reader::rooms` and the epoch, of durable rooms.
-macro_rules! rooms {
-    ($rest:literal) => {
-        concat!(
-            "SELECT number, games.form, header, over, epoch
-             FROM owned JOIN games USING (game_id) WHERE durable AND kind = 0 AND ",
-            $rest
-        )
-    };
-}
-
 impl PostgresStore {
-    /// See `Store::resumable_games`.
-    pub(super) async fn own_games(
-        &self,
-        ended_since_ms: u64,
-    ) -> Result<Vec<ResumableGame>, StoreError> {
-        let node = self.node()?;
-        let rows = self.reader.read(|connection| {
-            sqlx::query(rooms!(
-                "node = $1 AND (NOT over OR number IN (
-                     SELECT number FROM games JOIN owned USING (game_id)
-                     WHERE node = $1 AND over AND ended_at_ms >= $2
-                     ORDER BY ended_at_ms DESC LIMIT $3))
-                 ORDER BY number"
-            ))
-            .bind(node)
-            .bind(integer(ended_since_ms))
-            .bind(MAX_ENDED)
-            .fetch_all(connection)
-            .boxed()
-        });
-        self.resumables(rows.await?).await
-    }
-
-    /// The games in rows of `rooms`, with journals that write at the epochs there.
-    async fn resumables(&self, rows: Vec<PgRow>) -> Result<Vec<ResumableGame>, StoreError> {
-        let epochs: std::collections::HashMap<i64, i64> =
-            rows.iter().map(|row| (row.get(0), row.get(4))).collect();
-        let rooms = self.reader.rooms(rows).await?;
-        Ok((rooms.into_iter())
-            .map(|room| {
-                let epoch = epochs[&room.number];
-                self.resumable(room, epoch)
-            })
-            .collect())
-    }
-
-    /// See `Store::tournaments`.
-    pub(super) async fn own_tournaments(
-        &self,
-        newest_over: usize,
-    ) -> Result<Vec<StoredTournament>, StoreError> {
-        let node = self.node()?;
-        let rows = self.reader.read(|connection| {
-            sqlx::query(
-                "SELECT number, form, header FROM tournaments WHERE number IN (
-                     SELECT number FROM tournaments JOIN owned ON id = tournament_id
-                     WHERE node = $1 AND NOT owned.over
-                     UNION ALL
-                     SELECT * FROM (
-                         SELECT number FROM tournaments WHERE over
-                         ORDER BY number DESC LIMIT $2) newest)
-                 ORDER BY number",
-            )
-            .bind(node)
-            .bind(integer(newest_over as u64))
-            .fetch_all(connection)
-            .boxed()
-        });
-        self.reader.read_tournaments(rows.await?).await
-    }
-
     /// One attempt to claim a unit.
     async fn try_claim(&self, unit: Id, seen: Epoch) -> Result<Claim, StoreError> {
         let node = self.node()?;
@@ -154,119 +77,6 @@ impl PostgresStore {
 enum LocatedBy {
     Id(Id),
     Code(String),
-}
-
-/// What became of a claim.
-enum Claim {
-    Won(Epoch),
-    Lost,
-    /// The last owner wrote something at the same time.
-    Busy,
-}
-
-async fn claim(
-    connection: &mut PgConnection,
-    node: i64,
-    expire_after: i64,
-    unit: Id,
-    seen: i64,
-) -> sqlx::Result<Claim> {
-    let unit = unit.0.as_slice();
-    // Whoever has locked the rows claims the unit, or ends one of them.
-    let rows: Vec<(Option<i64>, bool)> = sqlx::query_as(
-        "SELECT node, durable FROM owned
-         WHERE unit = $1 AND epoch = $2 AND NOT over AND EXISTS (SELECT FROM nodes WHERE node = $3)
-         ORDER BY id FOR UPDATE",
-    )
-    .bind(unit)
-    .bind(seen)
-    .bind(node)
-    .fetch_all(&mut *connection)
-    .await?;
-    if !rows.iter().any(|(_, durable)| *durable) {
-        return Ok(Claim::Lost);
-    }
-    // All of them have the same owner.
-    let (owner, _) = rows[0];
-    if let Some(owner) = owner {
-        // A beat waits for the lock, so its answer comes before or after the whole claim.
-        let alive: Option<bool> = sqlx::query_scalar(
-            "SELECT beat_ms + $2 > clock_ms() FROM nodes WHERE node = $1 FOR SHARE",
-        )
-        .bind(owner)
-        .bind(expire_after)
-        .fetch_optional(&mut *connection)
-        .await?;
-        if alive == Some(true) {
-            return Ok(Claim::Lost);
-        }
-    }
-    sqlx::query("DELETE FROM owned WHERE unit = $1 AND NOT durable AND NOT over")
-        .bind(unit)
-        .execute(&mut *connection)
-        .await?;
-    let epoch = seen + 1;
-    // The rooms that are over can be shown by the new owner.
-    sqlx::query(
-        "UPDATE owned SET node = $2, epoch = CASE WHEN over THEN epoch ELSE $3 END WHERE unit = $1",
-    )
-    .bind(unit)
-    .bind(node)
-    .bind(epoch)
-    .execute(&mut *connection)
-    .await?;
-    match restart(connection, unit, epoch).await? {
-        true => Ok(Claim::Won(Epoch(epoch.cast_unsigned()))),
-        false => Ok(Claim::Busy),
-    }
-}
-
-/// Adds "the server was restarted" to the journals of a unit's rooms that are not over. Returns
-/// `false` if the last owner has just written at the same position.
-async fn restart(connection: &mut PgConnection, unit: &[u8], epoch: i64) -> sqlx::Result<bool> {
-    let games = sqlx::query(
-        "SELECT number, created_at_ms, position, entries
-         FROM owned JOIN games USING (game_id)
-              LEFT JOIN LATERAL (SELECT position, entries FROM journal WHERE game = number
-                                 ORDER BY position DESC LIMIT 1) last ON true
-         WHERE unit = $1 AND NOT over",
-    )
-    .bind(unit)
-    .fetch_all(&mut *connection)
-    .await?;
-    let (mut numbers, mut positions, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-    for game in &games {
-        let number: i64 = game.get(0);
-        let mut last = Vec::new();
-        let entries: Option<&[u8]> = game.get(3);
-        if let Err(problem) = form::read_entries(entries.unwrap_or_default(), &mut last) {
-            error!(number, %problem, "a game cannot be read; it is left unchanged");
-            continue;
-        }
-        let created_at_ms = u64::try_from(game.get::<i64, _>(1)).unwrap_or_default();
-        let age = Duration::from_millis(since_epoch_ms().saturating_sub(created_at_ms));
-        let last = last.last().map_or(Duration::ZERO, |entry| entry.at);
-        let entry = Entry {
-            // A clock that was set back does not make the room younger than its journal.
-            at: age.max(last),
-            change: Change::ServerRestarted,
-        };
-        numbers.push(number);
-        positions.push(game.get::<Option<i64>, _>(2).map_or(0, |last| last + 1));
-        rows.push(encode(&mut vec![entry]));
-    }
-    let written = sqlx::query(
-        "INSERT INTO journal (game, position, epoch, entries)
-         SELECT game, position, $3, entries FROM unnest($1, $2, $4) AS new (game, position, entries)
-         ON CONFLICT DO NOTHING",
-    )
-    .bind(&numbers)
-    .bind(&positions)
-    .bind(epoch)
-    .bind(&rows)
-    .execute(connection)
-    .await?;
-    Ok(written.rows_affected() == numbers.len() as u64)
 }
 
 impl ClusterStore for PostgresStore {
@@ -635,8 +445,4 @@ fn location(row: &PgRow) -> Result<Location, StoreError> {
         epoch: Epoch(row.get::<i64, _>(4).cast_unsigned()),
         over: row.get(5),
     })
-}
-
-fn millis(time: Duration) -> i64 {
-    integer(u64::try_from(time.as_millis()).unwrap_or(u64::MAX))
 }

@@ -8,8 +8,10 @@ use futures::future::{BoxFuture, ready};
 use tracing::error;
 
 use super::appends::Row;
-use super::commands::{Command, End, Owned, WholeGame};
+use super::commands::Command;
+use super::ends::{End, WholeGame};
 use super::reader::Reader;
+use super::values::Owned;
 use super::writer::Queue;
 use crate::store::form;
 use crate::store::{Journal, Signed, StoreError};

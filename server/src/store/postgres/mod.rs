@@ -1,17 +1,22 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
-//! reads, `journals`, `appends` and `commands` write through `writer`, `cluster` is about nodes and
-//! ownership, `transfer` moves an SQLite database here, `form` (beside this folder) encodes; this file joins them into a store.
+//! reads, `journals`, `appends`, `commands` and `ends` write through `writer`, `cluster`, `claims`
+//! and `owned` are about nodes and what they own, `transfer` moves an SQLite database here, `form`
+//! (beside this folder) encodes; this file joins them into a store.
 
 mod appends;
+mod claims;
 mod cluster;
 mod commands;
+mod ends;
 mod errors;
 mod journals;
 mod open;
+mod owned;
 mod reader;
 #[cfg(test)]
 pub(super) mod tests;
 mod transfer;
+mod values;
 mod writer;
 
 use std::collections::HashMap;
@@ -39,9 +44,10 @@ use appends::Row;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
-use commands::{Command, Owned};
+use commands::Command;
 use journals::{DurableJournal, EphemeralJournal, encode};
 use reader::{Reader, StoredRoom};
+use values::{FIRST_EPOCH, Owned, integer};
 use writer::{Queue, Shared};
 
 /// Writers of rows of running games: while one commits, the other takes what arrives.
@@ -54,8 +60,6 @@ const READERS: u32 = 6;
 const CONTROLLERS: u32 = 2;
 /// How long a read waits for a connection.
 const ACQUIRE_LIMIT: Duration = Duration::from_secs(5);
-/// The epoch of what has just been created.
-const FIRST_EPOCH: i64 = 1;
 
 /// How a node uses the database.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -409,11 +413,6 @@ impl Store for PostgresStore {
         }
         .boxed()
     }
-}
-
-/// A number as the database stores it.
-fn integer(number: u64) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -13,9 +13,8 @@ use sqlx::postgres::{PgConnection, PgPool, PgRow};
 use tokio::time::timeout;
 use tracing::error;
 
-use super::commands::text;
 use super::errors::failure;
-use super::integer;
+use super::values::{integer, text};
 use crate::store::codec::Codec;
 use crate::store::form::{self, FORM, Unreadable};
 use crate::store::tournaments::StoredTournament;

@@ -8,10 +8,9 @@ use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, Connection as _};
 use tracing::error;
 
-use super::commands::text;
 use super::errors::failure;
 use super::open::{self, DatabaseError};
-use super::{FIRST_EPOCH, integer};
+use super::values::{FIRST_EPOCH, integer, text};
 use crate::store::form;
 use crate::store::sqlite::{Contents, GameRow, JournalRow, ParticipantRow, TournamentRow};
 use crate::store::{DATABASE_FILE, OpenError, StoreError};

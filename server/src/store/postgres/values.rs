@@ -1,0 +1,43 @@
+//! Values as the database has them, which the files of this folder share.
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+use crate::store::StoreError;
+use chefshat_room::ids::Id;
+
+/// The epoch of what has just been created.
+pub(super) const FIRST_EPOCH: i64 = 1;
+
+/// A room or tournament, and the epoch at which its owner writes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Owned {
+    pub(super) id: Id,
+    pub(super) unit: Id,
+    pub(super) epoch: i64,
+}
+
+impl Owned {
+    /// Why its owner may not write any more.
+    pub(super) fn fenced(self) -> StoreError {
+        StoreError::Fenced(self.unit)
+    }
+}
+
+/// A number.
+pub(super) fn integer(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
+
+/// A time in milliseconds.
+pub(super) fn millis(time: Duration) -> i64 {
+    integer(u64::try_from(time.as_millis()).unwrap_or(u64::MAX))
+}
+
+/// A text as the database takes it: it has no NUL.
+pub(super) fn text(text: &str) -> Cow<'_, str> {
+    match text.contains('\0') {
+        true => text.replace('\0', "\u{fffd}").into(),
+        false => text.into(),
+    }
+}
