@@ -31,6 +31,7 @@ use tracing::{info, warn};
 use crate::access::{Access, TokenFileError};
 use crate::cluster::{
     CONNECTION_WINDOW, ClusterNode, Directory, NodeLease, PeerPort, STREAM_WINDOW, SingleServer,
+    StoreDirectory,
 };
 use crate::config::{
     DRAIN_LIMIT, HAND_OVER_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES,
@@ -145,10 +146,11 @@ impl Server {
     pub async fn joined(
         config: ServerConfig,
         store: Arc<dyn ClusterStore>,
-        directory: Arc<dyn Directory>,
         info: NodeInfo,
     ) -> Result<Self, ServeError> {
         let lease = Arc::new(NodeLease::new());
+        let directory = StoreDirectory::new(Arc::clone(&store), Arc::clone(&lease));
+        let directory = Arc::new(directory);
         let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
         let mut server = Self::new(config, stored, directory, Some(lease))?;
         let grace = server.config.grace;

@@ -5,6 +5,7 @@ mod agent;
 mod backup;
 mod board;
 mod check_agent;
+mod cluster;
 mod compare;
 mod config;
 mod conformance;
@@ -126,6 +127,8 @@ enum Command {
     Key(key::KeyCommand),
     /// Operate a running server: clients, rooms and tournaments of others, storage.
     Admin(admin::AdminCommand),
+    /// Show the nodes of a cluster, or make one hand over what it owns.
+    Cluster(cluster::ClusterCommand),
     /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
     /// Create, list and revoke the tokens of a server.
@@ -186,6 +189,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Import(command) => command.run(),
         Command::Key(command) => command.run(),
         Command::Admin(command) => in_runtime(command.run()),
+        Command::Cluster(command) => in_runtime(command.run()),
         Command::Participant(command) => in_runtime(command.run()),
         Command::Token(command) => command.run(),
         Command::Backup(command) => in_runtime(command.run()),

@@ -13,6 +13,7 @@ use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
+use super::cluster::{NewNode, NodeSettings};
 use super::listen::{self, Address};
 use super::numbers::duration;
 use super::{CommandError, data_dir, say};
@@ -23,7 +24,7 @@ use chefshat_server::proxies::{TrustedProxies, TrustedProxy};
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::signing::key_or_new;
-use chefshat_server::store::{MemoryStore, SqliteStore, Store};
+use chefshat_server::store::{MemoryStore, PostgresOptions, SqliteStore, Store};
 use chefshat_server::tls::TlsFiles;
 use chefshat_server::web;
 
@@ -141,6 +142,8 @@ pub(super) struct Settings {
     /// meets the present certificate; what it does on the old one continues. 0 means never.
     #[arg(long, env = "CHEFSHAT_CONNECTION_AGE", default_value_t = 43_200)]
     connection_age: u64,
+    #[command(flatten)]
+    node: NodeSettings,
 }
 
 impl Settings {
@@ -243,9 +246,17 @@ impl Serve {
         let (access, mode) = settings.access(data_dir.as_ref(), &address)?;
         // Pages of other names must not reach a server that trusts everybody on this machine.
         let is_local = mode == Mode::Open && address.is_loopback();
-        let store: Arc<dyn Store> = match &data_dir {
-            Some(folder) => Arc::new(SqliteStore::open(folder).await?),
-            None => Arc::new(MemoryStore::default()),
+        let options = PostgresOptions {
+            retention: ServerConfig::default().retention,
+            record_files: false,
+            ..PostgresOptions::default()
+        };
+        let storage = match settings.node.open(settings.max_rooms, options).await? {
+            Some(node) => Storage::Shared(Box::new(node)),
+            None => Storage::Own(match &data_dir {
+                Some(folder) => Arc::new(SqliteStore::open(folder).await?),
+                None => Arc::new(MemoryStore::default()),
+            }),
         };
         let metrics_address = (metrics_listener.as_ref())
             .map(TcpListener::local_addr)
@@ -255,6 +266,7 @@ impl Serve {
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
         let grace = settings.grace;
+        let is_node = settings.node.database.is_some();
         let allowed_hosts = without_empty(settings.allowed_hosts);
         let signing_key = data_dir.as_deref().map(key_or_new).transpose()?;
         let config = ServerConfig {
@@ -280,10 +292,21 @@ impl Serve {
             allowed_origins: without_empty(settings.allowed_origins),
             ..ServerConfig::default()
         };
-        let server = Server::restored(config, store).await?;
-        if let Some(folder) = kept_in {
-            eprintln!("games are stored in {}", folder.display());
-        }
+        let server = match storage {
+            Storage::Shared(node) => {
+                let (name, endpoint) = (node.info.name.clone(), node.info.peer_endpoint.clone());
+                let server = Server::joined(config, node.store, node.info).await?;
+                eprintln!("node {name} of a cluster; other nodes reach it at {endpoint}");
+                server.with_peers(node.port)
+            }
+            Storage::Own(store) => {
+                let server = Server::restored(config, store).await?;
+                if let Some(folder) = kept_in {
+                    eprintln!("games are stored in {}", folder.display());
+                }
+                server
+            }
+        };
         if server.games() > 0 {
             eprintln!("resumed games: {}", server.games());
         }
@@ -318,18 +341,25 @@ impl Serve {
                 Some(_) = OptionFuture::from(input_ends) => {}
             }
             let _ = sd_notify::notify(&[NotifyState::Stopping]);
-            eprintln!(
-                "stopping: no new rooms; running games may end within {grace} s, then durable ones are suspended and resume at the next \
-                 start; stop again to end at once"
-            );
+            let (then, at_once) = match is_node {
+                true => (
+                    format!("other nodes take durable games over, others may end within {grace} s"),
+                    "other nodes take durable games over when the lease expires",
+                ),
+                false => (
+                    format!(
+                        "running games may end within {grace} s, then durable ones are suspended and resume at the next start"
+                    ),
+                    "durable games resume when the server is started again",
+                ),
+            };
+            eprintln!("stopping: no new rooms; {then}; stop again to end at once");
             tokio::spawn(async move {
                 tokio::select! {
                     _ = terminate.recv() => {}
                     _ = interrupt.recv() => {}
                 }
-                eprintln!(
-                    "stopped at once: durable games resume when the server is started again, all others are lost"
-                );
+                eprintln!("stopped at once: {at_once}, all others are lost");
                 std::process::exit(1);
             });
         };
@@ -337,6 +367,14 @@ impl Serve {
         eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Where the games of a server are stored.
+enum Storage {
+    /// In a store of its own.
+    Own(Arc<dyn Store>),
+    /// In the database of a cluster.
+    Shared(Box<NewNode>),
 }
 
 /// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own

@@ -9,6 +9,7 @@
 mod cli {
     mod branching;
     mod check_agent;
+    mod cluster;
     mod compare;
     mod config;
     mod conformance;

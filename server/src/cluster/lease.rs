@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Mutex, MutexGuard};
 
+use chefshat_cluster::NodeId;
 use chefshat_room::ids::Id;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
@@ -15,6 +16,7 @@ use tokio::time::Instant;
 #[derive(Debug)]
 pub struct NodeLease {
     until: watch::Sender<Instant>,
+    node: Mutex<Option<NodeId>>,
     news: Mutex<BTreeSet<(Id, News)>>,
     has_news: Notify,
 }
@@ -33,6 +35,7 @@ impl NodeLease {
     pub fn new() -> Self {
         Self {
             until: watch::Sender::new(Instant::now()),
+            node: Mutex::default(),
             news: Mutex::default(),
             has_news: Notify::new(),
         }
@@ -41,6 +44,16 @@ impl NodeLease {
     /// Whether the node may publish now.
     pub fn holds(&self) -> bool {
         Instant::now() < *self.until.borrow()
+    }
+
+    /// The node, once it has joined.
+    pub(super) fn node(&self) -> Option<NodeId> {
+        *self.node.lock().expect("nothing panics under this lock")
+    }
+
+    /// Sets the node, which has just joined.
+    pub(super) fn joined(&self, node: NodeId) {
+        *self.node.lock().expect("nothing panics under this lock") = Some(node);
     }
 
     /// Waits until the node may publish.

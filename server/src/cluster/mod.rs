@@ -1,10 +1,11 @@
 //! A server as one node of several. `directory` says which node has a room or tournament; a single
-//! server has all of them and asks nobody. `peers` connects
+//! server has all of them and asks nobody, and `located` asks the database. `peers` connects
 //! the nodes. `node` is the task that beats and takes over, `units` resumes and stops what it owns,
 //! and `lease` tells those when they may publish.
 
 mod directory;
 mod lease;
+mod located;
 mod node;
 mod peers;
 #[cfg(test)]
@@ -13,5 +14,6 @@ mod units;
 
 pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer};
 pub use lease::{News, NodeLease};
+pub use located::StoreDirectory;
 pub use node::ClusterNode;
 pub use peers::{CONNECTION_WINDOW, PEER_NAME, PeerPort, PeerPortError, Peers, STREAM_WINDOW};

@@ -60,6 +60,7 @@ impl ClusterNode {
         let (publishes, may_publish) = watch::channel(false);
         let lease = rooms.lease().expect("the rooms of a node have a lease");
         let lease = Arc::clone(lease);
+        lease.joined(id);
         let units = Units::new(Arc::clone(&store), rooms, tournaments, grace);
         let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
@@ -314,7 +315,7 @@ impl Task {
                 }
             }
         };
-        self.began = Instant::now();
+        self.lease.joined(id);
         self.node = Node::new(id, self.times, self.capacity);
         self.put_in(Input::Time);
     }

@@ -140,6 +140,8 @@ impl Rooms {
         lease: Option<Arc<NodeLease>>,
         tracker: TaskTracker,
     ) -> Result<Arc<Self>, ThreadPoolBuildError> {
+        // The database of a cluster has all records.
+        let record_dir = config.data_dir.clone().filter(|_| lease.is_none());
         let metrics = Arc::new(Metrics::default());
         if let Some(store) = store.metrics() {
             metrics.add_store(store);
@@ -156,7 +158,7 @@ impl Rooms {
             context: TaskContext {
                 record_writer: RecordWriter::new(
                     Arc::clone(&store),
-                    config.data_dir.clone(),
+                    record_dir,
                     tracker.clone(),
                     Arc::clone(&background),
                 ),

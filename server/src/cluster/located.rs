@@ -1,0 +1,158 @@
+//! The directory of a node: asks the database who owns what, and remembers what other nodes own.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+use tokio::time::Instant;
+use tracing::warn;
+
+use super::directory::{Directory, FoundBy, Location, Peer};
+use super::lease::NodeLease;
+use crate::store::StoreError;
+use crate::store::cluster::{self, ClusterStore, NodeId};
+use chefshat_room::ids::Id;
+
+/// Most rooms and tournaments of other nodes that are remembered, by id and by join code.
+const MAX_REMEMBERED: usize = 10_000;
+/// How long it is known which nodes have a lease.
+const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
+
+/// Finds the owners of rooms and tournaments in the database.
+pub struct StoreDirectory {
+    store: Arc<dyn ClusterStore>,
+    lease: Arc<NodeLease>,
+    known: Mutex<Known>,
+}
+
+#[derive(Default)]
+struct Known {
+    by_id: BTreeMap<Id, Peer>,
+    by_code: BTreeMap<String, Peer>,
+    /// The nodes that have a lease, and when they were read.
+    nodes: BTreeMap<NodeId, Peer>,
+    read: Option<Instant>,
+}
+
+impl StoreDirectory {
+    /// Reads from this database, for the node with this lease.
+    pub fn new(store: Arc<dyn ClusterStore>, lease: Arc<NodeLease>) -> Self {
+        Self {
+            store,
+            lease,
+            known: Mutex::default(),
+        }
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        (self.known.lock()).expect("nothing panics under this lock")
+    }
+
+    /// The location of something that stands in the database.
+    async fn location(&self, found: Option<cluster::Location>) -> Result<Location, StoreError> {
+        let Some(found) = found else {
+            return Ok(Location::Nowhere);
+        };
+        if found.node.is_some() && found.node == self.lease.node() {
+            return Ok(match found.over {
+                // Its end is not shown any more.
+                true => Location::Nowhere,
+                false => Location::Here,
+            });
+        }
+        let peer = match found.node {
+            Some(node) => self.peer(node).await?,
+            None => None,
+        };
+        Ok(match peer {
+            Some(peer) => Location::Node(peer),
+            // With its last owner, its end is gone.
+            None if found.over => Location::Nowhere,
+            // A node will soon take it over.
+            None => Location::Unknown,
+        })
+    }
+
+    /// A node, if it has a lease.
+    async fn peer(&self, node: NodeId) -> Result<Option<Peer>, StoreError> {
+        let is_known =
+            |known: &Known| (known.read).is_some_and(|at| at.elapsed() < NODES_KNOWN_FOR);
+        if !is_known(&self.known()) {
+            let nodes = self.store.nodes().await?.into_iter();
+            let alive = nodes.filter(|node| !node.expired);
+            let peers = alive.map(|node| {
+                let peer = Peer {
+                    node: format!("{} #{}", node.info.name, node.id.0).into(),
+                    endpoint: node.info.peer_endpoint.into(),
+                };
+                (node.id, peer)
+            });
+            let peers = peers.collect();
+            let mut known = self.known();
+            (known.nodes, known.read) = (peers, Some(Instant::now()));
+        }
+        Ok(self.known().nodes.get(&node).cloned())
+    }
+}
+
+/// The answer, or that the directory cannot be read.
+fn readable(location: Result<Location, StoreError>) -> Location {
+    location.unwrap_or_else(|error| {
+        warn!(%error, "the owner of a room or tournament cannot be found");
+        Location::Unknown
+    })
+}
+
+/// Remembers a node that owns something.
+fn remember<K: Ord>(peers: &mut BTreeMap<K, Peer>, key: K, location: &Location) {
+    if let Location::Node(peer) = location {
+        if peers.len() >= MAX_REMEMBERED {
+            peers.clear();
+        }
+        peers.insert(key, peer.clone());
+    }
+}
+
+impl Directory for StoreDirectory {
+    fn locate(&self, id: Id) -> BoxFuture<'_, Location> {
+        async move {
+            if let Some(peer) = self.known().by_id.get(&id) {
+                return Location::Node(peer.clone());
+            }
+            let location = match self.store.locate(id).await {
+                Ok(found) => self.location(found).await,
+                Err(error) => Err(error),
+            };
+            let location = readable(location);
+            remember(&mut self.known().by_id, id, &location);
+            location
+        }
+        .boxed()
+    }
+
+    fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location> {
+        async move {
+            if let Some(peer) = self.known().by_code.get(code) {
+                return Location::Node(peer.clone());
+            }
+            let location = match self.store.locate_code(code).await {
+                Ok(found) => self.location(found).await,
+                Err(error) => Err(error),
+            };
+            let location = readable(location);
+            remember(&mut self.known().by_code, code.to_owned(), &location);
+            location
+        }
+        .boxed()
+    }
+
+    fn forget(&self, found_by: &FoundBy) {
+        let mut known = self.known();
+        match found_by {
+            FoundBy::Id(id) => drop(known.by_id.remove(id)),
+            FoundBy::Code(code) => drop(known.by_code.remove(code)),
+        }
+    }
+}
