@@ -70,6 +70,11 @@ pub trait Directory: Send + Sync + 'static {
     /// The location of the room or tournament with a join code in its normal form.
     fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location>;
 
+    /// Whether a tournament of another node is over, so that no record of its games is withheld.
+    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+        ready(false).boxed()
+    }
+
     /// The node that was named last does not own it any more, or cannot be reached.
     fn forget(&self, found_by: &FoundBy);
 }

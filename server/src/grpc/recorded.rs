@@ -84,8 +84,11 @@ impl Recorded {
             .ok_or_else(unknown)?;
         // While its tournament runs, only the node that has it knows its tickets and which records
         // it withholds.
-        if let Some(game) = stored.tournament() {
-            self.reach.tournament_here(game.tournament).await?;
+        if let Some(game) = stored.tournament()
+            && let Err(elsewhere) = self.reach.tournament_here(game.tournament).await
+            && !self.rooms().directory().is_over(game.tournament).await
+        {
+            return Err(elsewhere);
         }
         let sight = self.reach.recorded(caller, &stored, unknown)?;
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {

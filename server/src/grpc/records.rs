@@ -5,7 +5,8 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{
-    self, game_event::Kind, record_line::Line, record_service_server::RecordService,
+    self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
+    record_service_server::RecordService,
 };
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::jsonl::excess;
@@ -19,15 +20,17 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::forward::Gateway;
 use super::limits::charged;
 use super::pages;
 use super::reach::Sight;
 use super::recorded::{Recorded, SERIES_OPEN};
-use super::status::{disk_nearly_full, field, has_reason, read_failed, status};
+use super::status::{disk_nearly_full, field, has_reason, is_elsewhere, read_failed, status};
 use crate::access::Caller;
+use crate::cluster::Peer;
 use crate::config::{
     IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,
-    MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
+    MAX_PEER_MESSAGE_BYTES, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use crate::limits::{Key, Places};
 use crate::store::Part;
@@ -87,6 +90,7 @@ impl Records {
         caller: &Caller,
         filter: &v1::RecordFilter,
         key: Key,
+        gateway: Option<&Gateway>,
         sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
     ) -> Result<(), Status> {
         let mut after = 0;
@@ -103,9 +107,13 @@ impl Records {
                 let _place = self.sending.take(key).await;
                 let key = self.key.clone();
                 let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
-                let lines = (self.recorded)
-                    .of_game_here(caller, &summary.game_id, shown)
-                    .await;
+                let game = &summary.game_id;
+                let mut lines = self.recorded.of_game(caller, game, shown).await;
+                if let (Err(status), Some(gateway)) = (&lines, gateway)
+                    && let Some(elsewhere) = is_elsewhere(status)
+                {
+                    lines = record_at(&elsewhere.peer, gateway, game).await;
+                }
                 let lines = match lines {
                     // Withheld while games with the same deals are being played.
                     Err(status) if has_reason(&status, SERIES_OPEN) => continue,
@@ -116,6 +124,26 @@ impl Records {
             }
         }
     }
+}
+
+/// The record of a game whose tournament another node has, as that node shows it to the caller.
+async fn record_at(
+    peer: &Peer,
+    gateway: &Gateway,
+    game: &str,
+) -> Result<Vec<v1::RecordLine>, Status> {
+    let channel = gateway.peers().channel(peer);
+    let mut service =
+        RecordServiceClient::new(channel).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
+    let request = v1::GetRecordRequest {
+        game_id: game.to_owned(),
+    };
+    let mut responses = (service.get_record(gateway.request(request)).await?).into_inner();
+    let mut lines = Vec::new();
+    while let Some(response) = responses.message().await? {
+        lines.extend(response.lines);
+    }
+    Ok(lines)
 }
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -191,11 +219,13 @@ impl RecordService for Records {
     ) -> Result<Response<Self::StreamRecordsStream>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
         let filter = checked(request.into_inner().filter)?;
         let service = self.clone();
         let (sender, responses) = channel();
         tokio::spawn(async move {
-            let sent = service.send_all(&caller, &filter, key, &sender).await;
+            let sending = service.send_all(&caller, &filter, key, gateway.as_ref(), &sender);
+            let sent = sending.await;
             end(&sender, sent).await;
         });
         Ok(Response::new(responses))

@@ -2,6 +2,7 @@
 //! one stream, their clocks, lost connections between nodes, spectators, and participants of a
 //! tournament.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,7 +18,7 @@ use chefshat_tests::{
 };
 use futures::future::join_all;
 
-use crate::tournament_deals::{counted, withheld};
+use crate::tournament_deals::{counted, streamed, withheld};
 use crate::tournaments::{create, id_of, join, start, unhurried};
 
 /// A room of one Shift at a node, and the tickets of its seats, joined through another node.
@@ -309,13 +310,16 @@ async fn participants_play_a_tournament_of_another_node() {
         }
     });
     let played = patiently("the tournament to end", join_all(playing)).await;
+    let mut games = BTreeSet::new();
     for outcomes in played {
         let outcomes = outcomes.expect("played");
         assert_eq!(outcomes.len(), 2);
         for outcome in outcomes {
-            check_record(&nodes, 1, &outcome.game_id).await;
+            check_record(&nodes, 0, &outcome.game_id).await;
+            games.insert(outcome.game_id);
         }
     }
+    assert_eq!(streamed(&client).await, games);
 }
 
 #[tokio::test]

@@ -73,7 +73,7 @@ pub(crate) async fn withheld(client: &Client, game: &v1::TournamentGame) {
 }
 
 /// The games whose records a stream contains.
-async fn streamed(client: &Client) -> BTreeSet<String> {
+pub(crate) async fn streamed(client: &Client) -> BTreeSet<String> {
     let mut service = RecordServiceClient::new(client.channel());
     let stream = service.stream_records(v1::StreamRecordsRequest::default());
     let stream = stream.await.expect("a stream").into_inner();
