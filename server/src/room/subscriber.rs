@@ -16,7 +16,6 @@ use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
 use chefshat_room::{ConnectionId, Core};
 
-use super::message::AttachRequest;
 use crate::convert;
 use crate::limits::Held;
 use crate::metrics::Counted;
@@ -99,18 +98,21 @@ impl SeatConnection {
     /// Creates a connection that has received nothing yet.
     pub fn new(
         (seat, id): (Seat, ConnectionId),
-        request: &AttachRequest,
+        handle: u32,
+        options: DeliveryOptions,
         stamp: Arc<HandStamp>,
+        by_gateway: bool,
+        detached: Arc<AtomicBool>,
         counted: Counted,
     ) -> Self {
         Self {
             seat,
             id,
-            handle: request.handle,
-            options: request.options,
+            handle,
+            options,
             stamp,
-            by_gateway: request.by_gateway,
-            detached: Arc::clone(&request.detached),
+            by_gateway,
+            detached,
             sent: 0,
             acknowledged: 0,
             decision_pending: false,

@@ -864,8 +864,11 @@ impl Room {
         let stamp = HandStamp::new(self.clock);
         let connected = SeatConnection::new(
             (seat, connection),
-            &request,
+            request.handle,
+            request.options,
             Arc::clone(&stamp),
+            request.by_gateway,
+            request.detached,
             self.context.metrics.seat(kind),
         );
         let mut subscriber =

@@ -17,7 +17,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
-use super::remote::{NodeGone, RemoteSeats};
+use super::remote::{CALLED, FIRST_CALLED, NodeGone, RemoteSeats};
 use crate::access::Caller;
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
@@ -549,11 +549,6 @@ pub(super) fn too_many_seats() -> Status {
         [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
     )
 }
-
-/// First handle of seats that the server attaches.
-pub(super) const FIRST_CALLED: u32 = 1 << 31;
-/// Number of handles of seats that one node attaches to a stream.
-pub(super) const CALLED: u32 = 1 << 24;
 
 /// Ids of connections of participants.
 static CONNECTIONS: AtomicU64 = AtomicU64::new(1);

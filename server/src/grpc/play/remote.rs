@@ -18,7 +18,6 @@ use tonic::transport::Channel;
 use tonic::{Request, Status};
 use tracing::debug;
 
-use super::reader::{CALLED, FIRST_CALLED};
 use crate::cluster::{Directory, Elsewhere, FoundBy};
 use crate::config::MAX_PEER_MESSAGE_BYTES;
 use crate::grpc::forward::Gateway;
@@ -28,6 +27,10 @@ use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
 use crate::wire::{Received, Updates};
 use chefshat_room::ids::Id;
 
+/// First handle of seats that the server attaches.
+pub(super) const FIRST_CALLED: u32 = 1 << 31;
+/// Number of handles of seats that one node attaches to a stream.
+pub(super) const CALLED: u32 = 1 << 24;
 /// Inputs that wait for one stream to another node. A client that sends more waits.
 const INPUTS_WAITING: usize = 1_024;
 /// Most inputs in one message.
