@@ -28,7 +28,7 @@ const FAST: &[&str] = &["fsync=off", "full_page_writes=off"];
 /// The settings of every server.
 const SETTINGS: [&str; 4] = [
     "listen_addresses=127.0.0.1",
-    "max_connections=200",
+    "max_connections=500",
     "shared_buffers=32MB",
     "unix_socket_directories=",
 ];

@@ -1,6 +1,8 @@
 //! Takeovers: an owner that has lost a room or tournament writes nothing any more, and nothing that
 //! was acknowledged is lost.
 
+use chefshat_postgres::Server;
+
 use super::*;
 
 const FIRST: Epoch = Epoch::FIRST;
@@ -395,4 +397,52 @@ async fn a_cursor_misses_no_game_that_nodes_finish_at_the_same_time() {
     assert_eq!(seen, (1..=40).collect::<Vec<u64>>());
     first.close().await;
     second.close().await;
+}
+
+/// A journal with two rows, whose database has just stopped.
+async fn stopped(retry_for: Duration) -> (Server, PostgresStore, Box<dyn Journal>) {
+    let mut server = Server::start();
+    let options = PostgresOptions {
+        retry_for,
+        ..PostgresOptions::default()
+    };
+    let store = node_with(&server.database(), options).await;
+    let created = store.create(durable(1), vec![entry(1)]).await;
+    let mut journal = created.expect("created");
+    append(&mut journal, 2).await.expect("committed");
+    server.stop();
+    assert!(store.beat().await.is_err(), "nobody answers");
+    (server, store, journal)
+}
+
+#[tokio::test]
+async fn a_database_that_restarts_is_waited_for() {
+    let (mut server, store, mut journal) = stopped(Duration::from_secs(300)).await;
+    let cancelled = append(&mut journal, 3).now_or_never();
+    assert_eq!(cancelled, None, "it is on its way");
+    let resuming = tokio::task::spawn_blocking(move || {
+        server.resume();
+        server
+    });
+    let (appended, server) = futures::join!(append(&mut journal, 4), resuming);
+    assert_eq!(appended, Ok(()));
+    let entries = journal.entries().await.expect("readable");
+    assert_eq!(numbers(&entries), [1, 2, 3, 4]);
+    store.close().await;
+    drop(server);
+}
+
+#[tokio::test]
+async fn a_row_without_an_answer_is_settled_before_the_next_one() {
+    let (mut server, store, mut journal) = stopped(Duration::ZERO).await;
+    let failed = append(&mut journal, 3).await;
+    assert!(matches!(failed, Err(StoreError::Failed(_))), "{failed:?}");
+    let failed = append(&mut journal, 4).await;
+    assert!(matches!(failed, Err(StoreError::Failed(_))), "{failed:?}");
+    server.resume();
+    append(&mut journal, 5).await.expect("the database is back");
+    let entries = journal.entries().await.expect("readable");
+    // The row of 4 was never sent: the one before it had no answer.
+    assert_eq!(numbers(&entries), [1, 2, 3, 5]);
+    store.close().await;
 }
