@@ -54,15 +54,8 @@ pub enum FoundBy {
 /// is not the owner any more says so, and is then forgotten. That nobody has something is never
 /// remembered.
 pub trait Directory: Send + Sync + 'static {
-    /// The name of this node.
-    fn node(&self) -> &str {
-        ""
-    }
-
-    /// The other nodes that are alive.
-    fn peers(&self) -> BoxFuture<'_, Vec<Peer>> {
-        ready(Vec::new()).boxed()
-    }
+    /// The name of this node, and the other nodes that are alive.
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)>;
 
     /// The location of a room or tournament that is not in memory.
     fn locate(&self, id: Id) -> BoxFuture<'_, Location>;
@@ -71,9 +64,7 @@ pub trait Directory: Send + Sync + 'static {
     fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location>;
 
     /// Whether a tournament of another node is over, so that no record of its games is withheld.
-    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
-        ready(false).boxed()
-    }
+    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool>;
 
     /// The node that was named last does not own it any more, or cannot be reached.
     fn forget(&self, found_by: &FoundBy);
@@ -90,6 +81,14 @@ impl fmt::Debug for dyn Directory {
 pub struct SingleServer;
 
 impl Directory for SingleServer {
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+        ready((Arc::from(""), Vec::new())).boxed()
+    }
+
+    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+        ready(false).boxed()
+    }
+
     fn locate(&self, _id: Id) -> BoxFuture<'_, Location> {
         ready(Location::Nowhere).boxed()
     }

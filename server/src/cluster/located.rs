@@ -63,7 +63,7 @@ impl StoreDirectory {
             });
         }
         let peer = match found.node {
-            Some(node) => self.peer(node).await?,
+            Some(node) => self.alive().await?.remove(&node),
             None => None,
         };
         Ok(match peer {
@@ -75,8 +75,8 @@ impl StoreDirectory {
         })
     }
 
-    /// A node, if it has a lease.
-    async fn peer(&self, node: NodeId) -> Result<Option<Peer>, StoreError> {
+    /// The nodes that have a lease.
+    async fn alive(&self) -> Result<BTreeMap<NodeId, Peer>, StoreError> {
         let is_known =
             |known: &Known| (known.read).is_some_and(|at| at.elapsed() < NODES_KNOWN_FOR);
         if !is_known(&self.known()) {
@@ -93,7 +93,7 @@ impl StoreDirectory {
             let mut known = self.known();
             (known.nodes, known.read) = (peers, Some(Instant::now()));
         }
-        Ok(self.known().nodes.get(&node).cloned())
+        Ok(self.known().nodes.clone())
     }
 }
 
@@ -144,6 +144,27 @@ impl Directory for StoreDirectory {
             let location = readable(location);
             remember(&mut self.known().by_code, code.to_owned(), &location);
             location
+        }
+        .boxed()
+    }
+
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+        async move {
+            let mut alive = self.alive().await.unwrap_or_else(|error| {
+                warn!(%error, "the nodes of the cluster are unknown");
+                BTreeMap::new()
+            });
+            let own = self.lease.node().and_then(|node| alive.remove(&node));
+            let name = own.map_or_else(|| Arc::from(""), |own| own.node);
+            (name, alive.into_values().collect())
+        }
+        .boxed()
+    }
+
+    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool> {
+        async move {
+            let found = self.store.locate(tournament).await;
+            found.is_ok_and(|found| found.is_some_and(|location| location.over))
         }
         .boxed()
     }

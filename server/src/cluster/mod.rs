@@ -16,4 +16,6 @@ pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer}
 pub use lease::{News, NodeLease};
 pub use located::StoreDirectory;
 pub use node::ClusterNode;
-pub use peers::{CONNECTION_WINDOW, PEER_NAME, PeerPort, PeerPortError, Peers, STREAM_WINDOW};
+pub use peers::{
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PEER_NAME, PeerPort, PeerPortError, Peers, STREAM_WINDOW,
+};

@@ -38,6 +38,10 @@ pub const STREAM_WINDOW: u32 = 64 * 1024;
 /// up the others.
 pub const CONNECTION_WINDOW: u32 = 1 << 30;
 
+/// Most streams that may be reset at a time. Clients that cancel their calls reset streams between
+/// nodes, whose connection must survive it.
+pub const MAX_RESET_STREAMS: usize = 1 << 20;
+
 /// How a node receives and opens connections of other nodes.
 #[derive(Debug)]
 pub struct PeerPort {
@@ -155,6 +159,8 @@ impl Peers {
                 .keep_alive_while_idle(true)
                 .initial_stream_window_size(STREAM_WINDOW)
                 .initial_connection_window_size(CONNECTION_WINDOW)
+                .http2_max_concurrent_reset_streams(MAX_RESET_STREAMS)
+                .http2_max_local_error_reset_streams(None)
                 .connect_with_connector_lazy(connector)
         });
         channel.clone()

@@ -102,10 +102,10 @@ async fn everywhere<L: Listing>(
     page_token: &str,
     page_size: usize,
 ) -> Result<Page<L::Entry>, Status> {
-    let directory = gateway.directory();
     let shown = Shown::parse(page_token)?;
-    let own = key(directory.node());
-    let peers: Vec<(String, Peer)> = (directory.peers().await.into_iter())
+    let (own, others) = gateway.directory().nodes().await;
+    let own = key(&own);
+    let peers: Vec<(String, Peer)> = (others.into_iter())
         .map(|peer| (key(&peer.node), peer))
         .filter(|(key, _)| shown.includes(key))
         .collect();
@@ -264,7 +264,7 @@ pub(super) async fn of_others<T, F>(
 where
     F: Future<Output = Result<Response<T>, Status>>,
 {
-    let peers = gateway.directory().peers().await;
+    let (_, peers) = gateway.directory().nodes().await;
     let asked = peers
         .iter()
         .map(|peer| timeout(PEER_TIMEOUT, ask(gateway.peers().channel(peer))));

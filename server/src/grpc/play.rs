@@ -3,6 +3,7 @@
 
 mod reader;
 mod remote;
+mod requests;
 
 use std::pin::Pin;
 use std::sync::{Arc, OnceLock};

@@ -2,13 +2,17 @@
 //! passed on, and what only a caller with a secret sees.
 
 use std::path::Path;
+use std::time::Duration;
 
-use chefshat_proto::v1::{self, room_service_client::RoomServiceClient};
+use chefshat_proto::v1::{
+    self, room_service_client::RoomServiceClient, seat_update::Update,
+    spectator_service_client::SpectatorServiceClient,
+};
 use chefshat_server::cluster::{PEER_NAME, PeerPort, PeerPortError};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::proxies::TrustedProxies;
 use chefshat_server::tls::TlsFiles;
-use chefshat_tests::TestNodes;
+use chefshat_tests::{StreamSeat, TestNodes};
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 use tonic::transport::{Certificate, Channel, ClientTlsConfig, Identity};
 use tonic::{Code, Request};
@@ -170,4 +174,42 @@ async fn a_private_room_of_another_node_is_shown_to_those_with_its_secrets() {
     let ticket = joined.expect("it has the code").ticket;
     let seated = stranger.with_secrets([&ticket]).expect("a secret");
     assert_eq!(seated.get_room(&room).await.expect("its own").room_id, room);
+}
+
+#[tokio::test]
+async fn calls_that_clients_cancel_leave_the_connection_between_nodes_as_it_is() {
+    let nodes = TestNodes::start(2).await;
+    let created = nodes.create_room(1, v1::CreateRoomRequest::default()).await;
+    let room_id = created.room.expect("a room").room_id;
+    let client = nodes.nodes[0].client().await;
+    let joined = client.join_with_code(&created.join_code, "Ada").await;
+    let ticket = joined.expect("a seat").ticket;
+    let mut seat = StreamSeat::attached(client.channel(), &ticket).await;
+    let others = nodes.nodes[0].client().await;
+    for _ in 0..50 {
+        let watching = (0..40).map(|_| {
+            let (mut service, room_id) = (
+                SpectatorServiceClient::new(others.channel()),
+                room_id.clone(),
+            );
+            async move {
+                let watch = v1::SpectatorServiceWatchRequest {
+                    room_id,
+                    ..v1::SpectatorServiceWatchRequest::default()
+                };
+                let _ = service.watch(watch).await;
+            }
+        });
+        // Some are cancelled before they are answered, others while they are.
+        let watching = futures::future::join_all(watching);
+        let _ = tokio::time::timeout(Duration::from_millis(3), watching).await;
+    }
+    seat.send(v1::seat_command::Command::Detach(v1::Detach {}))
+        .await;
+    match seat.next().await {
+        Update::Detached(detached) => {
+            assert_eq!(detached.reason(), v1::DetachReason::Requested);
+        }
+        other => panic!("not detached, but {other:?}"),
+    }
 }

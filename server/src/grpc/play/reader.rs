@@ -6,7 +6,6 @@ use std::future::{Future as _, poll_fn};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::task::Poll;
-use std::time::Duration;
 
 use chefshat_engine::MAX_ENTROPY;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
@@ -19,9 +18,7 @@ use tonic::{Code, Status, Streaming};
 
 use super::remote::{CALLED, FIRST_CALLED, NodeGone, RemoteSeats};
 use crate::access::Caller;
-use crate::config::{
-    FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
-};
+use crate::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_SEATS_PER_STREAM};
 use crate::convert;
 use crate::grpc::forward::Gateway;
 use crate::grpc::reach::Reach;
@@ -33,7 +30,6 @@ use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
 use crate::tournaments::{Call, Connection, TournamentHandle, Tournaments};
 use crate::wire::Updates;
-use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::{Answer, ConnectionId};
 
@@ -42,7 +38,7 @@ pub(super) struct BoundSeat {
     pub(super) room: Handle,
     seat: chefshat_engine::Seat,
     connection: ConnectionId,
-    stamp: Arc<HandStamp>,
+    pub(super) stamp: Arc<HandStamp>,
     pub(super) secret: [u8; 32],
     /// Set when the seat has left the stream.
     detached: Arc<AtomicBool>,
@@ -55,7 +51,12 @@ impl BoundSeat {
 
     /// Passes an answer to the room, `in_place` or through its mailbox. Returns the answer if the
     /// room cannot accept it now.
-    fn answer_now(&self, answer: Answer, arrived: Instant, in_place: bool) -> Result<(), Answer> {
+    pub(super) fn answer_now(
+        &self,
+        answer: Answer,
+        arrived: Instant,
+        in_place: bool,
+    ) -> Result<(), Answer> {
         if !in_place {
             return (self.room).send_answer(self.seat, self.connection, answer, arrived);
         }
@@ -77,8 +78,8 @@ pub(super) struct Reader {
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
     next_handle: u32,
     /// The handles of seats that the server attaches start here.
-    first_called: u32,
-    next_called: u32,
+    pub(super) first_called: u32,
+    pub(super) next_called: u32,
     /// The seats that other nodes have. Boxed, because a single server has none.
     remote: Option<Box<RemoteSeats>>,
     /// Whether the stream comes from another node, at which its client is connected.
@@ -107,73 +108,6 @@ pub(super) trait Requests: Send {
         reader: &mut Reader,
         arrived: Instant,
     ) -> impl Future<Output = Result<(), Status>> + Send;
-}
-
-impl Requests for v1::PlayRequest {
-    async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {
-        if self.commands.len() > MAX_COMMANDS_PER_MESSAGE {
-            return Err(status(
-                Code::InvalidArgument,
-                "TOO_MANY_COMMANDS",
-                format!("a message contains at most {MAX_COMMANDS_PER_MESSAGE} commands"),
-                [("field", "commands")],
-            ));
-        }
-        // The rooms of a message for several seats work in parallel instead.
-        let in_place = self.commands.len() == 1;
-        for command in self.commands {
-            reader.execute(command, arrived, in_place).await;
-        }
-        Ok(())
-    }
-}
-
-impl Requests for PlayRequest {
-    async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {
-        if self.first_assigned_handle > 0 {
-            reader.first_called = self.first_assigned_handle;
-            reader.next_called = self.first_assigned_handle;
-        }
-        let in_place = self.inputs.len() == 1;
-        for PlayInput { input, elapsed_us } in self.inputs {
-            tokio::task::consume_budget().await;
-            match input {
-                Some(Input::Command(mut command)) => match command.command.take() {
-                    Some(Command::Attach(attach)) => {
-                        Box::pin(reader.attach_as(command.handle, attach)).await;
-                    }
-                    Some(Command::Answer(answer)) => {
-                        let measured = elapsed_us.map(Duration::from_micros);
-                        let answer = Answer {
-                            measured,
-                            ..convert::answer_from_proto(answer)
-                        };
-                        let left = match reader.seats.get(&command.handle) {
-                            Some(bound) => bound.answer_now(answer, arrived, in_place).err(),
-                            None => Some(answer),
-                        };
-                        if let Some(answer) = left {
-                            let action = SeatAction::Answer(answer);
-                            Box::pin(reader.perform(command.handle, action, arrived)).await;
-                        }
-                    }
-                    other => {
-                        Box::pin(reader.execute_command(command.handle, other, arrived)).await;
-                    }
-                },
-                Some(Input::HandedOver(HandedOver {
-                    handle,
-                    decision_id,
-                })) => {
-                    if let Some(bound) = reader.seats.get(&handle) {
-                        bound.stamp.report(decision_id, arrived);
-                    }
-                }
-                None => {}
-            }
-        }
-        Ok(())
-    }
 }
 
 impl Reader {
@@ -277,7 +211,12 @@ impl Reader {
         });
     }
 
-    async fn execute(&mut self, command: v1::SeatCommand, arrived: Instant, in_place: bool) {
+    pub(super) async fn execute(
+        &mut self,
+        command: v1::SeatCommand,
+        arrived: Instant,
+        in_place: bool,
+    ) {
         // A flood of answers, which are handled without waiting, must not hold the thread.
         tokio::task::consume_budget().await;
         let v1::SeatCommand { handle, command } = command;
@@ -313,7 +252,12 @@ impl Reader {
         }
     }
 
-    async fn execute_command(&mut self, handle: u32, command: Option<Command>, arrived: Instant) {
+    pub(super) async fn execute_command(
+        &mut self,
+        handle: u32,
+        command: Option<Command>,
+        arrived: Instant,
+    ) {
         let action = match command {
             Some(Command::Attach(attach)) => return self.attach_as(handle, attach).await,
             Some(Command::Detach(_)) => return self.detach(handle).await,
@@ -334,7 +278,7 @@ impl Reader {
     }
 
     /// Sends an action to the room of a seat and waits for space in its mailbox.
-    async fn perform(&mut self, handle: u32, action: SeatAction, arrived: Instant) {
+    pub(super) async fn perform(&mut self, handle: u32, action: SeatAction, arrived: Instant) {
         let Some(bound) = self.seats.get(&handle) else {
             let problem = FieldProblem::new(
                 "handle",
@@ -359,7 +303,7 @@ impl Reader {
         self.attach_as(handle, attach).await;
     }
 
-    async fn attach_as(&mut self, handle: u32, mut attach: v1::Attach) {
+    pub(super) async fn attach_as(&mut self, handle: u32, mut attach: v1::Attach) {
         // The client may have attached on its next stream already, which this one would supersede.
         if self.outbox.is_abandoned() {
             return;
