@@ -5,7 +5,7 @@
 use std::fs;
 use std::io::{self, Write as _};
 use std::net::TcpListener;
-use std::os::unix::fs::{MetadataExt as _, chown};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -200,6 +200,27 @@ impl Server {
             sleep(Duration::from_millis(20));
         }
         self.keeper = Some(keeper);
+    }
+
+    /// Makes the server, while it is stopped, accept encrypted connections alone.
+    ///
+    /// # Panics
+    /// If the files cannot be written.
+    pub fn encrypt(&self, certificate_pem: &str, key_pem: &str) {
+        for (name, text) in [
+            ("server.crt", certificate_pem),
+            ("server.key", key_pem),
+            ("pg_hba.conf", "hostssl all all 127.0.0.1/32 trust\n"),
+            ("postgresql.conf", "ssl = on\n"),
+        ] {
+            let file = self.data().join(name);
+            fs::write(&file, text).expect("the folder of the database is writable");
+            let private = fs::set_permissions(&file, fs::Permissions::from_mode(0o600));
+            private.expect("it is ours");
+            if is_root() {
+                chown(&file, Some(NOBODY), Some(NOBODY)).expect("root may change owners");
+            }
+        }
     }
 
     fn is_ready(&self) -> bool {

@@ -1,5 +1,7 @@
 //! Opening a database: unusable ones are refused and left unchanged.
 
+use chefshat_postgres::Server;
+
 use super::*;
 
 async fn refusal(database: &Database) -> DatabaseError {
@@ -83,4 +85,37 @@ async fn a_node_that_has_not_joined_creates_nothing() {
     let refused = store.create(durable(1), vec![]).await;
     assert!(matches!(refused.err(), Some(StoreError::Failed(_))));
     store.close().await;
+}
+
+#[tokio::test]
+async fn connections_are_encrypted_and_certificates_checked() {
+    let tls = |file: &str| {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/tls/");
+        format!("{folder}{file}")
+    };
+    let text = |file: &str| std::fs::read_to_string(tls(file)).expect("the fixture");
+    let mut server = Server::start();
+    let database = server.database();
+    server.stop();
+    server.encrypt(&text("localhost.pem"), &text("localhost.key"));
+    server.resume();
+    let by_name = database.url().replace("127.0.0.1", "localhost");
+    let options = PostgresOptions::default;
+    let root = format!("sslrootcert={}", tls("localhost.pem"));
+    let checked = format!("{by_name}?sslmode=verify-full&{root}");
+    let store = PostgresStore::open(&checked, options()).await;
+    let store = store.expect("the certificate is trusted");
+    store.join(NodeInfo::default()).await.expect("it joins");
+    store.close().await;
+    for refused in [
+        format!("{by_name}?sslmode=disable"),
+        // Nobody trusts this certificate unless asked to.
+        format!("{by_name}?sslmode=verify-full"),
+    ] {
+        let opened = PostgresStore::open(&refused, options()).await;
+        let error = opened
+            .err()
+            .unwrap_or_else(|| panic!("{refused} was opened"));
+        assert!(matches!(error, DatabaseError::Other(_)), "{error}");
+    }
 }
