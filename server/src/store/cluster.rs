@@ -108,8 +108,8 @@ pub trait ClusterStore: Store {
     fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
 
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
-    /// epochs; only such that this version of the program can resume. Ephemeral rooms of such nodes
-    /// are removed.
+    /// epochs, in an order of this node's own, so that several nodes share them; only such that this
+    /// version of the program can resume. Ephemeral rooms of such nodes are removed.
     fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>>;
 
     /// Takes an orphan over if it still has the epoch that was seen: raises its epoch and adds "the

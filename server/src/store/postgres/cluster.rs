@@ -145,23 +145,26 @@ impl ClusterStore for PostgresStore {
         async move {
             let expire_after = millis(self.options.expire_after);
             let retention = millis(self.options.retention);
+            let node = self.node()?;
             let units = self.control.read(move |connection| {
                 async move {
                     tidy(connection, expire_after, retention).await?;
                     sqlx::query(
-                        "SELECT DISTINCT unit, epoch FROM owned
+                        "SELECT unit, epoch FROM owned
                          WHERE NOT over AND durable
                            AND (node IS NULL OR node IN (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
                            AND NOT EXISTS (
                                SELECT FROM owned other
                                WHERE other.unit = owned.unit AND NOT over
                                  AND (form > $2 OR coalesce(rules_version, $3) <> $3))
-                         ORDER BY unit LIMIT $4",
+                         GROUP BY unit, epoch
+                         ORDER BY hashtextextended(encode(unit, 'hex'), $5), unit LIMIT $4",
                     )
                     .bind(expire_after)
                     .bind(FORM)
                     .bind(i64::from(RULES_VERSION))
                     .bind(integer(count as u64))
+                    .bind(node)
                     .fetch_all(connection)
                     .await
                 }

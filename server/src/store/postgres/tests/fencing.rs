@@ -188,6 +188,23 @@ async fn of_many_claims_one_wins() {
 }
 
 #[tokio::test]
+async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
+    let pair = Pair::new().await;
+    for room in 1..=40 {
+        let created = pair.first.create(durable(room), vec![entry(1)]);
+        created.await.expect("created");
+        let released = pair.first.release(Id([room; 16]), FIRST);
+        released.await.expect("released");
+    }
+    let first = pair.first.orphans(10).await.expect("it answers");
+    let second = pair.second.orphans(10).await.expect("it answers");
+    assert_eq!((first.len(), second.len()), (10, 10));
+    assert_ne!(first, second);
+    assert_eq!(pair.first.orphans(99).await.map(|all| all.len()), Ok(40));
+    pair.close().await;
+}
+
+#[tokio::test]
 async fn a_tournament_changes_hands_with_all_its_rooms() {
     let pair = Pair::new().await;
     let unit = Id([9; 16]);

@@ -253,7 +253,8 @@ impl Worlds {
     /// Both worlds show the same.
     async fn compare(&self) {
         let store = &self.servers[0].store;
-        let orphans = store.orphans(99).await.expect("it answers");
+        let mut orphans = store.orphans(99).await.expect("it answers");
+        orphans.sort();
         assert_eq!(orphans, self.tables.orphans(self.now_ms, 99));
         let rows = store.reader.read(|connection| {
             sqlx::query_as("SELECT id, epoch, CASE WHEN NOT over THEN node END FROM owned")
