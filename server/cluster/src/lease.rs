@@ -46,6 +46,11 @@ impl LeaseTimes {
         self.beat_every_ms
     }
 
+    /// How long a node serves after sending a beat.
+    pub(crate) fn serve_for_ms(self) -> u64 {
+        self.serve_for_ms
+    }
+
     /// From the end of the time for which a node serves after a beat to the end of its lease.
     pub(crate) fn margin_ms(self) -> u64 {
         self.expire_after_ms - self.serve_for_ms

@@ -111,6 +111,9 @@ pub struct Node<K> {
     claiming: BTreeMap<K, bool>,
     releasing: BTreeSet<K>,
     suspended: bool,
+    /// When it may take over again after it has regained its lease. The database may have been away for all nodes: the first
+    /// one to reach it again must not take everything from the others.
+    claims_from_ms: u64,
     /// Whether a beat waits for its answer.
     beating: bool,
     beats_at_ms: u64,
@@ -130,6 +133,7 @@ impl<K: Ord + Copy> Node<K> {
             claiming: BTreeMap::new(),
             releasing: BTreeSet::new(),
             suspended: true,
+            claims_from_ms: 0,
             beating: false,
             beats_at_ms: 0,
             changed: BTreeSet::new(),
@@ -202,7 +206,7 @@ impl<K: Ord + Copy> Node<K> {
         match input {
             Input::Time => {}
             Input::Beat { sent_ms, answer } => self.beaten(sent_ms, answer, now_ms, &mut outputs),
-            Input::Orphans(orphans) => self.claim(orphans, &mut outputs),
+            Input::Orphans(orphans) => self.claim(orphans, now_ms, &mut outputs),
             Input::Claimed(id, answer) => self.claimed(id, answer, &mut outputs),
             Input::Created(id) => self.own(id, Epoch::FIRST),
             Input::Fenced(id, epoch) => {
@@ -286,14 +290,18 @@ impl<K: Ord + Copy> Node<K> {
                 self.phase = Phase::Left;
             }
             BeatAnswer::Kept(owned) => {
+                let is_first = self.lease.ends_ms() == 0;
                 self.lease.beaten(sent_ms);
                 if self.lease.holds(now_ms) {
                     self.reconcile(&owned.into_iter().collect(), outputs);
                     if self.suspended {
                         self.suspended = false;
+                        if !is_first {
+                            self.claims_from_ms = now_ms + self.lease.times().serve_for_ms();
+                        }
                         outputs.push(Output::Resume);
                     }
-                    self.find_orphans(outputs);
+                    self.find_orphans(now_ms, outputs);
                     let nothing_left = self.owns_nothing() && self.changed.is_empty();
                     if self.phase == Phase::Draining && nothing_left {
                         self.phase = Phase::Left;
@@ -326,16 +334,16 @@ impl<K: Ord + Copy> Node<K> {
         }
     }
 
-    fn find_orphans(&self, outputs: &mut Vec<Output<K>>) {
+    fn find_orphans(&self, now_ms: u64, outputs: &mut Vec<Output<K>>) {
         let taken = self.owned.len() + self.claiming.len();
         let count = self.capacity.saturating_sub(taken).min(ORPHANS_AT_ONCE);
-        if self.phase == Phase::Serving && count > 0 {
+        if self.phase == Phase::Serving && count > 0 && now_ms >= self.claims_from_ms {
             outputs.push(Output::FindOrphans(count));
         }
     }
 
-    fn claim(&mut self, orphans: Vec<(K, Epoch)>, outputs: &mut Vec<Output<K>>) {
-        if self.phase != Phase::Serving || self.suspended {
+    fn claim(&mut self, orphans: Vec<(K, Epoch)>, now_ms: u64, outputs: &mut Vec<Output<K>>) {
+        if self.phase != Phase::Serving || self.suspended || now_ms < self.claims_from_ms {
             return;
         }
         for (id, seen) in orphans {

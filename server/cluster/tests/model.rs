@@ -17,6 +17,7 @@ const TAKEOVER: Bounds = Bounds {
 
 /// A node dies, and an answer to the other gets lost.
 const CRASH: Bounds = Bounds {
+    until: 6,
     crashes: 1,
     ..TAKEOVER
 };
@@ -46,6 +47,7 @@ const DRAIN: Bounds = Bounds {
 
 /// A game ends while others may take it over.
 const END: Bounds = Bounds {
+    until: 5,
     ends: 1,
     ..TAKEOVER
 };

@@ -7,8 +7,9 @@ use stateright::{Model as _, Property};
 
 use super::{Bounds, Cluster, Happening, ROOM, UNIT, World};
 
-/// Ticks within which a cluster without further trouble serves everything again: a lease expires, and another node claims it.
-const RECOVERS_WITHIN: u64 = 6;
+/// Ticks within which a cluster without further trouble serves everything again: a lease expires, and another node, which may
+/// just have regained its own, claims the unit.
+const RECOVERS_WITHIN: u64 = 8;
 
 /// Most events in these ticks.
 const MOST_EVENTS: usize = 200;
