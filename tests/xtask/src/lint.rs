@@ -24,13 +24,15 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
-    for file in ["docker/compose.yaml", "docker/compose.proxy.yaml"] {
-        schema(places, steps, "vendor.compose-spec", file)?;
+    for name in ["compose", "compose.proxy", "compose.cluster"] {
+        let file = format!("docker/{name}.yaml");
+        schema(places, steps, "vendor.compose-spec", &file)?;
     }
     // Kinds of the Gateway API are not among the schemas.
     let manifests = [
         "--strict",
         "docker/kubernetes/chefshat.yaml",
+        "docker/kubernetes/cluster.yaml",
         "docker/kubernetes/ingress.yaml",
     ];
     steps.program(

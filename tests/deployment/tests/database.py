@@ -1,0 +1,69 @@
+"""A PostgreSQL server in a temporary folder, from Debian's packages."""
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import Self
+
+import pytest
+from certificates import PATIENCE_S
+
+# PostgreSQL refuses to run as root.
+_NOBODY = 65_534
+
+
+class Database:
+    """A server with an empty database; a context manager.
+
+    Attributes:
+        url: the address of the database.
+    """
+
+    def __init__(self) -> None:
+        """Prepares a server."""
+        self._programs = _programs()
+        # Not in pytest's folder, which other users cannot reach.
+        self._folder = tempfile.TemporaryDirectory(prefix="chefshat-postgres-")
+        self._data = Path(self._folder.name) / "data"
+        self._user = _NOBODY if os.geteuid() == 0 else None
+        if self._user is not None:
+            os.chown(self._folder.name, _NOBODY, _NOBODY)
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self._port = free.getsockname()[1]
+        self.url = f"postgres://chefshat@127.0.0.1:{self._port}/postgres"
+
+    def __enter__(self) -> Self:
+        initdb = [str(self._programs / "initdb"), "--auth=trust", "--no-sync", "--username=chefshat", f"--pgdata={self._data}"]
+        subprocess.run(initdb, check=True, capture_output=True, user=self._user, cwd="/")
+        command = [str(self._programs / "postgres"), "-D", str(self._data), "-p", str(self._port), "-h", "127.0.0.1", "-k", ""]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL, user=self._user, cwd="/")
+        give_up_at = time.monotonic() + PATIENCE_S
+        while subprocess.run([self._programs / "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self._port)]).returncode != 0:
+            assert self._process.poll() is None, "PostgreSQL does not start"
+            assert time.monotonic() < give_up_at, "PostgreSQL does not start"
+            time.sleep(0.05)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # Its fast shutdown.
+        self._process.send_signal(signal.SIGINT)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(10)
+        self._process.kill()
+        self._process.wait()
+        self._folder.cleanup()
+
+
+def _programs() -> Path:
+    """The folder of PostgreSQL's programs. Skips the test if there is none."""
+    versions = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"), key=lambda path: int(path.parts[-3]))
+    found = str(versions[-1]) if versions else shutil.which("initdb")
+    if found is None:
+        pytest.skip("PostgreSQL is not installed")
+    return Path(found).parent
