@@ -7,7 +7,7 @@ use std::time::Duration;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use tokio::time::Instant;
-use tracing::warn;
+use tracing::{debug, warn};
 
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
@@ -100,7 +100,7 @@ impl StoreDirectory {
 /// The answer, or that the directory cannot be read.
 fn readable(location: Result<Location, StoreError>) -> Location {
     location.unwrap_or_else(|error| {
-        warn!(%error, "the owner of a room or tournament cannot be found");
+        debug!(%error, "the owner of a room or tournament cannot be found");
         Location::Unknown
     })
 }
