@@ -30,8 +30,8 @@ use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
 use crate::cluster::{
-    CONNECTION_WINDOW, ClusterNode, Directory, MAX_RESET_STREAMS, NodeLease, PeerPort,
-    STREAM_WINDOW, SingleServer, StoreDirectory,
+    CONNECTION_WINDOW, ClusterNode, Directory, MAX_RESET_STREAMS, NodeLease, PING_INTERVAL,
+    PING_TIMEOUT, PeerPort, STREAM_WINDOW, SingleServer, StoreDirectory,
 };
 use crate::config::{
     DRAIN_LIMIT, HAND_OVER_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES,
@@ -342,6 +342,8 @@ impl Server {
                         .max_concurrent_streams(None)
                         .initial_stream_window_size(STREAM_WINDOW)
                         .initial_connection_window_size(CONNECTION_WINDOW)
+                        .http2_keepalive_interval(Some(PING_INTERVAL))
+                        .http2_keepalive_timeout(Some(PING_TIMEOUT))
                         .http2_max_pending_accept_reset_streams(Some(MAX_RESET_STREAMS))
                         .http2_max_local_error_reset_streams(None)
                         .layer(MapRequestLayer::new(from_peer))

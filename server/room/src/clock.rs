@@ -331,7 +331,9 @@ impl Core {
         let Some(open) = &self.open else { return };
         let (seat, silent) = (open.decision.seat, open.is_silent());
         let time = now.saturating_sub(open.start.unwrap_or(open.released));
-        let time = time.saturating_sub(self.seats[seat.index()].grace);
+        // The timer fires later by the grace; a late answer may come at any time before.
+        let without_grace = time.saturating_sub(self.seats[seat.index()].grace);
+        let time = without_grace.max(time.min(self.time_allowed(seat)));
         let source = if self.seats[seat.index()].connection.is_some() {
             Source::Timeout
         } else {

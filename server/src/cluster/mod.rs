@@ -17,5 +17,6 @@ pub use lease::{News, NodeLease};
 pub use located::StoreDirectory;
 pub use node::ClusterNode;
 pub use peers::{
-    CONNECTION_WINDOW, MAX_RESET_STREAMS, PEER_NAME, PeerPort, PeerPortError, Peers, STREAM_WINDOW,
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PEER_NAME, PING_INTERVAL, PING_TIMEOUT, PeerPort,
+    PeerPortError, Peers, STREAM_WINDOW,
 };

@@ -28,10 +28,10 @@ use crate::tls::{MaybeTls, Tls, TlsError, TlsFiles};
 pub const PEER_NAME: &str = "chefshat-node";
 /// How long connecting to another node may take.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
-/// Time between two pings of a connection to another node.
-const PING_INTERVAL: Duration = Duration::from_secs(2);
-/// How long another node may take to answer a ping. After that everything on the connection fails.
-const PING_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time between two pings of a connection between nodes, from either side.
+pub const PING_INTERVAL: Duration = Duration::from_secs(2);
+/// How long the other node may take to answer a ping. After that everything on the connection fails.
+pub const PING_TIMEOUT: Duration = Duration::from_secs(3);
 /// Most bytes that wait on one stream between nodes for a client that does not read.
 pub const STREAM_WINDOW: u32 = 64 * 1024;
 /// Most bytes that wait on all streams between two nodes: streams that are not read must not hold

@@ -63,6 +63,7 @@ fn an_answer_that_was_late_at_the_gateway_closes_the_decision() {
     assert_eq!(answered.verdict, Verdict::Closed);
     let decided = table.last_decision();
     assert_eq!((decided.seat, decided.source), (seat, Source::Timeout));
+    assert_eq!((decided.time_us, decided.bank_left_ms), (1_500_000, 0));
 }
 
 #[test]
