@@ -1,7 +1,7 @@
 //! A server as one node of several. `directory` says which node has a room or tournament; a single
 //! server has all of them and asks nobody, and `located` asks the database. `peers` connects
 //! the nodes. `node` is the task that beats and takes over, `units` resumes and stops what it owns,
-//! and `lease` tells those when they may publish.
+//! `turns` keeps their order, and `lease` tells those when they may publish.
 
 mod directory;
 mod lease;
@@ -10,6 +10,7 @@ mod node;
 mod peers;
 #[cfg(test)]
 mod tests;
+mod turns;
 mod units;
 
 pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer};

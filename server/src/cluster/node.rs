@@ -3,19 +3,19 @@
 //! one after another.
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, LeaseTimes, Node, Output, Phase};
 use futures::future::pending;
-use tokio::sync::{Semaphore, oneshot, watch};
+use tokio::sync::{Semaphore, watch};
 use tokio::task::{JoinHandle, JoinSet};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, sleep_until, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
 use super::lease::{News, NodeLease};
+use super::turns::Turns;
 use super::units::Units;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
@@ -23,7 +23,8 @@ use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
-/// How long an answer of the database is awaited. After that, the next beat says what happened.
+/// How long an answer of the database is awaited, except to a beat. After that, the next beat says
+/// what happened.
 const ANSWER_TIME: Duration = Duration::from_secs(4);
 /// Time between two looks for units that nobody owns, so that those of a drained node soon run again.
 const FIND_INTERVAL: Duration = Duration::from_millis(500);
@@ -73,7 +74,7 @@ impl ClusterNode {
             units: Arc::new(units),
             began: Instant::now(),
             running: BTreeMap::new(),
-            work: BTreeMap::new(),
+            turns: Turns::default(),
             answers: JoinSet::new(),
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
             asked,
@@ -121,9 +122,7 @@ enum Event {
     Answer(Input<Id>),
     /// A beat was answered, and the node was asked to hand over what it owns.
     AskedToDrain(Input<Id>),
-    /// A unit runs here at this epoch.
-    Runs(Id, Epoch),
-    /// A unit was stopped, or nothing follows.
+    /// A unit was resumed or stopped, and nothing follows.
     Nothing,
     /// The node is removed from the database.
     Left,
@@ -138,10 +137,9 @@ struct Task {
     units: Arc<Units>,
     lease: Arc<NodeLease>,
     began: Instant,
-    /// The epochs at which units were resumed here.
+    /// The epochs at which units are resumed here.
     running: BTreeMap<Id, Epoch>,
-    /// The end of the latest work with each unit.
-    work: BTreeMap<Id, oneshot::Receiver<Infallible>>,
+    turns: Turns,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
     asked: watch::Sender<bool>,
@@ -164,7 +162,6 @@ impl Task {
                         self.asked.send_replace(true);
                         self.put_in(input);
                     }
-                    Ok(Event::Runs(unit, epoch)) => drop(self.running.insert(unit, epoch)),
                     Ok(Event::Nothing) => {}
                     Ok(Event::Left) => return,
                     Err(problem) => error!(%problem, "work for the cluster has failed"),
@@ -210,15 +207,18 @@ impl Task {
         let store = Arc::clone(&self.store);
         match output {
             Output::Beat => {
-                self.work.retain(|_, work| !work.is_terminated());
+                self.turns.forget_ended();
                 let sent_ms = self.now_ms();
+                // A beat without an answer must not take up the time of the next one, which the
+                // lease may still wait for.
+                let within = Duration::from_millis(self.times.beat_every_ms());
                 self.answers
-                    .spawn(async move { beat(&*store, sent_ms).await });
+                    .spawn(async move { beat(&*store, within, sent_ms).await });
             }
             Output::FindOrphans(count) => self.find_orphans(count),
             Output::Claim(unit, seen) => {
                 self.answers.spawn(async move {
-                    let answer = match answer("claim", store.claim(unit, seen)).await {
+                    let answer = match answer("claim", ANSWER_TIME, store.claim(unit, seen)).await {
                         Some(Some(epoch)) => ClaimAnswer::Won(epoch),
                         Some(None) => ClaimAnswer::Lost,
                         None => ClaimAnswer::None,
@@ -228,10 +228,12 @@ impl Task {
             }
             Output::Serve(unit, epoch) => {
                 self.units.want(unit, epoch);
+                // One of its rooms may stop before all are resumed.
+                self.running.insert(unit, epoch);
                 let units = Arc::clone(&self.units);
                 self.queue(unit, async move {
                     units.resume(unit, epoch).await;
-                    Event::Runs(unit, epoch)
+                    Event::Nothing
                 });
             }
             Output::Stop(unit) => self.stop(unit),
@@ -250,7 +252,7 @@ impl Task {
             Output::Leave => {
                 self.answers.spawn(async move {
                     // If no answer comes, the node is removed when its lease has expired.
-                    answer("leave", store.leave()).await;
+                    answer("leave", ANSWER_TIME, store.leave()).await;
                     Event::Left
                 });
             }
@@ -263,7 +265,7 @@ impl Task {
         }
         let store = Arc::clone(&self.store);
         self.answers.spawn(async move {
-            let orphans = answer("look for orphans", store.orphans(count)).await;
+            let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
             Event::Answer(Input::Orphans(orphans.unwrap_or_default()))
         });
     }
@@ -290,16 +292,10 @@ impl Task {
 
     /// Does something with a unit after what is done with it already.
     fn queue(&mut self, unit: Id, work: impl Future<Output = Event> + Send + 'static) {
-        let (done, ended) = oneshot::channel::<Infallible>();
-        let before = self.work.insert(unit, ended);
+        let mut turn = self.turns.take(unit);
         self.answers.spawn(async move {
-            if let Some(before) = before {
-                // Ends when its sender is dropped.
-                let _ = before.await;
-            }
-            let event = work.await;
-            drop(done);
-            event
+            turn.comes().await;
+            work.await
         });
     }
 
@@ -322,8 +318,8 @@ impl Task {
 }
 
 /// Beats, and reads what the node owns.
-async fn beat(store: &dyn ClusterStore, sent_ms: u64) -> Event {
-    let (answer, drain) = match answer("beat", store.beat()).await {
+async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64) -> Event {
+    let (answer, drain) = match answer("beat", within, store.beat()).await {
         Some(Some(beat)) => (BeatAnswer::Kept(beat.owned), beat.drain),
         Some(None) => (BeatAnswer::Unknown, false),
         None => (BeatAnswer::None, false),
@@ -335,9 +331,13 @@ async fn beat(store: &dyn ClusterStore, sent_ms: u64) -> Event {
     }
 }
 
-/// The answer of the database; `None` if it failed or none came.
-async fn answer<T>(what: &str, asked: impl Future<Output = Result<T, StoreError>>) -> Option<T> {
-    match timeout(ANSWER_TIME, asked).await {
+/// The answer of the database; `None` if it failed or none came in time.
+async fn answer<T>(
+    what: &str,
+    within: Duration,
+    asked: impl Future<Output = Result<T, StoreError>>,
+) -> Option<T> {
+    match timeout(within, asked).await {
         Ok(Ok(answer)) => Some(answer),
         Ok(Err(error)) => {
             warn!(what, %error, "the database did not do what the cluster needs");

@@ -12,7 +12,7 @@ use chefshat_room::journal::{Change, Entry, GameHeader};
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
 use tokio::sync::watch;
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 
 use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
@@ -113,6 +113,12 @@ pub(super) struct FakeStore {
     pub(super) cut_off: watch::Sender<bool>,
     /// Whether beats do not reach it.
     pub(super) beats_lost: watch::Sender<bool>,
+    /// How many of the next beats are never answered.
+    pub(super) beats_unanswered: watch::Sender<u32>,
+    /// How often a unit was read.
+    pub(super) loads: watch::Sender<u32>,
+    /// Whether reading a unit takes until this is over.
+    pub(super) loads_held: watch::Sender<bool>,
 }
 
 impl FakeStore {
@@ -123,6 +129,9 @@ impl FakeStore {
             epochs: Mutex::default(),
             cut_off: watch::Sender::new(false),
             beats_lost: watch::Sender::new(false),
+            beats_unanswered: watch::Sender::new(0),
+            loads: watch::Sender::new(0),
+            loads_held: watch::Sender::new(false),
         })
     }
 
@@ -379,6 +388,16 @@ impl ClusterStore for FakeStore {
             self.reached().await;
             let mut lost = self.beats_lost.subscribe();
             (lost.wait_for(|lost| !lost).await).expect("the sender is here");
+            let is_unanswered = self.beats_unanswered.send_if_modified(|left| {
+                let is_any = *left > 0;
+                *left = left.saturating_sub(1);
+                is_any
+            });
+            if is_unanswered {
+                return pending().await;
+            }
+            // So that it is seen when a node has no lease until the answer.
+            sleep(Duration::from_millis(1)).await;
             let mut tables = self.database.tables();
             let node = self.node();
             if !tables.beat(node, self.database.now_ms()) {
@@ -423,6 +442,9 @@ impl ClusterStore for FakeStore {
     fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
         async move {
             self.reached().await;
+            self.loads.send_modify(|loads| *loads += 1);
+            let mut held = self.loads_held.subscribe();
+            (held.wait_for(|held| !held).await).expect("the sender is here");
             let tables = self.database.tables();
             if tables.owner(unit) != Some(self.node()) || tables.epoch(unit) != Some(epoch) {
                 return Ok(None);

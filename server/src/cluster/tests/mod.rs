@@ -17,7 +17,7 @@ use futures::FutureExt as _;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::TaskTracker;
 
-use super::{ClusterNode, NodeLease, SingleServer};
+use super::{ClusterNode, News, NodeLease, SingleServer};
 use crate::config::ServerConfig;
 use crate::convert;
 use crate::limits::Key;
@@ -252,6 +252,44 @@ async fn without_a_lease_nothing_is_published_until_it_is_back() {
     first.store.beats_lost.send_replace(false);
     soon(joining).await.expect("the room continues");
     assert_eq!(names(&room).await, ["Ada"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_beat_without_an_answer_costs_no_lease() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    let mut publishes = first.node.may_publish();
+    first.store.beats_unanswered.send_replace(1);
+    let suspended = timeout(SOON, publishes.wait_for(|it| !it));
+    assert!(suspended.await.is_err(), "the node keeps its lease");
+    assert_eq!(*first.store.beats_unanswered.borrow(), 0, "a beat was lost");
+    soon(join(&room, "Ada")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_beat() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    second.store.loads_held.send_replace(true);
+    drop(first);
+    let mut loads = second.store.loads.subscribe();
+    soon(loads.wait_for(|loads| *loads == 1))
+        .await
+        .expect("the store is here");
+    let lease = second.rooms.lease().expect("a node");
+    lease.report(room, News::Stopped);
+    // Until everything waits for the store.
+    sleep(Duration::from_millis(1)).await;
+    second.store.loads_held.send_replace(false);
+
+    soon(loads.wait_for(|loads| *loads == 2))
+        .await
+        .expect("it is resumed again");
+    let room = second.has(room).await;
+    soon(join(&room, "Ada")).await.expect("it runs");
 }
 
 #[tokio::test(start_paused = true)]

@@ -1,0 +1,72 @@
+//! The order of what is done with one unit: one thing after another, while different units do not
+//! wait for each other.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+use chefshat_room::ids::Id;
+use tokio::sync::oneshot;
+use tokio::sync::oneshot::error::TryRecvError;
+
+/// The end of the latest work with each unit.
+#[derive(Default)]
+pub(super) struct Turns(BTreeMap<Id, oneshot::Receiver<Infallible>>);
+
+/// A place in the order of a unit. Dropping it lets the next one come.
+pub(super) struct Turn {
+    before: Option<oneshot::Receiver<Infallible>>,
+    _ends: oneshot::Sender<Infallible>,
+}
+
+impl Turns {
+    /// The place after all that were taken for the unit.
+    pub(super) fn take(&mut self, unit: Id) -> Turn {
+        let (ends, ended) = oneshot::channel();
+        Turn {
+            before: self.0.insert(unit, ended),
+            _ends: ends,
+        }
+    }
+
+    /// Forgets the units with which nothing is done any more.
+    pub(super) fn forget_ended(&mut self) {
+        self.0
+            .retain(|_, ended| ended.try_recv() == Err(TryRecvError::Empty));
+    }
+}
+
+impl Turn {
+    /// Waits until all before it have ended.
+    pub(super) async fn comes(&mut self) {
+        if let Some(before) = self.before.take() {
+            // Ends when its sender is dropped.
+            let _ = before.await;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::FutureExt as _;
+
+    use super::*;
+
+    #[test]
+    fn one_comes_after_another_and_units_without_work_are_forgotten() {
+        let (unit, other) = (Id([1; 16]), Id([2; 16]));
+        let mut turns = Turns::default();
+        let (first, mut second) = (turns.take(unit), turns.take(unit));
+        drop(turns.take(other));
+        assert_eq!(second.comes().now_or_never(), None);
+        turns.forget_ended();
+        assert!(turns.0.keys().eq([&unit]));
+
+        drop(first);
+        assert_eq!(second.comes().now_or_never(), Some(()));
+        turns.forget_ended();
+        assert!(turns.0.keys().eq([&unit]), "the second goes on");
+        drop(second);
+        turns.forget_ended();
+        assert!(turns.0.is_empty());
+    }
+}
