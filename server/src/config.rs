@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_cluster::LeaseTimes;
 use chefshat_record::signature::SigningKey;
 use chefshat_vector::Limits;
 
@@ -140,6 +141,8 @@ pub struct ServerConfig {
     pub data_dir: Option<PathBuf>,
     /// The key that signs records; `None`: they are not signed.
     pub signing_key: Option<Arc<SigningKey>>,
+    /// How often a node of a cluster beats, and how long its lease lasts.
+    pub lease: LeaseTimes,
     /// Most rooms at a time, including ended ones that are still listed.
     pub max_rooms: usize,
     /// Most connections at a time.
@@ -184,6 +187,7 @@ impl Default for ServerConfig {
         Self {
             data_dir: None,
             signing_key: None,
+            lease: LeaseTimes::DEFAULT,
             max_rooms: 10_000,
             max_connections: 10_000,
             vector_threads: 0,

@@ -8,7 +8,6 @@ use std::future::Future;
 use std::io;
 use std::sync::Arc;
 
-use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use futures::future::{Either, try_join};
 use futures::{Stream, StreamExt as _, TryStreamExt as _};
@@ -153,13 +152,13 @@ impl Server {
         let directory = Arc::new(directory);
         let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
         let mut server = Self::new(config, stored, directory, Some(lease))?;
-        let grace = server.config.grace;
+        let (grace, lease_times) = (server.config.grace, server.config.lease);
         let id = store.join(info.clone()).await?;
         info!(node = id.0, name = info.name, "joined the cluster");
         server.node = Some(ClusterNode::start(
             id,
             info,
-            LeaseTimes::DEFAULT,
+            lease_times,
             grace,
             store,
             Arc::clone(&server.rooms),

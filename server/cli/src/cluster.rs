@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use chefshat_server::cluster::PeerPort;
+use chefshat_server::cluster::{LeaseTimes, PeerPort};
 use chefshat_server::store::cluster::{ClusterStore, NodeInfo, NodeStatus};
 use chefshat_server::store::{PostgresOptions, PostgresStore, Store as _};
 use chefshat_server::tls::TlsFiles;
@@ -238,6 +238,17 @@ pub(super) struct NodeSettings {
     /// File with the authority that signs the certificates of nodes, and of nothing else, PEM.
     #[arg(long, env = "CHEFSHAT_PEER_CA", value_name = "FILE")]
     peer_ca: Option<PathBuf>,
+    /// Milliseconds after which the lease of a node that does not beat expires, the same for all
+    /// nodes: short ones are for tests.
+    #[arg(long, hide = true, default_value = "8000", value_name = "MS", value_parser = lease)]
+    pub(super) lease: LeaseTimes,
+}
+
+/// The times of leases that expire after these milliseconds, in the usual proportions.
+fn lease(text: &str) -> Result<LeaseTimes, String> {
+    let expire_after_ms: u64 = text.parse().map_err(|_| "use a number".to_owned())?;
+    let quarter_ms = expire_after_ms / 4;
+    LeaseTimes::new(quarter_ms, 3 * quarter_ms, expire_after_ms).map_err(|error| error.to_string())
 }
 
 /// A node that is about to join.

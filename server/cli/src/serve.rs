@@ -249,6 +249,7 @@ impl Serve {
         let options = PostgresOptions {
             retention: ServerConfig::default().retention,
             record_files: false,
+            expire_after: Duration::from_millis(settings.node.lease.expire_after_ms()),
             ..PostgresOptions::default()
         };
         let storage = match settings.node.open(settings.max_rooms, options).await? {
@@ -290,6 +291,7 @@ impl Serve {
             tls,
             grace: Duration::from_secs(settings.grace),
             allowed_origins: without_empty(settings.allowed_origins),
+            lease: settings.node.lease,
             ..ServerConfig::default()
         };
         let server = match storage {

@@ -51,6 +51,11 @@ impl LeaseTimes {
         self.serve_for_ms
     }
 
+    /// From a beat to the end of the lease.
+    pub fn expire_after_ms(self) -> u64 {
+        self.expire_after_ms
+    }
+
     /// From the end of the time for which a node serves after a beat to the end of its lease.
     pub(crate) fn margin_ms(self) -> u64 {
         self.expire_after_ms - self.serve_for_ms

@@ -7,6 +7,9 @@ use std::sync::Arc;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
+use crate::store::ResumableGame;
+use crate::store::cluster::Kind;
+use crate::store::tournaments::StoredTournament;
 use chefshat_room::ids::Id;
 
 /// Another node of the cluster.
@@ -25,6 +28,8 @@ pub enum Location {
     Here,
     /// Another node owns it.
     Node(Peer),
+    /// It is over, and the node that had it is gone. Every node may load it to show its end.
+    Over(Id, Kind),
     /// No node has it.
     Nowhere,
     /// The directory cannot be read now.
@@ -65,6 +70,16 @@ pub trait Directory: Send + Sync + 'static {
 
     /// Whether a tournament of another node is over, so that no record of its games is withheld.
     fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool>;
+
+    /// The room of a game that is over.
+    fn ended_room(&self, _room: Id) -> BoxFuture<'_, Option<ResumableGame>> {
+        ready(None).boxed()
+    }
+
+    /// A tournament that is over.
+    fn ended_tournament(&self, _tournament: Id) -> BoxFuture<'_, Option<StoredTournament>> {
+        ready(None).boxed()
+    }
 
     /// The node that was named last does not own it any more, or cannot be reached.
     fn forget(&self, found_by: &FoundBy);

@@ -11,8 +11,9 @@ use tracing::{debug, warn};
 
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
-use crate::store::StoreError;
 use crate::store::cluster::{self, ClusterStore, NodeId};
+use crate::store::tournaments::StoredTournament;
+use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::Id;
 
 /// Most rooms and tournaments of other nodes that are remembered, by id and by join code.
@@ -57,8 +58,7 @@ impl StoreDirectory {
         };
         if found.node.is_some() && found.node == self.lease.node() {
             return Ok(match found.over {
-                // Its end is not shown any more.
-                true => Location::Nowhere,
+                true => Location::Over(found.id, found.kind),
                 false => Location::Here,
             });
         }
@@ -68,8 +68,7 @@ impl StoreDirectory {
         };
         Ok(match peer {
             Some(peer) => Location::Node(peer),
-            // With its last owner, its end is gone.
-            None if found.over => Location::Nowhere,
+            None if found.over => Location::Over(found.id, found.kind),
             // A node will soon take it over.
             None => Location::Unknown,
         })
@@ -115,7 +114,23 @@ fn remember<K: Ord>(peers: &mut BTreeMap<K, Peer>, key: K, location: &Location) 
     }
 }
 
+/// What was read about something that is over.
+fn read<T>(ended: Result<Option<T>, StoreError>) -> Option<T> {
+    ended.unwrap_or_else(|error| {
+        warn!(%error, "a room or tournament that is over cannot be read");
+        None
+    })
+}
+
 impl Directory for StoreDirectory {
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Option<ResumableGame>> {
+        self.store.ended_room(room).map(read).boxed()
+    }
+
+    fn ended_tournament(&self, tournament: Id) -> BoxFuture<'_, Option<StoredTournament>> {
+        self.store.tournament(tournament).map(read).boxed()
+    }
+
     fn locate(&self, id: Id) -> BoxFuture<'_, Location> {
         async move {
             if let Some(peer) = self.known().by_id.get(&id) {

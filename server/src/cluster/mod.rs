@@ -13,6 +13,7 @@ mod tests;
 mod turns;
 mod units;
 
+pub use chefshat_cluster::LeaseTimes;
 pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer};
 pub use lease::{News, NodeLease};
 pub use located::StoreDirectory;

@@ -17,6 +17,7 @@ use crate::cluster::{Elsewhere, FoundBy, Location};
 use crate::room::Handle;
 use crate::rooms::Rooms;
 use crate::store::StoredGame;
+use crate::store::cluster::Kind;
 use crate::tournaments::{TournamentHandle, Tournaments};
 use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
 use chefshat_room::journal::{Change, Entry, GameHeader};
@@ -56,9 +57,9 @@ impl Reach {
             Some(handle) if !handle.is_gone() => Ok(Some(handle)),
             stopped => {
                 let is_known = || stopped.is_some() || self.tournaments.get(id).is_some();
-                let location = self.rooms.directory().locate(id).await;
+                let location = self.located(id).await;
                 not_elsewhere(location, FoundBy::Id(id), is_known)?;
-                Ok(stopped)
+                Ok(stopped.or_else(|| self.rooms.get(id)))
             }
         }
     }
@@ -70,9 +71,9 @@ impl Reach {
             stopped => {
                 let code = normal_code(code);
                 let is_known = || stopped.is_some() || self.tournaments.by_code(&code).is_some();
-                let location = self.rooms.directory().locate_code(&code).await;
+                let location = self.located_code(&code).await;
                 not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
-                Ok(stopped)
+                Ok(stopped.or_else(|| self.rooms.by_code(&code)))
             }
         }
     }
@@ -85,9 +86,9 @@ impl Reach {
         if let Some(handle) = self.tournaments.get(id) {
             return Ok(Some(handle));
         }
-        let location = self.rooms.directory().locate(id).await;
+        let location = self.located(id).await;
         not_elsewhere(location, FoundBy::Id(id), || self.rooms.get(id).is_some())?;
-        Ok(None)
+        Ok(self.tournaments.get(id))
     }
 
     /// The tournament with this join code, as [`Reach::room_here`].
@@ -99,10 +100,10 @@ impl Reach {
             return Ok(Some(handle));
         }
         let code = normal_code(code);
-        let location = self.rooms.directory().locate_code(&code).await;
+        let location = self.located_code(&code).await;
         let is_known = || self.rooms.by_code(&code).is_some();
         not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
-        Ok(None)
+        Ok(self.tournaments.by_code(&code))
     }
 
     /// Checks that no other node has created a room or tournament for this request before.
@@ -116,8 +117,41 @@ impl Reach {
         if self.rooms.get(id).is_some() || self.tournaments.get(id).is_some() {
             return Ok(());
         }
-        let location = self.rooms.directory().locate(id).await;
+        let location = self.located(id).await;
         not_elsewhere(location, FoundBy::Id(id), || false)
+    }
+
+    /// Where a room or tournament is that is not in memory. One that is over and whose node is gone
+    /// is in memory afterwards.
+    async fn located(&self, id: Id) -> Location {
+        let location = self.rooms.directory().locate(id).await;
+        self.load_end(&location).await;
+        location
+    }
+
+    /// As [`Reach::located`], by its join code in its normal form.
+    async fn located_code(&self, code: &str) -> Location {
+        let location = self.rooms.directory().locate_code(code).await;
+        self.load_end(&location).await;
+        location
+    }
+
+    async fn load_end(&self, location: &Location) {
+        let directory = self.rooms.directory();
+        match *location {
+            Location::Over(id, Kind::Room) => {
+                let ended = directory.ended_room(id).await;
+                self.rooms.resume_all(ended.into_iter().collect()).await;
+            }
+            Location::Over(id, Kind::Tournament) => {
+                let ended = directory.ended_tournament(id).await;
+                // Another request may have loaded it meanwhile.
+                if let Some(ended) = ended.filter(|_| self.tournaments.get(id).is_none()) {
+                    self.tournaments.resume(ended);
+                }
+            }
+            _ => {}
+        }
     }
 
     /// The room with an id from a message.
@@ -382,7 +416,7 @@ fn not_elsewhere(
     is_known: impl FnOnce() -> bool,
 ) -> Result<(), Status> {
     match location {
-        Location::Nowhere => Ok(()),
+        Location::Nowhere | Location::Over(..) => Ok(()),
         Location::Here if is_known() => Ok(()),
         Location::Here | Location::Unknown => Err(owner_unreachable()),
         Location::Node(peer) => Err(elsewhere(Elsewhere { peer, found_by })),

@@ -323,15 +323,18 @@ impl Reader {
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
         if let Some(token) = Token::parse(&attach.ticket) {
-            let tournament = self.tournaments.get(token.room);
+            let mut tournament = self.tournaments.get(token.room);
             let reach = Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments));
-            let in_scope = match &tournament {
-                Some(handle) => reach.check_ticket_of(&self.caller, handle, ticket_unknown),
-                None => (reach
-                    .room_of_ticket(&self.caller, token.room, ticket_unknown)
-                    .await)
-                    .map(drop),
-            };
+            let mut in_scope = Ok(());
+            if tournament.is_none() {
+                let room = reach.room_of_ticket(&self.caller, token.room, ticket_unknown);
+                in_scope = room.await.map(drop);
+                // This node may have taken it over meanwhile.
+                tournament = self.tournaments.get(token.room);
+            }
+            if let Some(handle) = &tournament {
+                in_scope = reach.check_ticket_of(&self.caller, handle, ticket_unknown);
+            }
             if let Err(status) = in_scope {
                 return match (is_elsewhere(&status), &mut self.remote) {
                     (Some(elsewhere), Some(remote)) => {
