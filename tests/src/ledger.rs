@@ -151,6 +151,7 @@ fn as_seen_by(event: &v1::GameEvent, seat: u32) -> v1::GameEvent {
             if ![exchanged.giver, exchanged.receiver].contains(&seat) =>
         {
             exchanged.cards.clear();
+            exchanged.golden = false;
         }
         _ => {}
     }

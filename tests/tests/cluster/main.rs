@@ -1,0 +1,10 @@
+//! Several server processes as the nodes of a cluster, on a real PostgreSQL server and behind a real
+//! proxy, while machines and networks fail.
+
+mod certificates;
+mod cluster;
+mod cup;
+mod faults;
+mod measure;
+mod proxy;
+mod rounds;
