@@ -3,8 +3,8 @@
 //! came is brought in as well, once the caller has waited long enough.
 //!
 //! Each answer to a beat says which units the node owns according to the database. So if an answer is lost (to a claim or a
-//! release), the node learns the truth with one of its next beats. A node whose lease has expired stops everything; what nobody
-//! else has taken over meanwhile it serves again with its next beat.
+//! release), the node learns the truth with one of its next beats. A node whose lease has expired stops all that others can
+//! take over; what nobody else has taken over meanwhile it serves again with its next beat.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -63,7 +63,12 @@ pub enum Input<K> {
     /// A claim was answered.
     Claimed(K, ClaimAnswer),
     /// A unit was created here.
-    Created(K),
+    Created {
+        /// The unit.
+        unit: K,
+        /// Whether it cannot outlive its node, so that no other node can take it over.
+        ephemeral: bool,
+    },
     /// A write was refused at this epoch: another node owns the unit.
     Fenced(K, Epoch),
     /// All of a unit is over, and the database knows.
@@ -106,6 +111,8 @@ pub struct Node<K> {
     /// Most units it takes over; those created here come on top.
     capacity: usize,
     owned: BTreeMap<K, Epoch>,
+    /// Those of `owned` that no other node can take over.
+    ephemeral: BTreeSet<K>,
     /// Claims without an answer, and whether the lease has held since each was sent. Otherwise its answer may be older than a
     /// takeover by another node, and only the next beats tell who owns the unit.
     claiming: BTreeMap<K, bool>,
@@ -130,6 +137,7 @@ impl<K: Ord + Copy> Node<K> {
             phase: Phase::Serving,
             capacity,
             owned: BTreeMap::new(),
+            ephemeral: BTreeSet::new(),
             claiming: BTreeMap::new(),
             releasing: BTreeSet::new(),
             suspended: true,
@@ -175,6 +183,11 @@ impl<K: Ord + Copy> Node<K> {
         self.phase == Phase::Serving && self.may_publish(now_ms)
     }
 
+    /// Whether it may look for orphans and claim them.
+    pub fn may_claim(&self, now_ms: u64) -> bool {
+        self.may_create(now_ms) && now_ms >= self.claims_from_ms
+    }
+
     /// The units that it owns, as far as it knows.
     pub fn owned(&self) -> impl Iterator<Item = (K, Epoch)> {
         self.owned.iter().map(|(id, epoch)| (*id, *epoch))
@@ -183,10 +196,11 @@ impl<K: Ord + Copy> Node<K> {
     /// When it wants to be woken with [`Input::Time`]; `None` if only answers matter.
     pub fn wakes_at_ms(&self) -> Option<u64> {
         let beats_at_ms = (!self.beating).then_some(self.beats_at_ms);
-        let ends_ms = match (self.suspended, self.owned.is_empty()) {
+        let has_claimable = self.owned.len() > self.ephemeral.len();
+        let ends_ms = match (self.suspended, has_claimable) {
             (false, _) => Some(self.lease.ends_ms()),
-            (true, false) => Some(self.expires_ms()),
-            (true, true) => None,
+            (true, true) => Some(self.expires_ms()),
+            (true, false) => None,
         };
         beats_at_ms.into_iter().chain(ends_ms).min()
     }
@@ -208,7 +222,12 @@ impl<K: Ord + Copy> Node<K> {
             Input::Beat { sent_ms, answer } => self.beaten(sent_ms, answer, now_ms, &mut outputs),
             Input::Orphans(orphans) => self.claim(orphans, now_ms, &mut outputs),
             Input::Claimed(id, answer) => self.claimed(id, answer, &mut outputs),
-            Input::Created(id) => self.own(id, Epoch::FIRST),
+            Input::Created { unit, ephemeral } => {
+                self.own(unit, Epoch::FIRST);
+                if ephemeral {
+                    self.ephemeral.insert(unit);
+                }
+            }
             Input::Fenced(id, epoch) => {
                 if self.owned.get(&id) == Some(&epoch) {
                     self.disown(id);
@@ -250,14 +269,17 @@ impl<K: Ord + Copy> Node<K> {
             outputs.push(Output::Suspend);
         }
         if self.suspended && now_ms >= self.expires_ms() {
-            self.stop_all(outputs);
+            self.stop_claimable(outputs);
         }
     }
 
-    fn stop_all(&mut self, outputs: &mut Vec<Output<K>>) {
-        outputs.extend(self.owned.keys().copied().map(Output::Stop));
-        self.owned.clear();
-        self.releasing.clear();
+    /// Stops what other nodes may have taken over.
+    fn stop_claimable(&mut self, outputs: &mut Vec<Output<K>>) {
+        let ephemeral = &self.ephemeral;
+        let claimable = self.owned.keys().filter(|id| !ephemeral.contains(id));
+        outputs.extend(claimable.copied().map(Output::Stop));
+        self.owned.retain(|id, _| ephemeral.contains(id));
+        self.releasing.retain(|id| ephemeral.contains(id));
     }
 
     fn own(&mut self, id: K, epoch: Epoch) {
@@ -266,9 +288,14 @@ impl<K: Ord + Copy> Node<K> {
     }
 
     fn disown(&mut self, id: K) {
-        self.owned.remove(&id);
-        self.releasing.remove(&id);
+        self.forget(id);
         self.changed.insert(id);
+    }
+
+    fn forget(&mut self, id: K) {
+        self.owned.remove(&id);
+        self.ephemeral.remove(&id);
+        self.releasing.remove(&id);
     }
 
     fn owns_nothing(&self) -> bool {
@@ -286,7 +313,9 @@ impl<K: Ord + Copy> Node<K> {
         match answer {
             BeatAnswer::None => {}
             BeatAnswer::Unknown => {
-                self.stop_all(outputs);
+                // Without the node, the database does not know its ephemeral units either.
+                self.ephemeral.clear();
+                self.stop_claimable(outputs);
                 self.phase = Phase::Left;
             }
             BeatAnswer::Kept(owned) => {
@@ -319,8 +348,7 @@ impl<K: Ord + Copy> Node<K> {
             .map(|(id, _)| *id)
             .collect();
         for id in lost {
-            self.owned.remove(&id);
-            self.releasing.remove(&id);
+            self.forget(id);
             outputs.push(Output::Stop(id));
         }
         for (&id, &epoch) in truth {
@@ -337,13 +365,13 @@ impl<K: Ord + Copy> Node<K> {
     fn find_orphans(&self, now_ms: u64, outputs: &mut Vec<Output<K>>) {
         let taken = self.owned.len() + self.claiming.len();
         let count = self.capacity.saturating_sub(taken).min(ORPHANS_AT_ONCE);
-        if self.phase == Phase::Serving && count > 0 && now_ms >= self.claims_from_ms {
+        if count > 0 && self.may_claim(now_ms) {
             outputs.push(Output::FindOrphans(count));
         }
     }
 
     fn claim(&mut self, orphans: Vec<(K, Epoch)>, now_ms: u64, outputs: &mut Vec<Output<K>>) {
-        if self.phase != Phase::Serving || self.suspended || now_ms < self.claims_from_ms {
+        if !self.may_claim(now_ms) {
             return;
         }
         for (id, seen) in orphans {

@@ -25,7 +25,10 @@ pub struct NodeLease {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum News {
     /// It was created here.
-    Created,
+    Created {
+        /// Whether it is a room that no other node can resume.
+        ephemeral: bool,
+    },
     /// Something of it has stopped by itself: it was fenced, or it failed.
     Stopped,
 }

@@ -77,6 +77,7 @@ impl ClusterNode {
             turns: Turns::default(),
             answers: JoinSet::new(),
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
+            search: Arc::new(Semaphore::new(1)),
             asked,
             publishes,
         };
@@ -142,6 +143,8 @@ struct Task {
     turns: Turns,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
+    /// Held by the search for orphans.
+    search: Arc<Semaphore>,
     asked: watch::Sender<bool>,
     publishes: watch::Sender<bool>,
 }
@@ -169,7 +172,9 @@ impl Task {
                 news = self.lease.news() => {
                     for (unit, news) in news {
                         match news {
-                            News::Created => self.put_in(Input::Created(unit)),
+                            News::Created { ephemeral } => {
+                                self.put_in(Input::Created { unit, ephemeral });
+                            }
                             News::Stopped => self.has_stopped(unit),
                         }
                     }
@@ -260,12 +265,17 @@ impl Task {
     }
 
     fn find_orphans(&mut self, count: usize) {
-        if !self.node.may_create(self.now_ms()) {
+        if !self.node.may_claim(self.now_ms()) {
             return;
         }
+        // A database that is slow is asked once at a time.
+        let Ok(search) = Arc::clone(&self.search).try_acquire_owned() else {
+            return;
+        };
         let store = Arc::clone(&self.store);
         self.answers.spawn(async move {
             let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
+            drop(search);
             Event::Answer(Input::Orphans(orphans.unwrap_or_default()))
         });
     }

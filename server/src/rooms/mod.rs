@@ -573,12 +573,14 @@ impl Reservation {
                 ..rooms.context.clone()
             };
             let handle = spawn_room(core, clock, None, journal, context);
+            let durable = rooms.is_durable(&header);
             if let Some(lease) = rooms.lease().filter(|_| header.tournament.is_none()) {
-                lease.report(header.unit(), News::Created);
+                let ephemeral = !durable;
+                lease.report(header.unit(), News::Created { ephemeral });
             }
             table.enter(Entry {
                 handle: handle.clone(),
-                durable: rooms.is_durable(&header),
+                durable,
                 header: Arc::clone(&header),
                 over: false,
                 suspended: false,

@@ -374,7 +374,7 @@ impl Reservation {
         let mut state = TournamentState::new(core);
         entries.iter().for_each(|entry| state.apply(entry));
         if let Some(lease) = tournaments.rooms.lease() {
-            lease.report(header.id, News::Created);
+            lease.report(header.id, News::Created { ephemeral: false });
         }
         let charged = (charged, place);
         let handle = tournaments.start_task(header, 1, plan, state, charged);

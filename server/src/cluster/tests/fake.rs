@@ -9,6 +9,7 @@ use chefshat_cluster::{Created, Kept, LeaseTimes, Tables};
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
+use chefshat_room::policy::Durability;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
 use tokio::sync::watch;
@@ -416,7 +417,18 @@ impl ClusterStore for FakeStore {
         async move {
             self.reached().await;
             let now_ms = self.database.now_ms();
-            Ok(self.database.tables().orphans(now_ms, count))
+            let mut tables = self.database.tables();
+            let games = self.database.games.lock().expect("no test panics here");
+            let is_ephemeral = |id: &Id| {
+                (games.get(id)).is_some_and(|it| it.policy.durability == Durability::Ephemeral)
+            };
+            let mut orphans = tables.orphans(now_ms, usize::MAX);
+            for (id, epoch) in orphans.extract_if(.., |(id, _)| is_ephemeral(id)) {
+                let rows = tables.journal(id).len() as u64;
+                tables.finish(id, epoch, rows);
+            }
+            orphans.truncate(count);
+            Ok(orphans)
         }
         .boxed()
     }

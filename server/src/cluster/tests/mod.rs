@@ -79,11 +79,15 @@ impl TestNode {
 
     /// Creates a durable room for four.
     async fn create_room(&self) -> Handle {
+        self.create(Durability::Durable).await
+    }
+
+    async fn create(&self, durability: Durability) -> Handle {
         let made = self.rooms.create(NewRoom {
             name: "a room".into(),
             rules: RuleSetSpec::default().validate().expect("the standard"),
             policy: Policy {
-                durability: Durability::Durable,
+                durability,
                 ..Policy::default()
             },
             fills: vec![Fill::Open { reserved_for: None }; 4],
@@ -309,6 +313,36 @@ async fn a_database_that_was_away_for_long_ends_no_node() {
     let room = first.has(room.id()).await;
     assert_eq!(names(&room).await, ["Ada"]);
     soon(join(&room, "Bo")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = second.create(Durability::Ephemeral).await;
+    first.store.cut_off.send_replace(true);
+    second.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    first.store.cut_off.send_replace(false);
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    // Within the time that is left to the other nodes.
+    sleep(Duration::from_secs(3)).await;
+    second.store.cut_off.send_replace(false);
+    soon(join(&room, "Ada")).await.expect("it goes on");
+    soon(second.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    soon(join(&room, "Bo")).await.expect("it goes on");
+
+    // The other node goes on, so it removes the room.
+    second.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    second.store.cut_off.send_replace(false);
+    second.loses(room.id()).await;
+    assert_eq!(soon(join(&room, "Cy")).await, Err(RoomGone));
 }
 
 #[tokio::test(start_paused = true)]
