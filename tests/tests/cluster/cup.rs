@@ -27,8 +27,6 @@ const LOOK_AGAIN: Duration = Duration::from_millis(20);
 fn options() -> PlayOptions {
     PlayOptions {
         backoff: Backoff {
-            first: Duration::from_millis(5),
-            max: Duration::from_millis(40),
             give_up_after: PATIENCE,
             ..Backoff::default()
         },
