@@ -9,7 +9,7 @@ use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use sqlx::postgres::PgConnection;
 
-use super::writer::{Answers, Work};
+use super::writer::{Answers, Work, confirming};
 use crate::store::StoreError;
 use chefshat_room::ids::Id;
 
@@ -71,16 +71,16 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
 /// Whether a row that was not inserted stands there already, because an earlier attempt without an
 /// answer inserted it.
 async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> {
-    sqlx::query_scalar(
-        "SELECT EXISTS (SELECT FROM journal
-                        WHERE game = $1 AND position = $2 AND epoch = $3 AND entries = $4)",
-    )
+    let stands = sqlx::query(confirming!(
+        "game FROM journal WHERE game = $1 AND position = $2 AND epoch = $3 AND entries = $4"
+    ))
     .bind(row.game)
     .bind(row.position)
     .bind(row.epoch)
     .bind(row.entries.as_slice())
-    .fetch_one(connection)
-    .await
+    .fetch_optional(connection)
+    .await?;
+    Ok(stands.is_some())
 }
 
 fn all<'a, T>(rows: &'a [Arc<Row>], value: impl Fn(&'a Row) -> T) -> Vec<T> {

@@ -209,11 +209,15 @@ impl ClusterStore for PostgresStore {
                 return Ok(None);
             }
             let tournament = self.tournament(unit).await?;
+            let retention = millis(self.options.retention);
             let games = self.reader.read(move |connection| {
-                sqlx::query(rooms!("unit = $1 ORDER BY number"))
-                    .bind(unit.0.to_vec())
-                    .fetch_all(connection)
-                    .boxed()
+                sqlx::query(rooms!(
+                    "unit = $1 AND (NOT over OR ended_ms >= clock_ms() - $2) ORDER BY number"
+                ))
+                .bind(unit.0.to_vec())
+                .bind(retention)
+                .fetch_all(connection)
+                .boxed()
             });
             let rooms = self.reader.rooms(games.await?).await?;
             if tournament.is_some() {
@@ -404,11 +408,16 @@ async fn tidy(
     .bind(expire_after)
     .execute(&mut *connection)
     .await?;
-    // Where a tournament was stays known: it is listed for ever.
-    sqlx::query("DELETE FROM owned WHERE over AND kind = 0 AND ended_ms < clock_ms() - $1")
-        .bind(retention)
-        .execute(&mut *connection)
-        .await?;
+    // Where a tournament was stays known: it is listed for ever. Which games are its own stays known
+    // until it is over: it may need them (`Reader::prunable`).
+    sqlx::query(
+        "DELETE FROM owned WHERE over AND kind = 0 AND ended_ms < clock_ms() - $1
+           AND NOT EXISTS (SELECT FROM tournaments
+                           WHERE tournament_id = unit AND NOT tournaments.over)",
+    )
+    .bind(retention)
+    .execute(&mut *connection)
+    .await?;
     // Games that were abandoned before the deal leave nothing behind.
     sqlx::query(
         "WITH game AS (

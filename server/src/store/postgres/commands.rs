@@ -13,7 +13,7 @@ use sqlx::{Connection as _, Row as _};
 
 use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole};
 use super::values::{Owned, integer, text};
-use super::writer::{Answers, Work};
+use super::writer::{Answers, Work, confirming};
 use crate::store::StoreError;
 use crate::store::form::FORM;
 use chefshat_room::ids::Id;
@@ -226,10 +226,10 @@ impl Command {
                 .await?;
         }
         if again {
-            let own: Option<Option<i64>> = sqlx::query_scalar(
-                "SELECT number FROM owned LEFT JOIN games USING (game_id)
-                 WHERE id = $1 AND game_id = $2 AND epoch = $3 AND header IS NOT DISTINCT FROM $4",
-            )
+            let own: Option<Option<i64>> = sqlx::query_scalar(confirming!(
+                "number FROM owned LEFT JOIN games USING (game_id)
+                 WHERE id = $1 AND game_id = $2 AND epoch = $3 AND header IS NOT DISTINCT FROM $4"
+            ))
             .bind(owned.id.0.as_slice())
             .bind(game_id.0.as_slice())
             .bind(owned.epoch)
@@ -276,8 +276,7 @@ impl Command {
                  INSERT INTO tournament_entries (tournament, position, epoch, entries)
                  SELECT number, 0, 1, $7 FROM tournament
              )
-             SELECT EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner),
-                    EXISTS (SELECT FROM tournaments WHERE tournament_id = $2 AND header = $6)",
+             SELECT EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner)",
         )
         .bind(*node)
         .bind(id.0.as_slice())
@@ -286,14 +285,28 @@ impl Command {
         .bind(*over)
         .bind(header.as_slice())
         .bind(entries.as_slice())
-        .fetch_one(connection)
+        .fetch_one(&mut *connection)
         .await?;
-        let (placed, owner, stands): (bool, bool, bool) = (row.get(0), row.get(1), row.get(2));
-        Ok(match placed || (again && stands) {
-            true => Ok(0),
-            false if owner => Err(StoreError::Taken(*id)),
-            false => Err(StoreError::Fenced(*id)),
-        })
+        let (placed, owner): (bool, bool) = (row.get(0), row.get(1));
+        if placed {
+            return Ok(Ok(0));
+        }
+        if again {
+            let own = sqlx::query(confirming!(
+                "tournament_id FROM tournaments WHERE tournament_id = $1 AND header = $2"
+            ))
+            .bind(id.0.as_slice())
+            .bind(header.as_slice())
+            .fetch_optional(connection)
+            .await?;
+            if own.is_some() {
+                return Ok(Ok(0));
+            }
+        }
+        Ok(Err(match owner {
+            true => StoreError::Taken(*id),
+            false => StoreError::Fenced(*id),
+        }))
     }
 }
 
@@ -323,7 +336,7 @@ async fn append_tournament(
     owned: Owned,
     (position, entries, over): (i64, &[u8], bool),
 ) -> sqlx::Result<Result<i64, StoreError>> {
-    let kept: bool = sqlx::query_scalar(
+    let row = sqlx::query(
         "WITH owner AS (
              SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
          ), row AS (
@@ -335,19 +348,30 @@ async fn append_tournament(
          ), over_tournament AS (
              UPDATE tournaments SET over = true FROM row WHERE number = tournament AND $5
          )
-         SELECT EXISTS (SELECT FROM row)
-                OR EXISTS (SELECT FROM tournaments JOIN tournament_entries ON tournament = number
-                           WHERE tournament_id = $1 AND position = $3 AND epoch = $2 AND entries = $4)",
+         SELECT tournament FROM row",
     )
     .bind(owned.id.0.as_slice())
     .bind(owned.epoch)
     .bind(position)
     .bind(entries)
     .bind(over)
-    .fetch_one(connection)
+    .fetch_optional(&mut *connection)
     .await?;
-    Ok(match kept {
-        true => Ok(0),
-        false => Err(owned.fenced()),
+    if row.is_some() {
+        return Ok(Ok(0));
+    }
+    let own = sqlx::query(confirming!(
+        "tournament FROM tournaments JOIN tournament_entries ON tournament = number
+         WHERE tournament_id = $1 AND position = $3 AND epoch = $2 AND entries = $4"
+    ))
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .bind(position)
+    .bind(entries)
+    .fetch_optional(connection)
+    .await?;
+    Ok(match own {
+        Some(_) => Ok(0),
+        None => Err(owned.fenced()),
     })
 }

@@ -8,6 +8,7 @@ use sqlx::query::Query;
 use sqlx::{Postgres, Row as _};
 
 use super::values::{Owned, integer, text};
+use super::writer::confirming;
 use crate::clock::since_epoch_ms;
 use crate::store::StoreError;
 use crate::store::form::FORM;
@@ -41,16 +42,16 @@ pub(super) enum Ended {
 
 /// What a room that could not be ended is: over already, at this epoch, or another node's.
 async fn not_ended(connection: &mut PgConnection, owned: Owned) -> sqlx::Result<Ended> {
-    let over: bool = sqlx::query_scalar(
-        "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND over)",
-    )
+    let over = sqlx::query(confirming!(
+        "id FROM owned WHERE id = $1 AND epoch = $2 AND over"
+    ))
     .bind(owned.id.0.as_slice())
     .bind(owned.epoch)
-    .fetch_one(connection)
+    .fetch_optional(connection)
     .await?;
     Ok(match over {
-        true => Ended::Before,
-        false => Ended::Refused(owned.fenced()),
+        Some(_) => Ended::Before,
+        None => Ended::Refused(owned.fenced()),
     })
 }
 
@@ -218,19 +219,20 @@ pub(super) async fn import(
             has_record: true,
         });
     }
-    let stands = again
-        && sqlx::query_scalar(
-            "SELECT EXISTS (SELECT FROM games JOIN added_records ON game = number
-                            WHERE game_id = $1 AND record = $2)",
-        )
+    if again {
+        let own = sqlx::query(confirming!(
+            "number FROM games JOIN added_records ON game = number
+             WHERE game_id = $1 AND record = $2"
+        ))
         .bind(game_id.0.as_slice())
         .bind(record)
-        .fetch_one(connection)
+        .fetch_optional(connection)
         .await?;
-    Ok(match stands {
-        true => Ended::Before,
-        false => Ended::Refused(StoreError::Taken(game_id)),
-    })
+        if own.is_some() {
+            return Ok(Ended::Before);
+        }
+    }
+    Ok(Ended::Refused(StoreError::Taken(game_id)))
 }
 
 /// Adds games to the end of the list of finished games. From here to the commit, nobody else does.

@@ -8,8 +8,9 @@ use chefshat_proto::v1;
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryStreamExt as _};
 use prost::Message as _;
-use sqlx::Row as _;
+use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnection, PgPool, PgRow};
+use sqlx::{Postgres, Row as _};
 use tokio::time::timeout;
 use tracing::error;
 
@@ -22,8 +23,10 @@ use crate::store::{Keep, Part, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// How long one read may take; then its connection is dropped.
+/// How long one read may take.
 const READ_LIMIT: Duration = Duration::from_secs(15);
+/// How long a connection that is given back may take to answer; then it is dropped.
+const RETURN_LIMIT: Duration = Duration::from_secs(1);
 
 /// The query for a list of finished games, with the condition on their numbers and the order.
 macro_rules! list_query {
@@ -51,6 +54,16 @@ pub(super) struct Reader {
     pub(super) codec: Codec,
 }
 
+/// A connection of the pool, which waits for its answer without limit when it is given back: one that
+/// hangs would keep its place.
+struct Lent(PoolConnection<Postgres>);
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        tokio::spawn(timeout(RETURN_LIMIT, self.0.return_to_pool()));
+    }
+}
+
 /// A game that is or was a room's, as stored.
 pub(super) struct StoredRoom {
     pub(super) number: i64,
@@ -63,17 +76,17 @@ pub(super) struct StoredRoom {
 }
 
 impl Reader {
-    /// Reads in bounded time; a connection whose answer does not come is dropped.
+    /// Reads in bounded time. A connection whose answer does not come is dropped, also if the caller
+    /// has given up before.
     pub(super) async fn read<T>(
         &self,
         work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, sqlx::Result<T>>,
     ) -> Result<T, StoreError> {
         let failed = |error: sqlx::Error| failure(&error);
-        let mut connection = self.pool.acquire().await.map_err(failed)?;
-        match timeout(READ_LIMIT, work(&mut connection)).await {
+        let mut connection = Lent(self.pool.acquire().await.map_err(failed)?);
+        match timeout(READ_LIMIT, work(&mut connection.0)).await {
             Ok(read) => read.map_err(failed),
             Err(_) => {
-                drop(connection.detach());
                 let late = std::io::Error::from(std::io::ErrorKind::TimedOut);
                 Err(failed(late.into()))
             }
@@ -285,7 +298,8 @@ impl Reader {
         Ok(u64::try_from(count).unwrap_or_default())
     }
 
-    /// See `Store::prunable`. Games without a record are none of the newest ones.
+    /// See `Store::prunable`. Games without a record are none of the newest ones. A tournament may
+    /// need its games until it is over, at whatever node.
     pub(super) async fn prunable(
         &self,
         keep: Keep,
@@ -299,6 +313,9 @@ impl Reader {
                     OR (filed OR NOT $5)
                        AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
                                       ORDER BY listed DESC LIMIT 1 OFFSET $2))
+               AND NOT EXISTS (
+                   SELECT FROM tournaments JOIN owned ON unit = tournament_id
+                   WHERE NOT tournaments.over AND owned.game_id = games.game_id)
              ORDER BY number LIMIT $4",
         )
         .bind(integer(after))

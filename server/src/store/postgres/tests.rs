@@ -4,6 +4,8 @@
 mod fencing;
 mod model;
 mod opening;
+mod retention;
+mod retrying;
 mod transfer;
 
 use std::sync::Arc;
@@ -17,6 +19,7 @@ use chefshat_room::journal::{
 };
 use chefshat_room::policy::{Durability, Policy};
 use chefshat_tournament::Change as TournamentChange;
+use sqlx::postgres::PgConnection;
 
 use super::*;
 use crate::store::cluster::{ClusterStore, Epoch, Kind, NodeId, NodeInfo};
@@ -47,6 +50,46 @@ fn stop_clock(database: &Database) {
 /// Lets time pass for a database with a stopped clock.
 fn advance(database: &Database, ms: u64) {
     database.run(&format!("UPDATE test_clock SET now_ms = now_ms + {ms}"));
+}
+
+async fn connected(database: &Database) -> PgConnection {
+    let address = open::address(database.url()).expect("an address");
+    open::connect(&address).await.expect("connected")
+}
+
+async fn run(connection: &mut PgConnection, sql: &'static str) {
+    let done = sqlx::query(sql).execute(connection).await;
+    done.expect("the database does it");
+}
+
+/// Makes the database wait where this trigger is run, until the connection is dropped or unlocks 1.
+async fn hold(database: &Database, trigger: &str) -> PgConnection {
+    database.run(&format!(
+        "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             PERFORM pg_advisory_xact_lock(1);
+             RETURN NEW;
+         END $$;
+         CREATE {trigger} EXECUTE FUNCTION wait()"
+    ));
+    let mut holder = connected(database).await;
+    run(&mut holder, "SELECT pg_advisory_lock(1)").await;
+    holder
+}
+
+/// Waits until a session of the same database waits for something, and returns its process.
+async fn waiting(connection: &mut PgConnection, wait_event: &str) -> i32 {
+    loop {
+        let process = sqlx::query_scalar(
+            "SELECT pid FROM pg_stat_activity
+             WHERE datname = current_database() AND wait_event = $1 ORDER BY backend_start DESC",
+        );
+        let process = process.bind(wait_event).fetch_optional(&mut *connection);
+        if let Some(process) = process.await.expect("readable") {
+            return process;
+        }
+        tokio::task::yield_now().await;
+    }
 }
 
 /// A room with the id `room`, whose game has the same id.
@@ -103,6 +146,13 @@ fn summary(room: u8) -> Box<v1::RecordSummary> {
         ended_at_ms: 2_000,
         ..v1::RecordSummary::default()
     })
+}
+
+/// The first entries of a tournament that has begun.
+fn begun() -> Vec<TournamentEntry> {
+    vec![TournamentEntry::Change(TournamentChange::Begun {
+        rounds: 1,
+    })]
 }
 
 /// An entry that says which of a test's entries it is: the journal does not care whether it makes

@@ -28,6 +28,23 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// How long work is tried again after the store was closed.
 const CLOSING_LIMIT: Duration = Duration::from_secs(5);
 
+/// The query for what an earlier attempt has committed. It must be a statement of its own: one that
+/// waited for that commit does not see it. If it finds a row, it writes a message into the log of the
+/// database, so that its own commit waits for synchronous standbys: what is found may not have
+/// reached them yet.
+macro_rules! confirming {
+    ($found:literal) => {
+        concat!(
+            "WITH found AS MATERIALIZED (SELECT ",
+            $found,
+            ")
+             SELECT * FROM found WHERE pg_logical_emit_message(true, 'chefshat', '') IS NOT NULL"
+        )
+    };
+}
+
+pub(super) use confirming;
+
 /// Work of one kind.
 pub(super) trait Work: Send + Sync + Sized + 'static {
     /// What its sender receives.
@@ -135,15 +152,15 @@ impl Writer {
             }
             let began = Instant::now();
             let pieces = batch.len();
-            self.commit(std::mem::take(&mut batch)).await;
+            self.commit(std::mem::take(&mut batch), false).await;
             self.shared.metrics.committed(pieces, began.elapsed());
         }
     }
 
-    /// Commits a batch and answers its senders.
-    async fn commit<W: Work>(&mut self, mut batch: Vec<Pending<W>>) {
+    /// Commits a batch, which may have been committed before if it is tried `again`, and answers
+    /// its senders.
+    async fn commit<W: Work>(&mut self, mut batch: Vec<Pending<W>>, mut again: bool) {
         let mut pause = FIRST_PAUSE;
-        let mut again = false;
         while !batch.is_empty() {
             let work: Vec<_> = batch.iter().map(|it| Arc::clone(&it.work)).collect();
             let cause = match self.attempt(&work, again).await {
@@ -168,7 +185,7 @@ impl Writer {
                     return;
                 }
                 for pending in batch {
-                    Box::pin(self.commit(vec![pending])).await;
+                    Box::pin(self.commit(vec![pending], again)).await;
                 }
                 return;
             }

@@ -95,32 +95,17 @@ async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
 
 /// Makes an append wait in the database, where it has seen its epoch already.
 struct Late {
-    holder: sqlx::postgres::PgConnection,
+    holder: PgConnection,
     append: JoinHandle<Result<(), StoreError>>,
 }
 
 impl Late {
     async fn new(database: &Database, mut journal: Box<dyn Journal>) -> Self {
-        database.run(
-            "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
-             BEGIN
-                 PERFORM pg_advisory_xact_lock(1);
-                 RETURN NEW;
-             END $$;
-             CREATE TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW
-                 WHEN (NEW.epoch = 1 AND NEW.entries <> '') EXECUTE FUNCTION wait()",
-        );
-        let address = open::address(database.url()).expect("an address");
-        let mut holder = open::connect(&address).await.expect("connected");
-        sqlx::query("SELECT pg_advisory_lock(1)")
-            .execute(&mut holder)
-            .await
-            .expect("locked");
+        let before = "TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW
+                      WHEN (NEW.epoch = 1 AND NEW.entries <> '')";
+        let mut holder = hold(database, before).await;
         let append = tokio::spawn(async move { append(&mut journal, 2).await });
-        let waits = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted";
-        while database.run(waits) != "1" {
-            tokio::task::yield_now().await;
-        }
+        waiting(&mut holder, "advisory").await;
         Self { holder, append }
     }
 
@@ -208,11 +193,6 @@ async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
 async fn a_tournament_changes_hands_with_all_its_rooms() {
     let pair = Pair::new().await;
     let unit = Id([9; 16]);
-    let begun = || {
-        vec![TournamentEntry::Change(TournamentChange::Begun {
-            rounds: 1,
-        })]
-    };
     let created = pair.first.create_tournament(cup(9), begun());
     created.await.expect("created");
     let room = |number| header(number, Some(9), Durability::Durable);

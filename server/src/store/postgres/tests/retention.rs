@@ -1,0 +1,52 @@
+//! What retention leaves alone.
+
+use super::*;
+
+/// The numbers of the games that may be deleted although one is kept.
+async fn prunable(store: &PostgresStore) -> Vec<u8> {
+    let found = store.prunable(Keep::default(), 0, 99).await;
+    let found = found.expect("readable");
+    found.iter().map(|(_, game)| game.0[0]).collect()
+}
+
+#[tokio::test]
+async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
+    let database = chefshat_postgres::database();
+    let first = node(&database).await;
+    stop_clock(&database);
+    let second = node(&database).await;
+    let created = first.create_tournament(cup(9), begun());
+    created.await.expect("created");
+    for (room, tournament) in [(1, Some(9)), (2, None), (3, None)] {
+        let header = header(room, tournament, Durability::Durable);
+        let created = first.create(header, vec![entry(1)]).await;
+        let finished = created
+            .expect("created")
+            .finish(Some(summary(room)), None)
+            .await;
+        finished.expect("committed");
+        let written = first.mark_record_written(Id([room; 16]));
+        written.await.expect("committed");
+    }
+    assert_eq!(prunable(&second).await, [2]);
+
+    // Also when the rooms have been removed.
+    advance(&database, 600_001);
+    first.beat().await.expect("it answers");
+    second.orphans(9).await.expect("it answers");
+    assert_eq!(second.locate(Id([2; 16])).await, Ok(None));
+    assert_eq!(prunable(&second).await, [2]);
+    // Its owner does not read them all when it resumes it.
+    let unit = first.load(Id([9; 16]), Epoch::FIRST).await;
+    let unit = unit.expect("readable").expect("it is owned");
+    assert_eq!(unit.games.len(), 0);
+
+    let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
+    let ended = first.append_tournament(Id([9; 16]), 1, end);
+    ended.await.expect("committed");
+    assert_eq!(prunable(&second).await, [1, 2]);
+    second.orphans(9).await.expect("it answers");
+    assert_eq!(second.locate(Id([1; 16])).await, Ok(None));
+    first.close().await;
+    second.close().await;
+}

@@ -1,0 +1,283 @@
+//! Work that is tried again because no answer came: what an earlier attempt has committed, or still
+//! commits, counts as done once it is safe; and a connection that hangs is replaced.
+
+use std::pin::pin;
+
+use chefshat_postgres::Server;
+use tokio::io::copy_bidirectional;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+
+use super::*;
+
+/// What happens to the connections of a [`Line`].
+#[derive(Clone, Copy)]
+enum Fault {
+    /// The node's ends are closed; the database notices nothing.
+    Cut,
+    /// Nothing passes any more, and nobody notices.
+    Hang,
+}
+
+/// What is between a node and its database.
+struct Line {
+    url: String,
+    faults: watch::Sender<Fault>,
+}
+
+impl Line {
+    async fn to(database: &Database) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let own = listener.local_addr().expect("it is bound").port();
+        let port = open::address(database.url())
+            .expect("an address")
+            .get_port();
+        let faults = watch::Sender::new(Fault::Cut);
+        let line = faults.clone();
+        tokio::spawn(async move {
+            while let Ok((node, _)) = listener.accept().await {
+                let database = TcpStream::connect(("127.0.0.1", port)).await;
+                let database = database.expect("the database listens");
+                tokio::spawn(carry(node, database, line.subscribe()));
+            }
+        });
+        let (from, to) = (format!(":{port}/"), format!(":{own}/"));
+        let url = database.url().replacen(&from, &to, 1);
+        Self { url, faults }
+    }
+
+    async fn node(&self) -> Arc<PostgresStore> {
+        let store = PostgresStore::open(&self.url, PostgresOptions::default()).await;
+        let store = store.expect("an empty database, or one of ours");
+        store.join(NodeInfo::default()).await.expect("it joins");
+        Arc::new(store)
+    }
+
+    /// Does this to the connections that there are.
+    fn fail(&self, fault: Fault) {
+        self.faults.send_replace(fault);
+    }
+}
+
+/// Carries one connection until it ends or fails; what fails stays open at the database.
+async fn carry(mut node: TcpStream, mut database: TcpStream, mut faults: watch::Receiver<Fault>) {
+    tokio::select! {
+        _ = copy_bidirectional(&mut node, &mut database) => return,
+        changed = faults.changed() => changed.expect("the line exists"),
+    }
+    if matches!(*faults.borrow(), Fault::Cut) {
+        drop(node);
+    }
+    pending::<()>().await;
+}
+
+/// Loses the connection of some work whose commit waits in the database, and lets it go on there when the
+/// next attempt waits for it.
+async fn overtake(line: &Line, holder: &mut PgConnection) {
+    waiting(holder, "advisory").await;
+    line.fail(Fault::Cut);
+    waiting(holder, "transactionid").await;
+    run(holder, "SELECT pg_advisory_unlock(1)").await;
+}
+
+#[tokio::test]
+async fn what_an_earlier_attempt_still_commits_counts_as_done() {
+    let database = chefshat_postgres::database();
+    let line = Line::to(&database).await;
+    let store = line.node().await;
+    let at_commit = "CONSTRAINT TRIGGER wait AFTER INSERT ON tournament_entries
+                     DEFERRABLE INITIALLY DEFERRED FOR EACH ROW";
+    let mut holder = hold(&database, at_commit).await;
+    let created = store.create_tournament(cup(9), begun());
+    let (created, ()) = futures::join!(created, overtake(&line, &mut holder));
+    assert_eq!(created, Ok(()));
+    run(&mut holder, "SELECT pg_advisory_lock(1)").await;
+    let appended = store.append_tournament(Id([9; 16]), 1, begun());
+    let (appended, ()) = futures::join!(appended, overtake(&line, &mut holder));
+    assert_eq!(appended, Ok(()));
+    assert_eq!(store.tournament_rows(Id([9; 16])).await, Ok(2));
+    store.close().await;
+}
+
+#[tokio::test]
+async fn connections_that_hang_do_not_keep_their_places() {
+    let database = chefshat_postgres::database();
+    let line = Line::to(&database).await;
+    let store = line.node().await;
+    let (mut holder, mut observer) = (connected(&database).await, connected(&database).await);
+    run(&mut holder, "BEGIN").await;
+    run(&mut holder, "LOCK nodes").await;
+    let beats: Vec<_> = (0..CONTROLLERS)
+        .map(|_| {
+            let store = Arc::clone(&store);
+            tokio::spawn(async move { store.beat().await })
+        })
+        .collect();
+    let all = "SELECT count(*) = $1 FROM pg_stat_activity
+               WHERE datname = current_database() AND wait_event = 'relation'";
+    let mut wait = false;
+    while !wait {
+        let all = sqlx::query_scalar(all).bind(i64::from(CONTROLLERS));
+        wait = all.fetch_one(&mut observer).await.expect("readable");
+    }
+    line.fail(Fault::Hang);
+    run(&mut holder, "ROLLBACK").await;
+    // The node gives up waiting.
+    beats.iter().for_each(JoinHandle::abort);
+    let beating = async { while store.beat().await.is_err() {} };
+    let beats = tokio::time::timeout(Duration::from_secs(60), beating).await;
+    assert_eq!(beats, Ok(()), "the database can be reached");
+    store.close().await;
+}
+
+/// A database with a synchronous standby, which is away while a test wants it.
+struct Primary {
+    database: Database,
+    admin: PgConnection,
+    /// Processes that have waited for the standby since it was lost.
+    known: Vec<i32>,
+    _server: Server,
+}
+
+impl Primary {
+    async fn new() -> Self {
+        let server = Server::start();
+        let database = server.database();
+        Self {
+            admin: connected(&database).await,
+            database,
+            known: Vec::new(),
+            _server: server,
+        }
+    }
+
+    /// From now on no commit is answered.
+    async fn lose_standby(&mut self) {
+        (self.database).run("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
+        self.database.run("SELECT pg_reload_conf()");
+        // The server reads its settings when it likes.
+        let mut probe = connected(&self.database).await;
+        let probing = async {
+            let write = "SELECT pg_logical_emit_message(true, '', '')";
+            while sqlx::query(write).execute(&mut probe).await.is_ok() {}
+        };
+        let ending = async {
+            let process = self.wait().await;
+            self.end(process).await;
+        };
+        futures::join!(probing, ending);
+    }
+
+    /// Answers what waits and what comes.
+    fn regain_standby(&mut self) {
+        self.known.clear();
+        (self.database).run("ALTER SYSTEM RESET synchronous_standby_names");
+        self.database.run("SELECT pg_reload_conf()");
+    }
+
+    /// Waits until one more process waits for the standby.
+    async fn wait(&mut self) -> i32 {
+        loop {
+            let process = waiting(&mut self.admin, "SyncRep").await;
+            if !self.known.contains(&process) {
+                self.known.push(process);
+                return process;
+            }
+        }
+    }
+
+    /// Ends a process that waits for the standby. What it has committed is visible then.
+    async fn end(&mut self, process: i32) {
+        let ended = sqlx::query("SELECT pg_terminate_backend($1, 60000)").bind(process);
+        ended.execute(&mut self.admin).await.expect("it ends");
+    }
+}
+
+#[tokio::test]
+async fn what_stands_is_acknowledged_when_the_standby_has_it() {
+    let mut primary = Primary::new().await;
+    let store = node(&primary.database).await;
+    let mut journals = Vec::new();
+    for room in [1, 2, 3] {
+        let durability = [Durability::Durable, Durability::Ephemeral][usize::from(room == 3)];
+        let created = store.create(header(room, None, durability), vec![entry(1)]);
+        journals.push(created.await.expect("created"));
+    }
+    let [appending, finishing, ephemeral] = &mut journals[..] else {
+        unreachable!("there are three");
+    };
+    let created = store.create_tournament(cup(9), begun());
+    created.await.expect("created");
+    let importing = store.import(Id([7; 16]), *summary(7), Arc::from([]));
+    let works: [(_, BoxFuture<'_, Result<(), StoreError>>); 7] = [
+        ("a row", append(appending, 2).boxed()),
+        ("an end", finishing.finish(Some(summary(2)), None)),
+        ("a whole game", ephemeral.finish(Some(summary(3)), None)),
+        (
+            "a room",
+            async { store.create(durable(4), vec![]).await.map(drop) }.boxed(),
+        ),
+        ("a tournament", store.create_tournament(cup(8), begun())),
+        (
+            "a tournament's row",
+            store.append_tournament(Id([9; 16]), 1, begun()),
+        ),
+        (
+            "an import",
+            async { importing.await.map(|new| assert!(new)) }.boxed(),
+        ),
+    ];
+    for (what, mut work) in works {
+        primary.lose_standby().await;
+        let tried_again = async {
+            let process = primary.wait().await;
+            primary.end(process).await;
+            primary.wait().await;
+        };
+        tokio::select! {
+            answer = &mut work => panic!("the standby does not have {what}: {answer:?}"),
+            _ = tried_again => {}
+        }
+        primary.regain_standby();
+        assert_eq!(work.await, Ok(()), "{what}");
+    }
+    store.close().await;
+}
+
+#[tokio::test]
+async fn what_stands_does_not_fail_with_what_is_refused_beside_it() {
+    let mut primary = Primary::new().await;
+    let store = node(&primary.database).await;
+    primary.database.run(
+        "CREATE TABLE refusing ();
+         CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             IF EXISTS (SELECT FROM refusing) THEN RAISE 'refused'; END IF;
+             RETURN NEW;
+         END $$;
+         CREATE TRIGGER refuse BEFORE INSERT ON owned FOR EACH ROW
+             WHEN (NEW.join_code = 'CUP2') EXECUTE FUNCTION refuse()",
+    );
+    primary.lose_standby().await;
+    // Both in one transaction.
+    let created = futures::future::join(
+        store.create_tournament(cup(1), begun()),
+        store.create_tournament(cup(2), begun()),
+    );
+    let mut created = pin!(created);
+    let refusing = async {
+        let process = primary.wait().await;
+        let refuse = "SET synchronous_commit = local; INSERT INTO refusing DEFAULT VALUES";
+        primary.database.run(refuse);
+        primary.end(process).await;
+        primary.regain_standby();
+    };
+    tokio::select! {
+        created = &mut created => panic!("the standby does not have them: {created:?}"),
+        () = refusing => {}
+    }
+    let (stands, refused) = created.await;
+    assert_eq!(stands, Ok(()));
+    assert!(matches!(refused, Err(StoreError::Failed(_))), "{refused:?}");
+    store.close().await;
+}
