@@ -138,7 +138,8 @@ impl Server {
         Ok(server)
     }
 
-    /// Creates a node of a cluster, and joins. From here on it runs what nobody else owns.
+    /// Creates a node of a cluster, and joins. From here on it runs what nobody else owns. It shows
+    /// the tournaments that are over.
     ///
     /// # Errors
     /// The database cannot be reached.
@@ -147,6 +148,11 @@ impl Server {
         store: Arc<dyn ClusterStore>,
         info: NodeInfo,
     ) -> Result<Self, ServeError> {
+        let endpoint = Some(info.client_endpoint.clone());
+        let config = ServerConfig {
+            client_endpoint: endpoint.filter(|endpoint| !endpoint.is_empty()),
+            ..config
+        };
         let lease = Arc::new(NodeLease::new());
         let directory = StoreDirectory::new(Arc::clone(&store), Arc::clone(&lease));
         let directory = Arc::new(directory);
@@ -155,6 +161,8 @@ impl Server {
         let (grace, lease_times) = (server.config.grace, server.config.lease);
         let id = store.join(info.clone()).await?;
         info!(node = id.0, name = info.name, "joined the cluster");
+        // It owns nothing yet: these are over.
+        server.tournaments.restore().await?;
         server.node = Some(ClusterNode::start(
             id,
             info,

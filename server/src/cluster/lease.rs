@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard};
 use chefshat_cluster::NodeId;
 use chefshat_room::ids::Id;
 use tokio::sync::{Notify, watch};
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep_until};
 
 /// The lease of a node, as its rooms and tournaments see it.
 ///
@@ -57,6 +57,14 @@ impl NodeLease {
     /// Sets the node, which has just joined.
     pub(super) fn joined(&self, node: NodeId) {
         *self.node.lock().expect("nothing panics under this lock") = Some(node);
+    }
+
+    /// Waits until the node may not publish.
+    pub async fn lapsed(&self) {
+        while self.holds() {
+            let until = *self.until.borrow();
+            sleep_until(until).await;
+        }
     }
 
     /// Waits until the node may publish.

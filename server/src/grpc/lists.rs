@@ -1,6 +1,7 @@
 //! Lists over all nodes of a cluster. Each node lists what it has, newest first, and numbers it; the
-//! node that was asked merges the lists by the time of creation. A page token says how far each
-//! list has been shown. A single server's token is the number of the last entry alone.
+//! node that was asked merges the lists by the time of creation, and shows once what several nodes
+//! have. A page token says how far each list has been shown. A single server's token is the number of
+//! the last entry alone.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::future::Future;
@@ -65,6 +66,9 @@ pub(super) trait Listing {
 
     /// When an entry was created, milliseconds since the Unix epoch.
     fn created_at_ms(entry: &Self::Entry) -> u64;
+
+    /// The id of an entry.
+    fn id(entry: &Self::Entry) -> &str;
 }
 
 /// Answers a request for a page of this size.
@@ -128,7 +132,7 @@ async fn everywhere<L: Listing>(
     let (asked, here) = futures::future::join(asked, here).await;
     let here = here?.map(|part| (own.clone(), shown.before(&own), part));
     let parts = asked.into_iter().flatten().chain(here);
-    Ok(merged(parts, page_size, L::created_at_ms))
+    Ok(merged(parts, page_size, L::created_at_ms, L::id))
 }
 
 /// The list of another node.
@@ -158,10 +162,11 @@ async fn ask<L: Listing>(
 
 /// The first entries of several lists, newest first. Each list comes with its node's key and the
 /// number before which it starts.
-fn merged<T>(
+fn merged<T, K: PartialEq + ?Sized>(
     parts: impl IntoIterator<Item = (String, Option<u64>, Part<T>)>,
     page_size: usize,
     created_at_ms: impl Fn(&T) -> u64,
+    id: impl Fn(&T) -> &K,
 ) -> Page<T> {
     struct Source<T> {
         key: String,
@@ -199,6 +204,12 @@ fn merged<T>(
             break;
         };
         source.before = Some(number);
+        for source in &mut sources {
+            let is_same = |next: &mut (u64, T)| id(&next.1) == id(&entry);
+            if let Some((number, _)) = source.entries.pop_front_if(is_same) {
+                source.before = Some(number);
+            }
+        }
         entries.push(entry);
     }
     let left = sources.into_iter().filter_map(|source| {
@@ -299,16 +310,15 @@ mod tests {
             ]
             .map(|(key, part)| (key.to_owned(), None, part))
         };
-        let page = merged(lists(), 2, |time| *time);
+        let page = merged(lists(), 2, |time| *time, |time| time);
         assert_eq!(page.entries, [90, 80]);
         assert_eq!(page.next_page_token, "a-100,b-100");
         // More of the second list may be newer than 50.
-        let page = merged(lists(), 10, |time| *time);
+        let page = merged(lists(), 10, |time| *time, |time| time);
         assert_eq!(page.entries, [90, 80, 70, 60]);
         assert_eq!(page.next_page_token, "a-100,b-98");
-        let page = merged([("a".to_owned(), None, part(&[5, 4], false))], 2, |time| {
-            *time
-        });
+        let one = [("a".to_owned(), None, part(&[5, 4], false))];
+        let page = merged(one, 2, |time| *time, |time| time);
         assert_eq!(
             (page.entries, page.next_page_token.as_str()),
             (vec![5, 4], "")
@@ -317,13 +327,21 @@ mod tests {
             ("a".to_owned(), None, part(&[5], false)),
             ("b".to_owned(), None, part(&[9], true)),
         ];
-        let page = merged(none, 1, |time| *time);
+        let page = merged(none, 1, |time| *time, |time| time);
         assert_eq!(page.next_page_token, "a-,b-100");
         let shown = Shown::parse(&page.next_page_token).expect("its own");
         assert!(shown.includes("a") && shown.before("a").is_none());
         assert!(shown.includes("b") && !shown.includes("c"));
         assert_eq!(shown.before("b"), Some(100));
         assert_eq!(shown.to_token(), page.next_page_token);
+        let copies = || {
+            [("a", &[90, 50]), ("b", &[90, 10])]
+                .map(|(key, times)| (key.to_owned(), None, part(times, false)))
+        };
+        let page = merged(copies(), 9, |time| *time, |time| time);
+        assert_eq!(page.entries, [90, 50, 10]);
+        let page = merged(copies(), 1, |time| *time, |time| time);
+        assert_eq!(page.next_page_token, "a-100,b-100");
         for wrong in ["7", "a", "a-x", ",", "a-1,b"] {
             assert!(Shown::parse(wrong).is_err(), "{wrong}");
         }

@@ -173,6 +173,10 @@ impl Listing for RoomList<'_> {
     fn created_at_ms(room: &v1::Room) -> u64 {
         room.created_at_ms
     }
+
+    fn id(room: &v1::Room) -> &str {
+        &room.room_id
+    }
 }
 
 /// Describes numbered rooms in order, [`ROOMS_ASKED`] of them at a time.

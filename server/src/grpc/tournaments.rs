@@ -204,6 +204,10 @@ impl Listing for TournamentList<'_> {
     fn created_at_ms(tournament: &v1::Tournament) -> u64 {
         tournament.created_at_ms
     }
+
+    fn id(tournament: &v1::Tournament) -> &str {
+        &tournament.tournament_id
+    }
 }
 
 #[tonic::async_trait]

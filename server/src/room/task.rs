@@ -934,7 +934,7 @@ impl Room {
             false => None,
         };
         let finished = self.journal.finish(summary.map(Box::new), signed);
-        let finished = unless_fenced(&self.context, &self.fence, header.room_id, finished);
+        let finished = unless_lost(&self.context, &self.fence, header.room_id, finished);
         if let Err(error) = finished.await {
             self.over_since = None;
             self.fail(&error);
@@ -1023,6 +1023,28 @@ async fn unless_fenced(
         biased;
         written = written => written,
         () = fence.cancelled() => Err(StoreError::Fenced(room)),
+    }
+}
+
+/// The outcome of the end of a game, unless the room is fenced and the node has no lease. A node
+/// that has one learns from its beat that the game is over, maybe before it learns the outcome.
+async fn unless_lost(
+    context: &TaskContext,
+    fence: &CancellationToken,
+    room: Id,
+    finished: impl Future<Output = Result<(), StoreError>>,
+) -> Result<(), StoreError> {
+    let Some(lease) = &context.lease else {
+        return finished.await;
+    };
+    let lost = async {
+        fence.cancelled().await;
+        lease.lapsed().await;
+    };
+    tokio::select! {
+        biased;
+        finished = finished => finished,
+        () = lost => Err(StoreError::Fenced(room)),
     }
 }
 

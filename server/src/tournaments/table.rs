@@ -1,5 +1,6 @@
-//! The table of tournaments, in the order of their creation, with look-up by id and join code.
-//! made, is decided elsewhere.
+//! The table of tournaments, in the order of their creation, with look-up by id and join code. Their
+//! numbers are made of their times of creation and ids, so all nodes of a cluster list those that are
+//! over in the same order.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -10,7 +11,6 @@ use chefshat_room::ids::Id;
 
 #[derive(Debug, Default)]
 pub(super) struct Table {
-    next_number: u64,
     /// In the order of their creation.
     by_number: BTreeMap<u64, Arc<TournamentHandle>>,
     numbers: HashMap<Id, u64>,
@@ -68,9 +68,13 @@ impl Table {
         {
             self.remove(number);
         }
-        let number = self.next_number;
-        self.next_number += 1;
-        self.numbers.insert(handle.id(), number);
+        let id = handle.id();
+        let [first, second] = [id.0[0], id.0[1]].map(u64::from);
+        let mut number = (handle.header.created_at_ms << 16) | (first << 8) | second;
+        while self.by_number.contains_key(&number) {
+            number += 1;
+        }
+        self.numbers.insert(id, number);
         self.codes.insert(handle.join_code().to_owned(), number);
         self.by_number.insert(number, handle);
     }
