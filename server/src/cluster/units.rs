@@ -10,10 +10,13 @@ use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch};
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
+use tokio::sync::Semaphore;
 use tokio::time::{Duration, sleep, timeout};
 
 /// Pause before a unit that could not be read is read again.
 const RETRY: Duration = Duration::from_secs(1);
+/// Units that are read and replayed at a time, so that many orphans do not slow down what runs.
+pub(super) const LOADS_AT_ONCE: usize = 4;
 
 /// The units of a node. What is done with one unit is done one after another, by the caller.
 pub(super) struct Units {
@@ -24,6 +27,7 @@ pub(super) struct Units {
     grace: Duration,
     /// The units that are to run here, with their epochs.
     wanted: Mutex<BTreeMap<Id, Epoch>>,
+    loads: Semaphore,
 }
 
 impl Units {
@@ -39,6 +43,7 @@ impl Units {
             rooms,
             tournaments,
             wanted: Mutex::default(),
+            loads: Semaphore::new(LOADS_AT_ONCE),
         }
     }
 
@@ -84,6 +89,7 @@ impl Units {
     }
 
     async fn load(&self, unit: Id, epoch: Epoch) -> Result<(), StoreError> {
+        let _permit = self.loads.acquire().await.expect("it is never closed");
         let Some(loaded) = self.store.load(unit, epoch).await? else {
             return Ok(());
         };

@@ -83,7 +83,12 @@ impl Rooms {
         let last = game.entries.last().map_or(Duration::ZERO, |entry| entry.at);
         // A system clock that was set back does not make the room younger than its journal.
         let age = Duration::from_millis(since_created).max(last);
-        let core = Core::revived(Arc::clone(&header), &game.entries, age)
+        // A long game takes a while, and others are played meanwhile.
+        let (revived, entries) = (Arc::clone(&header), game.entries);
+        let reviving = move || Core::revived(revived, &entries, age);
+        let core = tokio::task::spawn_blocking(reviving)
+            .await
+            .map_err(|problem| problem.to_string())?
             .map_err(|problem| problem.to_string())?;
         let clock = RoomClock::of_age(age);
         let mut table = self.lock();

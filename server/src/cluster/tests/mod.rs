@@ -17,6 +17,7 @@ use futures::FutureExt as _;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::TaskTracker;
 
+use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, News, NodeLease, SingleServer};
 use crate::config::ServerConfig;
 use crate::convert;
@@ -187,6 +188,33 @@ async fn the_room_of_a_dead_node_continues_at_another() {
     assert_eq!(names(&room).await, ["Ada"]);
     soon(join(&room, "Bo")).await.expect("it runs");
     assert_eq!(database.seated(id), ["Ada", "Bo"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let mut rooms = Vec::new();
+    for _ in 0..3 * LOADS_AT_ONCE {
+        rooms.push(first.create_room().await.id());
+    }
+    second.store.loads_held.send_replace(true);
+    drop(first);
+    let all_claimed = async {
+        let node = second.store.node();
+        while !rooms.iter().all(|room| database.owner(*room) == Some(node)) {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(all_claimed).await;
+    // Until everything waits for the store.
+    sleep(Duration::from_millis(1)).await;
+    assert_eq!(*second.store.loads.borrow() as usize, LOADS_AT_ONCE);
+    second.store.loads_held.send_replace(false);
+    for room in rooms {
+        second.has(room).await;
+    }
 }
 
 #[tokio::test(start_paused = true)]
