@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
+use tokio::sync::Mutex as AsyncMutex;
 use tokio::time::Instant;
 use tracing::{debug, warn};
 
@@ -26,15 +27,20 @@ pub struct StoreDirectory {
     store: Arc<dyn ClusterStore>,
     lease: Arc<NodeLease>,
     known: Mutex<Known>,
+    /// Locked while they are read, so that one request reads them for all.
+    nodes: AsyncMutex<Option<Nodes>>,
+}
+
+/// The nodes that have a lease, or why they are unknown, and when they were read.
+struct Nodes {
+    read: Instant,
+    alive: Result<BTreeMap<NodeId, Peer>, StoreError>,
 }
 
 #[derive(Default)]
 struct Known {
     by_id: BTreeMap<Id, Peer>,
     by_code: BTreeMap<String, Peer>,
-    /// The nodes that have a lease, and when they were read.
-    nodes: BTreeMap<NodeId, Peer>,
-    read: Option<Instant>,
 }
 
 impl StoreDirectory {
@@ -44,6 +50,7 @@ impl StoreDirectory {
             store,
             lease,
             known: Mutex::default(),
+            nodes: AsyncMutex::default(),
         }
     }
 
@@ -76,23 +83,26 @@ impl StoreDirectory {
 
     /// The nodes that have a lease.
     async fn alive(&self) -> Result<BTreeMap<NodeId, Peer>, StoreError> {
-        let is_known =
-            |known: &Known| (known.read).is_some_and(|at| at.elapsed() < NODES_KNOWN_FOR);
-        if !is_known(&self.known()) {
-            let nodes = self.store.nodes().await?.into_iter();
-            let alive = nodes.filter(|node| !node.expired);
-            let peers = alive.map(|node| {
-                let peer = Peer {
-                    node: format!("{} #{}", node.info.name, node.id.0).into(),
-                    endpoint: node.info.peer_endpoint.into(),
-                };
-                (node.id, peer)
-            });
-            let peers = peers.collect();
-            let mut known = self.known();
-            (known.nodes, known.read) = (peers, Some(Instant::now()));
+        let mut nodes = self.nodes.lock().await;
+        let recent = |nodes: &&Nodes| nodes.read.elapsed() < NODES_KNOWN_FOR;
+        if let Some(nodes) = nodes.as_ref().filter(recent) {
+            return nodes.alive.clone();
         }
-        Ok(self.known().nodes.clone())
+        let alive = self.store.alive().await.map(|alive| {
+            let peers = alive.into_iter().map(|(id, info)| {
+                let peer = Peer {
+                    node: format!("{} #{}", info.name, id.0).into(),
+                    endpoint: info.peer_endpoint.into(),
+                };
+                (id, peer)
+            });
+            peers.collect()
+        });
+        *nodes = Some(Nodes {
+            read: Instant::now(),
+            alive: alive.clone(),
+        });
+        alive
     }
 }
 

@@ -147,7 +147,11 @@ pub trait ClusterStore: Store {
     /// Number of rows of a tournament's journal; 0 if it does not exist.
     fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>>;
 
-    /// All nodes, in the order in which they joined.
+    /// The nodes that have a lease.
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>>;
+
+    /// All nodes, in the order in which they joined. Counts what they own, so it takes longer than
+    /// [`ClusterStore::alive`].
     fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>>;
 
     /// Asks a node to hand over what it owns; it learns of it with its next beat. Returns whether

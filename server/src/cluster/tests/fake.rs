@@ -551,6 +551,10 @@ impl ClusterStore for FakeStore {
         async move { Ok(self.database.tables().journal(id).len() as u64) }.boxed()
     }
 
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
+        async { Ok(Vec::new()) }.boxed()
+    }
+
     fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
         async { Ok(Vec::new()) }.boxed()
     }

@@ -344,6 +344,23 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
+        async move {
+            let expire_after = millis(self.options.expire_after);
+            let nodes = self.reader.read(move |connection| {
+                sqlx::query(
+                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity
+                     FROM nodes WHERE beat_ms + $1 > clock_ms()",
+                )
+                .bind(expire_after)
+                .fetch_all(connection)
+                .boxed()
+            });
+            Ok(nodes.await?.iter().map(node_of).collect())
+        }
+        .boxed()
+    }
+
     fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
         async move {
             let expire_after = millis(self.options.expire_after);
@@ -359,22 +376,18 @@ impl ClusterStore for PostgresStore {
                 .fetch_all(connection)
                 .boxed()
             });
-            let number = |row: &PgRow, column: &str| row.get::<i64, _>(column).cast_unsigned();
             Ok((nodes.await?.iter())
-                .map(|row| NodeStatus {
-                    id: NodeId(number(row, "node")),
-                    info: NodeInfo {
-                        name: row.get("name"),
-                        peer_endpoint: row.get("peer_endpoint"),
-                        client_endpoint: row.get("client_endpoint"),
-                        build: row.get("build"),
-                        capacity: number(row, "capacity"),
-                    },
-                    last_beat: Duration::from_millis(number(row, "since_ms")),
-                    expired: row.get("expired"),
-                    drain: row.get("drain"),
-                    rooms: number(row, "rooms"),
-                    tournaments: number(row, "tournaments"),
+                .map(|row| {
+                    let (id, info) = node_of(row);
+                    NodeStatus {
+                        id,
+                        info,
+                        last_beat: Duration::from_millis(number(row, "since_ms")),
+                        expired: row.get("expired"),
+                        drain: row.get("drain"),
+                        rooms: number(row, "rooms"),
+                        tournaments: number(row, "tournaments"),
+                    }
                 })
                 .collect())
         }
@@ -436,6 +449,22 @@ async fn tidy(
 fn unit_at(row: &PgRow) -> Option<(Id, Epoch)> {
     let epoch: i64 = row.get(1);
     Some((id_of(row, 0)?, Epoch(epoch.cast_unsigned())))
+}
+
+/// A node, and what it said when it joined.
+fn node_of(row: &PgRow) -> (NodeId, NodeInfo) {
+    let info = NodeInfo {
+        name: row.get("name"),
+        peer_endpoint: row.get("peer_endpoint"),
+        client_endpoint: row.get("client_endpoint"),
+        build: row.get("build"),
+        capacity: number(row, "capacity"),
+    };
+    (NodeId(number(row, "node")), info)
+}
+
+fn number(row: &PgRow, column: &str) -> u64 {
+    row.get::<i64, _>(column).cast_unsigned()
 }
 
 fn id_of(row: &PgRow, column: usize) -> Option<Id> {
