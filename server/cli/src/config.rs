@@ -436,7 +436,8 @@ mod tests {
         assert!(error.starts_with("2: duplicate key"), "{error}");
     }
 
-    /// A flag of `chefshat serve` without a variable is not a setting. These describe one run.
+    /// A flag of `chefshat serve` without a variable is not a setting. These describe one run, or are
+    /// for tests.
     #[test]
     fn every_flag_of_serve_is_a_setting_except_those_of_one_run() {
         let mut command = Line::command();
@@ -451,7 +452,10 @@ mod tests {
             .filter(|id| !known.contains(id))
             .map(|id| id.as_str())
             .collect();
-        assert_eq!(others, ["config", "until_stdin_closes", "json", "help"]);
+        assert_eq!(
+            others,
+            ["config", "lease", "until_stdin_closes", "json", "help"]
+        );
         for argument in settings(Line::command()) {
             let variable = argument.get_env().expect("settings have one");
             let expected = format!(
