@@ -57,8 +57,7 @@ export const faults: Texts["faults"] = {
       "Il disco del server è quasi pieno: non possono iniziare nuove partite. Chiedi a chi gestisce il server di liberare spazio. Le partite in corso continuano.",
     STORE_FAILED:
       "Il server non riesce a salvare le partite e si sta fermando. Le tue decisioni finora sono salvate; le partite riprendono al suo ritorno.",
-    OWNER_UNREACHABLE:
-      "Il server che se ne occupa non è raggiungibile, o un altro sta subentrando. Riprova tra poco.",
+    OWNER_UNREACHABLE: "Il server che se ne occupa non è raggiungibile, o un altro sta subentrando. Riprova tra poco.",
     ROOM_GONE: "Questa stanza si è appena chiusa, o il server si sta fermando. Riprova tra poco.",
     INTERNAL: "Il server non è riuscito a farlo. Riprova; se non basta, avvisa chi gestisce il server.",
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite riprendono al suo ritorno.",
