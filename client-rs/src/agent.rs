@@ -44,6 +44,10 @@ pub trait Agent: Send {
     /// Called for every event of the game, once and in order, also across lost connections.
     fn on_event(&mut self, _event: &v1::GameEvent) {}
 
+    /// Called when the game waits for another of the others, or for none. Only for seats that receive
+    /// events at once.
+    fn on_awaited(&mut self, _awaited: &v1::Awaited) {}
+
     /// Called with the result of an answer.
     fn on_result(&mut self, _result: &v1::AnswerResult) {}
 
@@ -67,6 +71,9 @@ macro_rules! forward_agent {
             }
             fn on_event(&mut self, event: &v1::GameEvent) {
                 (**self).on_event(event);
+            }
+            fn on_awaited(&mut self, awaited: &v1::Awaited) {
+                (**self).on_awaited(awaited);
             }
             fn on_result(&mut self, result: &v1::AnswerResult) {
                 (**self).on_result(result);

@@ -113,13 +113,19 @@ impl Client {
     /// # Errors
     /// `ROOM_UNKNOWN`.
     pub async fn get_room(&self, room_id: impl Into<String>) -> Result<v1::Room, Error> {
-        let mut service = RoomServiceClient::new(self.channel());
+        let service = RoomServiceClient::new(self.channel());
         let request = v1::GetRoomRequest {
             room_id: room_id.into(),
             join_code: String::new(),
         };
-        let response = service.get_room(request).await?.into_inner();
-        response.room.ok_or_else(|| Error::incomplete("room"))
+        let response = repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.get_room(request).await }
+        });
+        response
+            .await?
+            .room
+            .ok_or_else(|| Error::incomplete("room"))
     }
 
     /// Gives up a seat before the game starts: the seat becomes free and the ticket invalid.
@@ -220,12 +226,16 @@ impl Client {
     /// # Errors
     /// `GAME_UNKNOWN`, `GAME_RUNNING`.
     pub async fn record(&self, game_id: impl Into<String>) -> Result<Vec<v1::RecordLine>, Error> {
-        let mut service =
+        let service =
             RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
         let request = v1::GetRecordRequest {
             game_id: game_id.into(),
         };
-        let mut stream = service.get_record(request).await?.into_inner();
+        let opened = repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.get_record(request).await }
+        });
+        let mut stream = opened.await?;
         let mut lines = Vec::new();
         while let Some(part) = stream.message().await? {
             lines.extend(part.lines);

@@ -34,7 +34,7 @@ pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
-pub use spectate::Spectator;
+pub use spectate::{Spectator, Watched};
 pub use table::TableFollower;
 pub use tournaments::TournamentFollower;
 pub use vector::VectorGames;

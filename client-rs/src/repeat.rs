@@ -1,4 +1,5 @@
-//! Repeats requests whose response was lost. Their id tells the server that they are the same.
+//! Repeats requests whose response was lost, or whose room or tournament is just changing servers.
+//! They change nothing, or their id tells the server that they are the same.
 
 use std::time::Duration;
 
@@ -8,10 +9,17 @@ use tonic::{Response, Status};
 use crate::Error;
 use crate::error::may_retry;
 
-/// Maximum number of attempts.
+/// Maximum number of attempts if the connection is lost.
 const ATTEMPTS: u32 = 5;
+/// Maximum number of attempts while the server of a room or tournament cannot be reached: another
+/// one takes over within ten seconds.
+const OWNER_ATTEMPTS: u32 = 20;
 /// Pause after the first attempt; it doubles with each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// Reason of a server that cannot reach the one that runs a room or tournament.
+const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
 
 /// Gives a request an id unless the caller has.
 ///
@@ -27,7 +35,8 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
     }
 }
 
-/// Sends a request, and again if the connection is lost before its response arrives.
+/// Sends a request, and again if the connection is lost before its response arrives, or the server of
+/// its room or tournament cannot be reached.
 pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
@@ -38,11 +47,17 @@ where
             Ok(response) => return Ok(response.into_inner()),
             Err(status) => Error::from(status),
         };
-        // An error with a reason is an answer of the server.
-        if attempt == ATTEMPTS || error.reason().is_some() || !may_retry(error.code()) {
+        let attempts = match error.reason() {
+            None if may_retry(error.code()) => ATTEMPTS,
+            Some(OWNER_UNREACHABLE) => OWNER_ATTEMPTS,
+            // The server has refused it.
+            _ => 1,
+        };
+        if attempt >= attempts {
             return Err(error);
         }
-        tokio::time::sleep(FIRST_PAUSE * 2_u32.pow(attempt - 1)).await;
+        let pause = FIRST_PAUSE * 2_u32.pow(attempt - 1);
+        tokio::time::sleep(pause.min(LONGEST_PAUSE)).await;
         attempt += 1;
     }
 }
@@ -50,6 +65,9 @@ where
 #[cfg(test)]
 mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
+
+    use tonic::Code;
+    use tonic_types::{ErrorDetails, StatusExt as _};
 
     use super::*;
 
@@ -71,5 +89,35 @@ mod tests {
         };
         repeated(refused).await.expect_err("refused");
         assert_eq!(sent.load(Ordering::Relaxed), 1);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_room_that_changes_servers_is_awaited_but_not_for_ever() {
+        let sent = AtomicU32::new(0);
+        let changes_servers_until = |attempt: u32| {
+            sent.store(0, Ordering::Relaxed);
+            let sent = &sent;
+            move || {
+                let unreachable = || {
+                    let details = ErrorDetails::with_error_info(OWNER_UNREACHABLE, "chefshat", []);
+                    Status::with_error_details(Code::Unavailable, "try again", details)
+                };
+                let number = sent.fetch_add(1, Ordering::Relaxed);
+                std::future::ready(match number < attempt {
+                    true => Err(unreachable()),
+                    false => Ok(Response::new(number)),
+                })
+            }
+        };
+        let began = tokio::time::Instant::now();
+        let found = repeated(changes_servers_until(OWNER_ATTEMPTS - 1)).await;
+        assert_eq!(found.expect("the last attempt"), OWNER_ATTEMPTS - 1);
+        assert!(began.elapsed() > Duration::from_secs(10), "a takeover");
+        let never = repeated(changes_servers_until(u32::MAX)).await;
+        assert_eq!(
+            never.expect_err("given up").reason(),
+            Some(OWNER_UNREACHABLE)
+        );
+        assert_eq!(sent.load(Ordering::Relaxed), OWNER_ATTEMPTS);
     }
 }

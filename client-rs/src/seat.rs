@@ -125,6 +125,11 @@ impl<A: Agent> SeatSession<A> {
         any
     }
 
+    /// Passes on whom the game waits for.
+    pub(crate) fn awaited(&mut self, awaited: &v1::Awaited) {
+        self.agent.on_awaited(awaited);
+    }
+
     /// Updates the state after an event. Attaching ends earlier substitutions.
     fn follow(&mut self, event: v1::GameEvent) {
         match event.kind {

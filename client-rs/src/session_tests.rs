@@ -213,6 +213,7 @@ fn substituted(seat: u32) -> Option<Kind> {
     Some(Kind::Substituted(v1::Substituted {
         seat,
         built_in_agent: agent,
+        for_good: false,
     }))
 }
 

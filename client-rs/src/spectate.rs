@@ -11,6 +11,15 @@ use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 
+/// What a spectator learns.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Watched {
+    /// An event of the game.
+    Event(Box<v1::GameEvent>),
+    /// Whom the game waits for, after the events so far.
+    Awaited(v1::Awaited),
+}
+
 /// A spectator of one room, created by [`Client::spectate`](crate::Client::spectate).
 #[derive(Debug)]
 pub struct Spectator {
@@ -20,7 +29,7 @@ pub struct Spectator {
     backoff: Backoff,
     outage: Outage,
     stream: Option<(Streaming<v1::SpectatorServiceWatchResponse>, Instant)>,
-    ready: VecDeque<v1::GameEvent>,
+    ready: VecDeque<Watched>,
     room: Option<v1::Room>,
     ended: bool,
 }
@@ -55,7 +64,10 @@ impl Spectator {
 
     /// Number of the next event, for resuming in another process.
     pub fn next_sequence(&self) -> u64 {
-        let first = self.ready.front().map(|event| event.sequence);
+        let first = self.ready.iter().find_map(|watched| match watched {
+            Watched::Event(event) => Some(event.sequence),
+            Watched::Awaited(_) => None,
+        });
         first.unwrap_or(self.next_event).max(1)
     }
 
@@ -67,8 +79,23 @@ impl Spectator {
     /// connection cannot be restored in time. After an error there are no more events.
     pub async fn next(&mut self) -> Result<Option<v1::GameEvent>, Error> {
         loop {
-            if let Some(event) = self.ready.pop_front() {
-                return Ok(Some(event));
+            match self.next_watched().await? {
+                Some(Watched::Event(event)) => return Ok(Some(*event)),
+                Some(Watched::Awaited(_)) => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// The next event, or whom the game waits for when that changes; `None` when the game is over.
+    /// Cancel safe, as [`Spectator::next`].
+    ///
+    /// # Errors
+    /// As [`Spectator::next`].
+    pub async fn next_watched(&mut self) -> Result<Option<Watched>, Error> {
+        loop {
+            if let Some(watched) = self.ready.pop_front() {
+                return Ok(Some(watched));
             }
             if self.ended {
                 return Ok(None);
@@ -113,9 +140,11 @@ impl Spectator {
             if event.sequence >= self.next_event {
                 self.next_event = event.sequence.saturating_add(1);
                 self.outage.over();
-                self.ready.push_back(event);
+                self.ready.push_back(Watched::Event(Box::new(event)));
             }
         }
+        let awaited = response.awaited.into_iter().last();
+        self.ready.extend(awaited.map(Watched::Awaited));
     }
 
     async fn lost(&mut self, status: Status) -> Result<(), Error> {

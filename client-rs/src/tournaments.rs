@@ -1,5 +1,7 @@
-//! Tournaments: calls, following a tournament, and taking part in one. `participant` processes the
-//! updates of a participant.
+//! Tournaments: calls, following a tournament, and taking part in one. `by_hand` has the calls that
+//! change a running tournament; `participant` processes the updates of a participant.
+
+mod by_hand;
 
 use futures::Stream;
 use tonic::{Status, Streaming};
@@ -49,8 +51,11 @@ impl Client {
             tournament_id: tournament_id.into(),
             join_code: String::new(),
         };
-        let response = service(self).get_tournament(request).await?.into_inner();
-        one(response.tournament)
+        let response = repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.get_tournament(request).await }
+        });
+        one(response.await?.tournament)
     }
 
     /// A page of the server's tournaments, newest first, without participants.
@@ -169,8 +174,11 @@ impl Client {
         let request = v1::GetTournamentResultsRequest {
             tournament_id: tournament_id.into(),
         };
-        let response = service(self).get_tournament_results(request).await?;
-        Ok(response.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.get_tournament_results(request).await }
+        })
+        .await
     }
 
     /// A page of a tournament's games, in order.
@@ -181,8 +189,11 @@ impl Client {
         &self,
         request: v1::ListTournamentGamesRequest,
     ) -> Result<v1::ListTournamentGamesResponse, Error> {
-        let response = service(self).list_tournament_games(request).await?;
-        Ok(response.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.list_tournament_games(request).await }
+        })
+        .await
     }
 
     /// The ratings of everybody who has played rated games on the server, best first.

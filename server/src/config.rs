@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_cluster::LeaseTimes;
 use chefshat_record::signature::SigningKey;
 use chefshat_vector::Limits;
 
@@ -25,6 +24,8 @@ pub const MAX_SEATS_PER_STREAM: usize = 4_096;
 pub const MAX_SEATS_PER_WATCH: usize = 64;
 /// Most commands in one message.
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
+/// Most commands of a seat that wait for its attachment while another stream has it.
+pub const MAX_COMMANDS_CONTESTED: usize = 64;
 /// How long a Play stream may stay silent before its first message.
 pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Messages that wait for one room.
@@ -92,6 +93,10 @@ pub const TOURNAMENT_MAILBOX: usize = 256;
 pub const MAX_CALLS_WAITING: usize = 4_096;
 /// How long a tournament stays open if nobody joins or starts it.
 pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
+/// How far ahead the start of a tournament may be set.
+pub const MAX_START_AHEAD: Duration = Duration::from_secs(366 * 24 * 3_600);
+/// How long a tournament stays paused.
+pub const TOURNAMENT_PAUSE: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// Pause before rooms for games of a tournament are tried again after a failure.
 pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
 /// Most streams that follow tournaments.
@@ -141,8 +146,6 @@ pub struct ServerConfig {
     pub data_dir: Option<PathBuf>,
     /// The key that signs records; `None`: they are not signed.
     pub signing_key: Option<Arc<SigningKey>>,
-    /// How often a node of a cluster beats, and how long its lease lasts.
-    pub lease: LeaseTimes,
     /// Most rooms at a time, including ended ones that are still listed.
     pub max_rooms: usize,
     /// Most connections at a time.
@@ -187,7 +190,6 @@ impl Default for ServerConfig {
         Self {
             data_dir: None,
             signing_key: None,
-            lease: LeaseTimes::DEFAULT,
             max_rooms: 10_000,
             max_connections: 10_000,
             vector_threads: 0,

@@ -259,6 +259,12 @@ impl Outbox {
         self.lock().weight
     }
 
+    /// Whether updates still reach the client: it has not gone, and its stream has not been ended.
+    pub fn is_open(&self) -> bool {
+        let waiting = self.lock();
+        !(waiting.ended || waiting.abandoned)
+    }
+
     /// Whether the client has gone and nothing in here will be read.
     pub fn is_abandoned(&self) -> bool {
         self.lock().abandoned

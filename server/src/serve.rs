@@ -154,11 +154,12 @@ impl Server {
             ..config
         };
         let lease = Arc::new(NodeLease::new());
-        let directory = StoreDirectory::new(Arc::clone(&store), Arc::clone(&lease));
+        let shared = Arc::clone(&store);
+        let directory = StoreDirectory::new(shared, Arc::clone(&lease), config.shares);
         let directory = Arc::new(directory);
         let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
         let mut server = Self::new(config, stored, directory, Some(lease))?;
-        let (grace, lease_times) = (server.config.grace, server.config.lease);
+        let grace = server.config.grace;
         let id = store.join(info.clone()).await?;
         info!(node = id.0, name = info.name, "joined the cluster");
         // It owns nothing yet: these are over.
@@ -166,7 +167,6 @@ impl Server {
         server.node = Some(ClusterNode::start(
             id,
             info,
-            lease_times,
             grace,
             store,
             Arc::clone(&server.rooms),
@@ -327,8 +327,10 @@ impl Server {
         if let Some(tls) = tls {
             tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
         }
-        let forwarding = (peers.as_ref())
-            .map(|port| grpc::ForwardLayer::new(Arc::clone(rooms.directory()), port.peers()));
+        let forwarding = (peers.as_ref()).map(|port| {
+            let directory = Arc::clone(rooms.directory());
+            grpc::ForwardLayer::new(directory, port.peers(), Arc::clone(&calls))
+        });
         let play = grpc::Play::new(
             Arc::clone(&rooms),
             Arc::clone(&tournaments),

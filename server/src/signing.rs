@@ -16,7 +16,7 @@ use tracing::error;
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert;
 use crate::limits::{Background, Key};
-use crate::store::{Journal, Signed};
+use crate::store::{Journal, Signed, StoreError};
 use chefshat_room::journal::GameHeader;
 
 /// The file of the key in a data directory.
@@ -108,15 +108,20 @@ impl Signer {
         self.key.as_ref().map(|key| key.public())
     }
 
-    /// Signs the record of a game that has ended, in the background if given, charged to a caller.
-    /// A record that cannot be signed stays unsigned.
+    /// Signs the record of a game that has ended, in the background if given, charged to a caller;
+    /// `None` without a key.
+    ///
+    /// # Errors
+    /// The journal cannot be read.
     pub async fn sign(
         &self,
         header: Arc<GameHeader>,
         journal: &mut dyn Journal,
         background: Option<(&Background, Key)>,
-    ) -> Option<Signed> {
-        let key = Arc::clone(self.key.as_ref()?);
+    ) -> Result<Option<Signed>, StoreError> {
+        let Some(key) = self.key.clone() else {
+            return Ok(None);
+        };
         // Before the journal is read: a long one takes much memory.
         let _right = match background {
             Some((background, charged)) => Either::Left(background.slice(charged).await),
@@ -124,13 +129,7 @@ impl Signer {
             None => Either::Right(self.permits.acquire().await.ok()),
         };
         let game = header.game_id;
-        let entries = match journal.entries().await {
-            Ok(entries) => entries,
-            Err(error) => {
-                error!(%game, %error, "a record could not be signed; it stays unsigned");
-                return None;
-            }
-        };
+        let entries = journal.entries().await?;
         let signing = move || {
             let lines = convert::record_lines(&header, &entries);
             Signed {
@@ -145,7 +144,7 @@ impl Signer {
         if signed.is_none() {
             error!(%game, "a record could not be signed; it stays unsigned");
         }
-        signed
+        Ok(signed)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{Ledger, PATIENCE, patiently};
 
 /// Pause before repeating a call that did not reach the server.
 const AGAIN_AFTER: Duration = Duration::from_millis(10);
-/// How the agents reconnect: fast, and as long as a test waits.
+/// How agents reconnect unless a test says otherwise: fast, and as long as a test waits.
 const BACKOFF: Backoff = Backoff {
     first: Duration::from_millis(5),
     max: Duration::from_millis(40),
@@ -42,6 +42,8 @@ pub struct RoomKind {
     pub delivery: v1::EventDelivery,
     /// Longest thinking time of an agent.
     pub pace: Duration,
+    /// How the agents reconnect.
+    pub backoff: Backoff,
 }
 
 impl Default for RoomKind {
@@ -57,6 +59,7 @@ impl Default for RoomKind {
             one_stream: false,
             delivery: v1::EventDelivery::AtOnce,
             pace: Duration::from_millis(2),
+            backoff: BACKOFF,
         }
     }
 }
@@ -215,7 +218,7 @@ impl Room {
     ) -> Vec<Result<Outcome, PlayError>> {
         let options = PlayOptions {
             delivery: self.kind.delivery,
-            backoff: BACKOFF,
+            backoff: self.kind.backoff.clone(),
             ..PlayOptions::default()
         };
         let mut seats = Vec::new();

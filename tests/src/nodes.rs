@@ -14,6 +14,7 @@ use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_server::cluster::{Directory, FoundBy, Location, Peer, PeerPort};
 use chefshat_server::config::ServerConfig;
+use chefshat_server::limits::Key;
 use chefshat_server::serve::{ServeError, Server};
 use chefshat_server::store::MemoryStore;
 use chefshat_server::tls::TlsFiles;
@@ -29,6 +30,7 @@ use crate::link::{Link, listen};
 struct Places {
     by_id: HashMap<Id, usize>,
     by_code: HashMap<String, usize>,
+    by_game: HashMap<Id, usize>,
     /// What a node wrongly remembers: an owner, and how often it must be forgotten.
     stale: HashMap<(usize, Id), (usize, u32)>,
 }
@@ -66,15 +68,16 @@ impl Directory for View {
         ready(false).boxed()
     }
 
-    fn locate(&self, id: Id) -> BoxFuture<'_, Location> {
+    fn locate<'a>(&'a self, found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
         let places = self.places.lock().expect("nothing panics under this lock");
-        let stale = places.stale.get(&(self.node, id)).map(|(node, _)| *node);
-        self.location(stale.or(places.by_id.get(&id).copied()))
-    }
-
-    fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location> {
-        let places = self.places.lock().expect("nothing panics under this lock");
-        self.location(places.by_code.get(code).copied())
+        self.location(match found_by {
+            FoundBy::Id(id) => {
+                let stale = places.stale.get(&(self.node, *id)).map(|(node, _)| *node);
+                stale.or(places.by_id.get(id).copied())
+            }
+            FoundBy::Code(code) => places.by_code.get(code).copied(),
+            FoundBy::Game(game) => places.by_game.get(game).copied(),
+        })
     }
 
     fn forget(&self, found_by: &FoundBy) {
@@ -205,6 +208,12 @@ impl TestNodes {
         let mut places = self.places.lock().expect("nothing panics under this lock");
         places.by_id.insert(Id::parse(id).expect("an id"), node);
         places.by_code.insert(join_code.to_owned(), node);
+    }
+
+    /// Tells all nodes where a game is played.
+    pub fn place_game(&self, node: usize, game: &str) {
+        let mut places = self.places.lock().expect("nothing panics under this lock");
+        places.by_game.insert(Id::parse(game).expect("an id"), node);
     }
 
     /// Makes a node believe that `owner` has something, until it has forgotten it this often.

@@ -22,6 +22,8 @@ pub struct StreamSeat {
     pub last_event: u64,
     /// All events received, in order.
     pub events: Vec<v1::GameEvent>,
+    /// Whom the game waited for, in order. Only with events at once.
+    pub awaited: Vec<v1::Awaited>,
 }
 
 impl StreamSeat {
@@ -39,6 +41,7 @@ impl StreamSeat {
             waiting: VecDeque::new(),
             last_event: 0,
             events: Vec::new(),
+            awaited: Vec::new(),
         }
     }
 
@@ -104,7 +107,8 @@ impl StreamSeat {
         self.requests = None;
     }
 
-    /// The next update that is not a batch of events; those are stored in `events`. Panics if the
+    /// The next update that is neither a batch of events nor about who is awaited; those are stored in
+    /// `events` and `awaited`. Panics if the
     /// stream ends.
     pub async fn next(&mut self) -> Update {
         self.next_or_end()
@@ -132,6 +136,7 @@ impl StreamSeat {
                             self.events.push(event);
                         }
                     }
+                    Update::Awaited(awaited) => self.awaited.push(awaited),
                     other => return Ok(Some(other)),
                 }
             }

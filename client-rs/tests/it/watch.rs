@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use chefshat_client::{Backoff, v1};
+use chefshat_client::{Backoff, Watched, v1};
 use futures::TryStreamExt as _;
 use tonic::{Code, Status};
 
@@ -42,6 +42,38 @@ async fn events_come_once_and_in_order_across_lost_streams() {
     assert_eq!(numbers, [1, 2, 3, 4, 5]);
     assert_eq!(fake.watched_from(), [0, 3, 3]);
     assert!(fake.is_done());
+}
+
+#[tokio::test]
+async fn whom_the_game_waits_for_comes_between_the_events() {
+    let awaited = |seat| v1::Awaited {
+        seat,
+        ..v1::Awaited::default()
+    };
+    let with = |numbers: Vec<u64>, awaited| {
+        let response: v1::SpectatorServiceWatchResponse = part(numbers)?;
+        Ok(v1::SpectatorServiceWatchResponse {
+            awaited,
+            ..response
+        })
+    };
+    let fake = Fake::default();
+    fake.watch(vec![
+        with(vec![1], vec![awaited(Some(2)), awaited(Some(0))]),
+        with(vec![2], vec![]),
+        with(vec![], vec![awaited(None)]),
+    ]);
+    let client = fake.start().await;
+    let mut spectator = client.spectate("room", 0).with_backoff(quick());
+    let mut watched = Vec::new();
+    while let Some(next) = spectator.next_watched().await.unwrap() {
+        watched.push(match next {
+            Watched::Event(event) => (event.sequence, None),
+            Watched::Awaited(awaited) => (0, Some(awaited.seat)),
+        });
+    }
+    let nobody = (0, Some(None));
+    assert_eq!(watched, [(1, None), (0, Some(Some(0))), (2, None), nobody]);
 }
 
 #[tokio::test]

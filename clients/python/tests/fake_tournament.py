@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 import grpc
 from fake_game import SEATS, FakeGame, FakeSeat, Outbox
@@ -43,6 +44,12 @@ class Entrant:
     max_games: int
     stream: Stream | None = None
     handle: int = 0
+
+
+def refuse_change_by_hand(context: Context) -> NoReturn:
+    """Ends a call that the fake server does not implement."""
+    context.abort(grpc.StatusCode.UNIMPLEMENTED, "the fake server's tournaments are not changed by hand")
+    raise AssertionError("abort always raises")
 
 
 class FakeTournaments(tournament_grpc.TournamentServiceServicer):
@@ -103,6 +110,29 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
                     if not game.over:
                         game.end(pb.ABORT_REASON_CLOSED)
         return pb.CloseTournamentResponse(tournament=tournament.shown)
+
+    # Changes by hand, which the fake server does not have.
+
+    def WithdrawParticipant(self, request: pb.WithdrawParticipantRequest, context: Context) -> pb.WithdrawParticipantResponse:
+        refuse_change_by_hand(context)
+
+    def RemoveParticipant(self, request: pb.RemoveParticipantRequest, context: Context) -> pb.RemoveParticipantResponse:
+        refuse_change_by_hand(context)
+
+    def ReplaceParticipant(self, request: pb.ReplaceParticipantRequest, context: Context) -> pb.ReplaceParticipantResponse:
+        refuse_change_by_hand(context)
+
+    def PauseTournament(self, request: pb.PauseTournamentRequest, context: Context) -> pb.PauseTournamentResponse:
+        refuse_change_by_hand(context)
+
+    def ResumeTournament(self, request: pb.ResumeTournamentRequest, context: Context) -> pb.ResumeTournamentResponse:
+        refuse_change_by_hand(context)
+
+    def PostponeGame(self, request: pb.PostponeGameRequest, context: Context) -> pb.PostponeGameResponse:
+        refuse_change_by_hand(context)
+
+    def CallGame(self, request: pb.CallGameRequest, context: Context) -> pb.CallGameResponse:
+        refuse_change_by_hand(context)
 
     def FollowTournament(self, request: pb.FollowTournamentRequest, context: Context) -> Iterator[pb.FollowTournamentResponse]:
         """Reports every 20 ms, with a heartbeat before each report."""

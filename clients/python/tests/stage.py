@@ -26,6 +26,9 @@ class Scribe(Agent):
     def on_snapshot(self, snapshot: pb.Snapshot) -> None:
         self.log.append(("snapshot", snapshot.next_sequence))
 
+    def on_awaited(self, awaited: pb.Awaited) -> None:
+        self.log.append(("awaited", awaited.seat if awaited.HasField("seat") else None))
+
     def on_result(self, result: pb.AnswerResult) -> None:
         self.log.append(("result", pb.AnswerStatus.Name(result.status).removeprefix("ANSWER_STATUS_")))
 

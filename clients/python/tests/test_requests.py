@@ -1,11 +1,15 @@
-"""Calls that are repeated when their response was lost."""
+"""Calls that are repeated when their response was lost, or their room is just changing servers."""
 
 import asyncio
+from typing import Any
 
 import grpc
 import pytest
+from google.protobuf import any_pb2
+from google.rpc import error_details_pb2, status_pb2
 
 from chefshat import ChefsHatError, pb, requests
+from chefshat.errors import DETAILS_KEY
 
 
 class Lost(grpc.RpcError):
@@ -19,6 +23,17 @@ class Lost(grpc.RpcError):
         return self._code
 
 
+class Unreachable(Lost):
+    """The answer of a server that cannot reach the one that runs a room or tournament."""
+
+    def trailing_metadata(self) -> tuple[Any, ...]:
+        """The reason."""
+        detail = any_pb2.Any()
+        detail.Pack(error_details_pb2.ErrorInfo(reason="OWNER_UNREACHABLE", domain="chefshat"))
+        status = status_pb2.Status(code=grpc.StatusCode.UNAVAILABLE.value[0], details=[detail])
+        return ((DETAILS_KEY, status.SerializeToString()),)
+
+
 class Method:
     """A call that fails with each error in turn, then returns; records the ids of its requests."""
 
@@ -26,9 +41,9 @@ class Method:
         self.errors = list(errors)
         self.ids: list[bytes] = []
 
-    def __call__(self, request: pb.JoinRoomRequest) -> str:
+    def __call__(self, request: pb.JoinRoomRequest | pb.GetRoomRequest | pb.LeaveRoomRequest) -> str:
         """Fails or returns."""
-        self.ids.append(request.request_id)
+        self.ids.append(getattr(request, "request_id", b""))
         if self.errors:
             raise self.errors.pop(0)
         return "joined"
@@ -42,6 +57,7 @@ class Method:
 def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Removes the pauses between attempts."""
     monkeypatch.setattr(requests, "PAUSES_S", (0.0, 0.0, 0.0))
+    monkeypatch.setattr(requests, "OWNER_PAUSES_S", len(requests.OWNER_PAUSES_S) * (0.0,))
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -61,3 +77,20 @@ def test_a_refusal_and_the_last_attempt_are_raised(errors: list[grpc.RpcError]) 
     with pytest.raises(ChefsHatError):
         requests.called(method, pb.JoinRoomRequest())
     assert len(method.ids) == len(errors)
+
+
+@pytest.mark.parametrize("request_", [pb.JoinRoomRequest(), pb.GetRoomRequest()])
+def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(request_: pb.JoinRoomRequest | pb.GetRoomRequest) -> None:
+    attempts = 1 + len(requests.OWNER_PAUSES_S)
+    assert requests.called(Method(*[Unreachable()] * (attempts - 1)), request_) == "joined"
+    method = Method(*[Unreachable()] * attempts)
+    with pytest.raises(ChefsHatError, match="OWNER_UNREACHABLE"):
+        requests.called(method, request_)
+    assert len(method.ids) == attempts
+
+
+def test_a_change_that_may_have_been_made_is_not_repeated() -> None:
+    method = Method(Unreachable())
+    with pytest.raises(ChefsHatError, match="OWNER_UNREACHABLE"):
+        requests.called(method, pb.LeaveRoomRequest())
+    assert len(method.ids) == 1

@@ -30,6 +30,12 @@ def test_a_game_from_attaching_to_its_end() -> None:
     assert stage.log == [("attached", 0), ("event", 1), ("result", "ACCEPTED"), ("event", 2), ("over", True)]
 
 
+def test_the_agent_learns_whom_the_game_waits_for(stage: Stage) -> None:
+    stage.receive(events(1), pb.SeatUpdate(awaited=pb.Awaited(seat=0, away=True, left_ms=12_000)))
+    stage.receive(pb.SeatUpdate(awaited=pb.Awaited()))
+    assert stage.log[-3:] == [("event", 1), ("awaited", 0), ("awaited", None)]
+
+
 def test_every_seat_has_its_own_entropy() -> None:
     session = PlaySession({ticket: Scribe() for ticket in "tuv"})
     session.connected()

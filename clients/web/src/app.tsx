@@ -29,6 +29,7 @@ const pages: Pages = {
   leaderboard: async () => (await import("./people/LeaderboardPage")).LeaderboardPage,
   person: async () => (await import("./people/PersonPage")).PersonPage,
   tutorial: async () => (await import("./tutorial/TutorialPage")).TutorialPage,
+  rules: async () => (await import("./rules/RulesPage")).RulesPage,
   unknown: async () => (await import("./parts/NotFound")).NotFound,
 };
 

@@ -1,5 +1,5 @@
 // The entry point: takes the token from the address, applies the stored theme and language, then
-// renders the page.
+// renders the page. The service worker (public/sw.js) caches nothing: it makes the page installable.
 
 import { render } from "preact";
 import "@fontsource-variable/atkinson-hyperlegible-next/wght.css";
@@ -15,4 +15,6 @@ if (root) {
   startTheme();
   await startLanguage();
   render(<App />, root);
+  // A browser has none in a private window, or without a secure origin.
+  void navigator.serviceWorker?.register("/sw.js").catch(() => undefined);
 }

@@ -19,6 +19,7 @@ export type Route =
   | { page: "leaderboard" }
   | { page: "person"; name: string }
   | { page: "tutorial" }
+  | { page: "rules" }
   | { page: "unknown" };
 
 /** Parses a path such as "/rooms/0123". */
@@ -41,6 +42,8 @@ export function routeOf(path: string): Route {
         return { page: "leaderboard" };
       case "tutorial":
         return { page: "tutorial" };
+      case "rules":
+        return { page: "rules" };
       default:
         return { page: "unknown" };
     }

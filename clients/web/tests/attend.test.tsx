@@ -138,7 +138,7 @@ describe("entering by hand", () => {
     await press("11, mozzarella");
     await press("Report the play");
     await press("11, mozzarella");
-    await press("1 Bo");
+    await press("2 Bo");
     await press("Bo lays 1 × 11, Golden");
     expect(sent).toEqual([
       { case: "laid", value: { cards: { cards: [11], golden: true } } },
@@ -149,11 +149,11 @@ describe("entering by hand", () => {
   test("is for players at the table: what a remote one decides is laid for it", async () => {
     await show(stateOf({ seat: 2 }));
     const who = [...root.querySelectorAll('[data-part~="entry"] [aria-pressed]')].map(nameOf);
-    expect(who).not.toContain("2 Cleo");
+    expect(who).not.toContain("3 Cleo");
     await press("5, chilli");
     await press("Report the play");
     expect(sent).toEqual([]);
-    await press("1 Bo");
+    await press("2 Bo");
     await press("Bo lays 3 × 5");
     expect(sent).toHaveLength(1);
   });
@@ -199,15 +199,15 @@ describe("entering by hand", () => {
     await press("Nobody declares");
     await press("Dan declares");
     await press("Gift");
-    await press("3 Dan");
+    await press("4 Dan");
     await press("Dan gave, cards not seen");
     await press("Gift");
-    await press("3 Dan");
+    await press("4 Dan");
     await press("Add 1, truffle");
     await press("Add 2, shrimp");
     await press("Dan gave these cards");
     await press("Role taken");
-    await press("0 Ada");
+    await press("1 Ada");
     await press("Chef");
     await press("Ada is Chef");
     expect(sent).toEqual([
@@ -327,7 +327,7 @@ describe("the reports of the Shift", () => {
   test("are listed, the newest first", async () => {
     await show(stateOf({ reports }));
     const words = [...root.querySelectorAll('[data-part~="report"] p')].map(({ textContent }) => textContent);
-    expect(words).toEqual(["1 Dan passed", "1 Bo laid 2 × 9 + joker", "2 The hand of Cleo was seen"]);
+    expect(words).toEqual(["2 Dan passed", "2 Bo laid 2 × 9 + joker", "3 The hand of Cleo was seen"]);
   });
 
   test("are shown eight at a time, or all", async () => {

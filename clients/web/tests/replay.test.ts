@@ -66,6 +66,7 @@ test.each(RECORDS)("%s: with unknown hands, as at a table with real cards, leads
       : line;
   });
   const [known, film] = [filmOf(lines), filmOf(unknown)];
+  expect([known.handsKnown, film.handsKnown]).toEqual([true, false]);
   expect(film.length).toBe(known.length);
   for (let at = 0; at < film.length; at += 1) {
     const [frame, full] = [film.at(at), known.at(at)];

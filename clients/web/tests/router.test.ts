@@ -18,6 +18,7 @@ const ROUTES: [string, Route][] = [
   ["/leaderboard", { page: "leaderboard" }],
   ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II" }],
   ["/tutorial", { page: "tutorial" }],
+  ["/rules", { page: "rules" }],
 ];
 
 test.each(ROUTES)("%s is parsed and formatted", (path, route) => {

@@ -49,7 +49,7 @@ const final = game({ game: 2, round: 2, table: 1, order: [7, 3, 1, 4] });
 
 function knockout(games: TournamentGame[], state = TournamentState.PLAYING) {
   const participants = Array.from({ length: 8 }, (_, participant) => ({ participant, name: `P${participant}` }));
-  return bracket(create(TournamentSchema, { participants, state }), games).map(({ tables }) =>
+  return bracket(create(TournamentSchema, { participants, state, rounds: 2 }), games).map(({ tables }) =>
     tables.map(({ seats }) => seats.map(({ participant, wentOn }) => `${participant}${wentOn ? "+" : ""}`).join(" ")),
   );
 }
@@ -65,7 +65,7 @@ test.each([
 
 test("a table of a later round names the tables that lead to it", () => {
   const participants = Array.from({ length: 16 }, (_, participant) => ({ participant }));
-  const tournament = create(TournamentSchema, { participants, state: TournamentState.PLAYING });
+  const tournament = create(TournamentSchema, { participants, rounds: 3, state: TournamentState.PLAYING });
   const rounds = bracket(tournament, [game({ game: 0, round: 1, table: 1, order: [0, 1, 2, 3] })]);
   expect(rounds.map(({ tables }) => tables.map(({ from }) => from))).toEqual([
     [[], [], [], []],

@@ -14,6 +14,7 @@ import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chef
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { Role, SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
 import { maskOf } from "../src/table/model/actions";
+import { awaitedSeconds } from "../src/table/model/awaited";
 import { applyUpdate, type LiveState, startLive } from "../src/table/model/live";
 import { legalMoves } from "../src/table/model/picking";
 import { emptyTable } from "../src/table/model/state";
@@ -119,6 +120,30 @@ describe("an open decision", () => {
     const specialAction = SpecialAction.FOOD_FIGHT;
     const special = told(start(), decision(9n, { kind: DecisionKind.SPECIAL_ACTION, specialAction }));
     expect(special.decision?.special).toBe(specialAction);
+  });
+});
+
+describe("whom the game waits for", () => {
+  const awaited = (value: Extract<Init, { case: "awaited" }>["value"]): Init => ({ case: "awaited", value });
+  const away = told(start(), awaited({ seat: 2, away: true, waitedMs: 8000, leftMs: 12_400 })).awaited;
+
+  test("counts down for a seat that is away", () => {
+    if (!away) throw new Error("nobody is awaited");
+    expect(away).toMatchObject({ seat: 2, receivedAtMs: 1000 });
+    expect([1000, 1400, 1401, 99_000].map((nowMs) => awaitedSeconds(away, nowMs))).toEqual([13, 12, 12, 0]);
+  });
+
+  test("counts up for a seat that is connected, once that is worth saying", () => {
+    const here = told(start(), awaited({ seat: 2, away: false, waitedMs: 1000, leftMs: 60_000 })).awaited;
+    if (!here) throw new Error("nobody is awaited");
+    expect([1000, 4999, 5000, 9500].map((nowMs) => awaitedSeconds(here, nowMs))).toEqual([undefined, undefined, 5, 9]);
+  });
+
+  test("is nobody after a message without a seat, and on a new connection", () => {
+    const waiting = told(start(), awaited({ seat: 0, away: true, waitedMs: 0, leftMs: 1 }));
+    expect(waiting.awaited?.seat).toBe(0);
+    expect(told(waiting, awaited({})).awaited).toBeUndefined();
+    expect(told(waiting, { case: "attached", value: { seat: OWN } }).awaited).toBeUndefined();
   });
 });
 

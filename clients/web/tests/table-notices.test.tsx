@@ -4,6 +4,7 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
+import { Role } from "../src/gen/chefshat/v1/rules_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import type { TableState } from "../src/table/model/state";
 import { TableView } from "../src/table/view/TableView";
@@ -48,4 +49,16 @@ test("a pause and a violation are shown above the table", async () => {
   await show({ ...dealt(), paused: true, violation: { kind: "violated", breach, demand } }, REMOTE);
   expect(banner()).toContain("The game is paused at the table.");
   expect(banner()).toContain("Bo: That pizza has 3 cards.");
+});
+
+test("after the game a seat shows its place in the game, not the role of the last Shift", async () => {
+  const known = dealt();
+  const seats = known.seats.map((seat) => ({ ...seat, role: Role.CHEF, place: 4 - seat.seat }));
+  const states = () => [...root.querySelectorAll('[data-part~="seat"]')].map(({ textContent }) => textContent ?? "");
+  await show({ ...known, phase: "shiftOver", seats }, undefined);
+  expect(states().every((text) => text.includes("Chef"))).toBe(true);
+  const standings = known.seats.map(({ seat }) => ({ seat, points: 0, place: seat + 1 }));
+  await show({ ...known, phase: "gameOver", seats, standings }, undefined);
+  expect(states().some((text) => text.includes("Chef"))).toBe(false);
+  expect(states().filter((text) => text.includes("1st"))).toEqual([expect.stringContaining("Ada")]);
 });

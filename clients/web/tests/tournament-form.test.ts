@@ -45,6 +45,15 @@ test("built-in agents are listed as often as they take part", () => {
   expect(settings.startWhenJoined).toBe(5);
 });
 
+test("a start time is sent as the moment it names here, and must not have passed", () => {
+  const at = { start: "time", startAt: "2199-05-01T20:00" } as const;
+  expect(asked(at).startAtMs).toBe(BigInt(new Date(2199, 4, 1, 20).getTime()));
+  expect(problemsOf(form(at))).toEqual({});
+  expect(asked({ ...at, start: "byHand" }).startAtMs).toBe(0n);
+  for (const startAt of ["", "2001-05-01T20:00"])
+    expect(problemsOf(form({ ...at, startAt }))).toEqual({ startAt: "startPassed" });
+});
+
 test("with physical tables the holder of the Golden card opens", () => {
   const tables = { physicalTables: "2", opening: "anyTopFace" } as const;
   expect(asked(tables).physicalTables).toBe(2);

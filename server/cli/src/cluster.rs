@@ -240,8 +240,8 @@ pub(super) struct NodeSettings {
     peer_ca: Option<PathBuf>,
     /// Milliseconds after which the lease of a node that does not beat expires, the same for all
     /// nodes: short ones are for tests.
-    #[arg(long, hide = true, default_value = "8000", value_name = "MS", value_parser = lease)]
-    pub(super) lease: LeaseTimes,
+    #[arg(long, hide = true, value_name = "MS", value_parser = lease)]
+    pub(super) lease: Option<LeaseTimes>,
 }
 
 /// The times of leases that expire after these milliseconds, in the usual proportions.

@@ -20,6 +20,7 @@ mod health;
 mod import;
 mod key;
 mod kind;
+mod lan;
 mod leaderboard;
 mod listen;
 mod migrate;

@@ -22,10 +22,15 @@ pub(super) struct PolicyArgs {
     /// 300000.
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
-    /// Times for one kind of participant: milliseconds per decision and, after another colon, the
-    /// time bank, for example human:60000 or robot:30000:120000. Repeatable. People have their
-    /// default times unless --decision-time-ms or --bank-ms is given.
-    #[arg(long = "clock", value_name = "KIND:MS[:MS]", value_parser = clock)]
+    /// Absence time: milliseconds that the game waits, at each decision, for a seat that is not
+    /// connected; then a substitute plays until it returns. Default: 20000 for people, the decision
+    /// time for others.
+    #[arg(long, value_name = "MS")]
+    absence_time_ms: Option<u32>,
+    /// Times for one kind of participant: milliseconds per decision and, after further colons, the
+    /// time bank and the absence time, for example human:60000 or robot:30000:120000:5000.
+    /// Repeatable. People have their default times unless --decision-time-ms or --bank-ms is given.
+    #[arg(long = "clock", value_name = "KIND:MS[:MS[:MS]]", value_parser = clock)]
     clocks: Vec<v1::KindClock>,
     /// Invalid attempts at one decision before the default action is taken, 0 for no limit.
     /// Default: 10.
@@ -86,6 +91,7 @@ impl PolicyArgs {
         v1::RoomPolicy {
             decision_time_ms: self.decision_time_ms,
             bank_ms: self.bank_ms,
+            absence_time_ms: self.absence_time_ms,
             max_invalid_attempts: self.max_invalid_attempts,
             max_timeouts: self.max_timeouts,
             pace_ms: self.pace_ms,
@@ -115,15 +121,14 @@ fn clock(words: &str) -> Result<v1::KindClock, String> {
     let kind = parts
         .next()
         .and_then(|kind| KindArg::from_str(kind, false).ok());
-    let mut times = parts.map(|part| part.parse::<u32>().ok());
-    match (kind, times.next(), times.next(), times.next()) {
-        (Some(kind), Some(Some(decision_time_ms)), bank_ms, None) if bank_ms != Some(None) => {
-            Ok(v1::KindClock {
-                kind: v1::ParticipantKind::from(kind).into(),
-                decision_time_ms: Some(decision_time_ms),
-                bank_ms: bank_ms.flatten(),
-            })
-        }
+    let times: Option<Vec<u32>> = parts.map(|part| part.parse().ok()).collect();
+    match (kind, times.as_deref()) {
+        (Some(kind), Some([decision_time_ms, rest @ ..])) if rest.len() <= 2 => Ok(v1::KindClock {
+            kind: v1::ParticipantKind::from(kind).into(),
+            decision_time_ms: Some(*decision_time_ms),
+            bank_ms: rest.first().copied(),
+            absence_time_ms: rest.get(1).copied(),
+        }),
         _ => Err("use agent, human or robot, a colon, and milliseconds per decision".to_owned()),
     }
 }
@@ -180,18 +185,23 @@ mod tests {
 
     #[test]
     fn kinds_have_their_own_clocks() {
-        let clock_of = |kind: v1::ParticipantKind, decision_time_ms, bank_ms| v1::KindClock {
-            kind: kind.into(),
-            decision_time_ms: Some(decision_time_ms),
-            bank_ms,
-        };
+        let clock_of =
+            |kind: v1::ParticipantKind, decision_time_ms, bank_ms, absence_time_ms| v1::KindClock {
+                kind: kind.into(),
+                decision_time_ms: Some(decision_time_ms),
+                bank_ms,
+                absence_time_ms,
+            };
+        let flags = "--clock human:60000 --clock robot:30000:0 --clock agent:9:8:7";
         assert_eq!(
-            policy("--clock human:60000 --clock robot:30000:0").clocks,
+            policy(flags).clocks,
             [
-                clock_of(v1::ParticipantKind::Human, 60_000, None),
-                clock_of(v1::ParticipantKind::Robot, 30_000, Some(0)),
+                clock_of(v1::ParticipantKind::Human, 60_000, None, None),
+                clock_of(v1::ParticipantKind::Robot, 30_000, Some(0), None),
+                clock_of(v1::ParticipantKind::Agent, 9, Some(8), Some(7)),
             ]
         );
+        assert_eq!(policy("--absence-time-ms 5000").absence_time_ms, Some(5000));
         for nonsense in [
             "",
             "human",
@@ -199,7 +209,7 @@ mod tests {
             "ghost:5",
             "human:5:",
             "human:5:x",
-            "human:5:6:7",
+            "human:5:6:7:8",
         ] {
             assert!(clock(nonsense).is_err(), "{nonsense}");
         }

@@ -16,8 +16,9 @@ use tokio::sync::oneshot;
 use super::cluster::{NewNode, NodeSettings};
 use super::listen::{self, Address};
 use super::numbers::duration;
-use super::{CommandError, data_dir, say};
+use super::{CommandError, data_dir, lan, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
+use chefshat_server::cluster::LeaseTimes;
 use chefshat_server::config::{KeepGames, ServerConfig};
 use chefshat_server::limits::Shares;
 use chefshat_server::proxies::{TrustedProxies, TrustedProxy};
@@ -249,7 +250,7 @@ impl Serve {
         let options = PostgresOptions {
             retention: ServerConfig::default().retention,
             record_files: false,
-            expire_after: Duration::from_millis(settings.node.lease.expire_after_ms()),
+            lease: settings.node.lease.unwrap_or(LeaseTimes::DEFAULT),
             ..PostgresOptions::default()
         };
         let storage = match settings.node.open(settings.max_rooms, options).await? {
@@ -291,7 +292,6 @@ impl Serve {
             tls,
             grace: Duration::from_secs(settings.grace),
             allowed_origins: without_empty(settings.allowed_origins),
-            lease: settings.node.lease,
             ..ServerConfig::default()
         };
         let server = match storage {
@@ -325,6 +325,9 @@ impl Serve {
             }))?;
         }
         eprintln!("listening on {}", address.url(scheme));
+        if let Address::Ip(address) = &address {
+            lan::print_addresses(*address, scheme);
+        }
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
             eprintln!("metrics at http://{address}/metrics");
             let metrics = Arc::clone(server.metrics());

@@ -83,7 +83,7 @@ impl Lease {
         }
     }
 
-    /// A beat sent at this time was kept. Answers may arrive in any order.
+    /// A beat sent at this time was committed. Answers may arrive in any order.
     pub fn beaten(&mut self, sent_ms: u64) {
         self.serves_until_ms = self.serves_until_ms.max(sent_ms + self.times.serve_for_ms);
     }
@@ -93,7 +93,7 @@ impl Lease {
         now_ms < self.serves_until_ms
     }
 
-    /// When it ends if no further beat is kept.
+    /// When it ends if no further beat is committed.
     pub fn ends_ms(&self) -> u64 {
         self.serves_until_ms
     }

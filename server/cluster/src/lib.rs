@@ -3,7 +3,7 @@
 //! runs it. This crate decides and remembers; it has no IO, clock or threads. `Node` is what one server knows and wants, `Writer`
 //! is one journal as its owner sees it, and `Tables` is what the database must do, as a value: real ones are tested against it.
 //!
-//! Safety and liveness are kept apart. *Safety* is the epoch: each takeover raises it, and the database commits an entry only if
+//! Safety and liveness are separate. *Safety* is the epoch: each takeover raises it, and the database commits an entry only if
 //! its writer has the present one. *Liveness* is the lease: a node that does not beat loses what it owns. A lease that is
 //! wrong for any reason costs time, never a decision.
 
@@ -14,7 +14,7 @@ mod writer;
 
 pub use lease::{Lease, LeaseTimes, WrongTimes};
 pub use node::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
-pub use tables::{Created, Kept, Row, Tables};
+pub use tables::{Created, Row, Tables, Written};
 pub use writer::{Step, Writer};
 
 /// Identifies a node: one run of a server. Numbers are given by the database and never used again.

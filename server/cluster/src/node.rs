@@ -28,7 +28,7 @@ pub enum Phase {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum BeatAnswer<K> {
     /// The lease is renewed. In the same transaction the node owned these.
-    Kept(Vec<(K, Epoch)>),
+    Renewed(Vec<(K, Epoch)>),
     /// The database does not know the node: it was away for long and has been removed.
     Unknown,
     /// No answer came.
@@ -71,8 +71,6 @@ pub enum Input<K> {
     },
     /// A write was refused at this epoch: another node owns the unit.
     Fenced(K, Epoch),
-    /// All of a unit is over, and the database knows.
-    Ended(K),
     /// A release was answered; `false` if no answer came.
     Released(K, bool),
     /// The node is to hand everything over and leave.
@@ -84,7 +82,7 @@ pub enum Input<K> {
 pub enum Output<K> {
     /// Beat, and read in the same transaction what the node owns.
     Beat,
-    /// Look for at most so many orphans.
+    /// Look for at most this number of orphans.
     FindOrphans(usize),
     /// Claim an orphan that was seen at this epoch.
     Claim(K, Epoch),
@@ -129,7 +127,7 @@ pub struct Node<K> {
 }
 
 impl<K: Ord + Copy> Node<K> {
-    /// A node that has just joined: it has no lease until its first beat is kept.
+    /// A node that has just joined: it has no lease until its first beat is committed.
     pub fn new(id: NodeId, times: LeaseTimes, capacity: usize) -> Self {
         Self {
             id,
@@ -163,7 +161,7 @@ impl<K: Ord + Copy> Node<K> {
         !self.suspended && self.lease.holds(now_ms)
     }
 
-    /// When it must have stopped to publish, on its own clock, unless a beat is kept before. The past if it may not publish.
+    /// When it must have stopped publishing, on its own clock, unless a beat is committed before. The past if it may not publish.
     pub fn publishes_until_ms(&self) -> u64 {
         match self.suspended {
             true => 0,
@@ -234,7 +232,6 @@ impl<K: Ord + Copy> Node<K> {
                     outputs.push(Output::Stop(id));
                 }
             }
-            Input::Ended(id) => self.disown(id),
             Input::Released(id, true) => self.disown(id),
             // Whether it was released is in the answer to a later beat.
             Input::Released(id, false) => {
@@ -318,7 +315,7 @@ impl<K: Ord + Copy> Node<K> {
                 self.stop_claimable(outputs);
                 self.phase = Phase::Left;
             }
-            BeatAnswer::Kept(owned) => {
+            BeatAnswer::Renewed(owned) => {
                 let is_first = self.lease.ends_ms() == 0;
                 self.lease.beaten(sent_ms);
                 if self.lease.holds(now_ms) {
@@ -392,7 +389,7 @@ impl<K: Ord + Copy> Node<K> {
         if !held {
             return;
         }
-        // The answer to a beat may have told it before.
+        // The answer to a beat may have said it before.
         if self.owned.get(&id).is_some_and(|owned| *owned >= epoch) {
             return;
         }

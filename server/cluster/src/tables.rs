@@ -16,9 +16,9 @@ pub struct Row<E> {
 
 /// What became of a write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kept {
+pub enum Written {
     /// It is committed.
-    Kept,
+    Committed,
     /// Nothing was written: the epoch is not the present one, the position is taken, or the item is over.
     Refused,
 }
@@ -210,28 +210,28 @@ impl<K: Ord + Copy, E> Tables<K, E> {
     }
 
     /// Writes a row at a position, from 0, if the writer has the present epoch and the position is the next one.
-    pub fn append(&mut self, id: K, epoch: Epoch, position: u64, entries: E) -> Kept {
+    pub fn append(&mut self, id: K, epoch: Epoch, position: u64, entries: E) -> Written {
         match self.items.get_mut(&id) {
             Some(item)
                 if !item.over && item.epoch == epoch && item.journal.len() as u64 == position =>
             {
                 item.journal.push(Row { epoch, entries });
-                Kept::Kept
+                Written::Committed
             }
-            _ => Kept::Refused,
+            _ => Written::Refused,
         }
     }
 
     /// Ends an item whose journal has this many rows: nobody owns it any more, and its journal stays as it is. Doing so again
     /// changes nothing. The rows are compared because an append of the same owner, from before it lost and regained its lease,
     /// may still arrive.
-    pub fn finish(&mut self, id: K, epoch: Epoch, rows: u64) -> Kept {
+    pub fn finish(&mut self, id: K, epoch: Epoch, rows: u64) -> Written {
         match self.items.get_mut(&id) {
             Some(item) if item.epoch == epoch && item.journal.len() as u64 == rows => {
                 item.over = true;
-                Kept::Kept
+                Written::Committed
             }
-            _ => Kept::Refused,
+            _ => Written::Refused,
         }
     }
 

@@ -1,13 +1,13 @@
 //! One journal as its owner sees it. A row is published only when it certainly stands in the journal. If an append
-//! has no answer (the connection broke), it may have been kept or not, or be kept later: the owner reads the position again, and
+//! has no answer (the connection broke), it may have been committed or not, or be committed later: the owner reads the position again, and
 //! an equal row of its own epoch there is its row.
 
-use crate::{Epoch, Kept};
+use crate::{Epoch, Written};
 
 /// What the owner does next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Step {
-    /// The row is kept: publish it.
+    /// The row is committed: publish it.
     Publish,
     /// Read the row at [`Writer::position`].
     Read,
@@ -47,11 +47,11 @@ impl Writer {
     }
 
     /// An append was answered; `None` if the answer never came. A refusal after that may mean that the row stands there already.
-    pub fn appended(&mut self, answer: Option<Kept>) -> Step {
+    pub fn appended(&mut self, answer: Option<Written>) -> Step {
         match answer {
-            Some(Kept::Kept) => self.publish(),
-            Some(Kept::Refused) if !self.uncertain => Step::Stop,
-            Some(Kept::Refused) | None => {
+            Some(Written::Committed) => self.publish(),
+            Some(Written::Refused) if !self.uncertain => Step::Stop,
+            Some(Written::Refused) | None => {
                 self.uncertain = true;
                 Step::Read
             }

@@ -40,8 +40,7 @@ impl Core {
         Some(if self.is_automatic(seat) {
             self.decided_at(open)
         } else {
-            let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
-            (deadline + self.seats[seat.index()].grace).max(open.recheck_at)
+            self.runs_out_at(open).max(open.recheck_at)
         })
     }
 
@@ -99,6 +98,7 @@ impl Core {
             if self.state == State::Playing && self.is_too_long() {
                 self.abort(now, AbortReason::TooLong);
             }
+            self.retire_those_who_left(now);
             let runs = self.state == State::Playing && !self.is_paused();
             let Some(open) = self.open.as_ref().filter(|_| runs) else {
                 return;
@@ -162,16 +162,17 @@ impl Core {
         if replayed { REPLAY_COST } else { 1 }
     }
 
-    /// Time for the open decision of a seat before its bank is used. A silent decision has the
-    /// longest time of any seat that participants can take, for every seat.
-    fn decision_time(&self, seat: Seat) -> Duration {
-        match self.is_silent() {
+    /// Time for a decision before the bank of its seat is used. A silent decision has the longest
+    /// time of any seat that participants can take, for every seat.
+    pub(super) fn decision_time(&self, open: &OpenDecision) -> Duration {
+        let usual = self.usual_decision_time(open.decision.seat);
+        match open.is_silent() {
             true => (self.all_seats())
                 .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
                 .map(|seat| self.usual_decision_time(seat))
                 .max()
-                .unwrap_or_else(|| self.usual_decision_time(seat)),
-            false => self.usual_decision_time(seat),
+                .unwrap_or(usual),
+            false => usual,
         }
     }
 
@@ -181,28 +182,25 @@ impl Core {
         policy.decision_time_of(participant.map(|participant| participant.kind))
     }
 
-    /// Time a seat has for the open decision, including its bank. A silent decision does not use
-    /// the bank, because what is left of it shows at the seat's later decisions.
-    pub(super) fn time_allowed(&self, seat: Seat) -> Duration {
-        let bank = match self.is_silent() {
+    /// Time a seat has for a decision, including its bank and absences that have ended. A silent
+    /// decision does not use the bank, because what is left of it shows at the seat's later
+    /// decisions.
+    pub(super) fn time_allowed(&self, open: &OpenDecision) -> Duration {
+        let bank = match open.is_silent() {
             true => Duration::ZERO,
-            false => self.seats[seat.index()].bank_left,
+            false => self.seats[open.decision.seat.index()].bank_left,
         };
-        self.decision_time(seat) + bank
+        self.decision_time(open) + bank + open.unbanked
     }
 
-    /// The rest of a seat's bank after the open decision, if it took `time`.
-    pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
-        let bank_left = self.seats[seat.index()].bank_left;
-        if self.is_silent() {
+    /// The rest of a seat's bank after a decision, if it took `time`.
+    pub(super) fn bank_after(&self, open: &OpenDecision, time: Duration) -> Duration {
+        let bank_left = self.seats[open.decision.seat.index()].bank_left;
+        if open.is_silent() {
             return bank_left;
         }
-        bank_left.saturating_sub(time.saturating_sub(self.decision_time(seat)))
-    }
-
-    /// Whether the open decision is one that nobody else may learn of.
-    fn is_silent(&self) -> bool {
-        self.open.as_ref().is_some_and(OpenDecision::is_silent)
+        let beyond = time.saturating_sub(self.decision_time(open));
+        bank_left.saturating_sub(beyond.saturating_sub(self.unbanked(open, time)))
     }
 
     /// Time left for the open decision: before the bank is used, and in the bank.
@@ -214,12 +212,9 @@ impl Core {
         let used = now.saturating_sub(open.start.unwrap_or(now));
         let bank_left = match open.is_silent() {
             true => Duration::ZERO,
-            false => self.bank_after(open.decision.seat, used),
+            false => self.bank_after(open, used),
         };
-        (
-            self.decision_time(open.decision.seat).saturating_sub(used),
-            bank_left,
-        )
+        (self.decision_time(open).saturating_sub(used), bank_left)
     }
 
     /// Determines when the clock of the open decision started. Once determined, it never changes.
@@ -263,7 +258,7 @@ impl Core {
     }
 
     /// Until when the clock waits for a seat that has not returned since the server restarted.
-    fn recalled_until(&self, seat: Seat) -> Option<Duration> {
+    pub(super) fn recalled_until(&self, seat: Seat) -> Option<Duration> {
         self.restarted
             .filter(|_| self.seats[seat.index()].recalled)
             .map(|at| at + RECALL_TIME)
@@ -316,8 +311,7 @@ impl Core {
             let seat = open.decision.seat;
             // The clock is paused while the seat waits for the server.
             let by = open.paused_since.map_or(now, |since| since.min(now));
-            let allowed = self.time_allowed(seat) + self.seats[seat.index()].grace;
-            let late = open.start.is_some_and(|start| start + allowed <= by);
+            let late = open.start.is_some() && self.runs_out_at(open) <= by;
             if late && !self.is_automatic(seat) {
                 self.time_out(now);
             }
@@ -325,25 +319,24 @@ impl Core {
         self.advance(now);
     }
 
-    /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a
-    /// substitute, but never for a silent decision, which the substitution would reveal.
+    /// Takes the default decision for a seat whose time is up. A seat that is away or late too often
+    /// gets a substitute, but never for a silent decision, which the substitution would reveal.
     pub(super) fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let (seat, silent) = (open.decision.seat, open.is_silent());
+        let absent = self.absence(open).is_some();
         let time = now.saturating_sub(open.start.unwrap_or(open.released));
         // The timer fires later by the grace; a late answer may come at any time before.
         let without_grace = time.saturating_sub(self.seats[seat.index()].grace);
-        let time = without_grace.max(time.min(self.time_allowed(seat)));
+        let time = without_grace.max(time.min(self.time_allowed(open)));
         let source = if self.seats[seat.index()].connection.is_some() {
             Source::Timeout
         } else {
             Source::Disconnected
         };
         self.take_default(now, seat, source, time);
-        if self.state == State::Playing
-            && !silent
-            && self.seats[seat.index()].timeouts >= self.header.policy.max_timeouts
-        {
+        let too_often = self.seats[seat.index()].timeouts >= self.header.policy.max_timeouts;
+        if self.state == State::Playing && !silent && (absent || too_often) {
             self.lose(now, seat);
         }
     }
@@ -359,12 +352,13 @@ impl Core {
         let action = self
             .default_action()
             .expect("an open decision has a default");
-        let bank_left = self.bank_after(seat, time);
+        let open = self.open.as_ref().expect("a decision is open");
+        let bank_left = self.bank_after(open, time);
         let decided = self.decided(seat, action, source, time, bank_left);
         self.commit(now, Change::Decided(decided));
     }
 
-    /// Substitutes a seat that has been late too often, or aborts the game.
+    /// Substitutes a seat that is away or has been late too often, or aborts the game.
     fn lose(&mut self, now: Duration, seat: Seat) {
         let others_lost = self
             .seats
@@ -385,6 +379,22 @@ impl Core {
         }
         self.give_substitute(seat);
         self.commit(now, Change::Substituted(seat));
+    }
+
+    /// Substitutes the seats whose participants have left for good, unless that would reveal
+    /// something.
+    fn retire_those_who_left(&mut self, now: Duration) {
+        let is_silent = self.open.as_ref().is_some_and(OpenDecision::is_silent);
+        if self.state != State::Playing || is_silent {
+            return;
+        }
+        for seat in self.all_seats() {
+            let state = &mut self.seats[seat.index()];
+            if std::mem::take(&mut state.retiring) {
+                self.give_substitute(seat);
+                self.commit(now, Change::Retired(seat));
+            }
+        }
     }
 
     /// Creates the agent that plays for a substituted seat.

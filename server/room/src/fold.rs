@@ -56,6 +56,13 @@ impl Core {
                 state.ever_substituted = true;
                 self.log.push(at, RoomEvent::Substituted(*seat));
             }
+            Change::Retired(seat) => {
+                let state = &mut self.seats[seat.index()];
+                state.retired = true;
+                state.substituted = true;
+                state.ever_substituted = true;
+                self.log.push(at, RoomEvent::Retired(*seat));
+            }
             Change::Attempted { .. } => {
                 if let Some(open) = &mut self.open {
                     open.attempts += 1;
@@ -99,6 +106,7 @@ impl Core {
                 continue;
             }
             state.connection = None;
+            state.lost_at = at;
             state.recalled = true;
             match self.state {
                 // Its ticket must be attached again within the same time as at first.
@@ -285,6 +293,8 @@ impl Core {
                     start: None,
                     recheck_at: Duration::ZERO,
                     paused_since: None,
+                    absent: Duration::ZERO,
+                    unbanked: Duration::ZERO,
                     attempts: 0,
                     search: Search::NotStarted,
                     hints: 0,

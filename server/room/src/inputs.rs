@@ -1,4 +1,4 @@
-//! Inputs of participants: join, attach, leave, answer, express, return. Each input is checked
+//! Inputs of participants: join, attach, leave, retire, answer, express, return. Each input is checked
 //! against the state; an invalid one is refused and changes nothing.
 
 use std::time::Duration;
@@ -10,7 +10,7 @@ use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
     MAX_EXPRESSIONS_PER_SEAT, MAX_GATEWAY_DELAY, MAX_SEATINGS, OpenDecision, State,
 };
-use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
+use crate::journal::{AbortReason, Change, Fill, ParticipantKind, SeatedParticipant, Source};
 use crate::log::RoomEvent;
 
 impl Core {
@@ -117,6 +117,7 @@ impl Core {
         }
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed_before);
+            self.end_absence(seat, arrived.min(now));
             self.restart_clock(now, seat);
             self.pause_clock(arrived);
         }
@@ -155,8 +156,8 @@ impl Core {
         if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
             return;
         }
-        self.seats[seat.index()].connection = None;
-        self.seats[seat.index()].grace = Duration::ZERO;
+        let state = &mut self.seats[seat.index()];
+        (state.connection, state.lost_at, state.grace) = (None, now, Duration::ZERO);
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed);
         }
@@ -169,8 +170,28 @@ impl Core {
 
     /// Gives a substituted seat back to its agent.
     pub fn resume(&mut self, now: Duration, seat: Seat) {
-        if self.seats[seat.index()].substituted {
+        let state = &self.seats[seat.index()];
+        if state.substituted && !state.retired {
             self.returned(now, seat);
+        }
+    }
+
+    /// Gives up a seat whose participant has left the tournament. Its ticket ends, and a substitute
+    /// plays from now on; while somebody decides about a special action, from then on, because the
+    /// time of that decision would reveal whose it is. A game that has not started is aborted. Does
+    /// nothing if nobody can join the seat.
+    pub fn retire(&mut self, now: Duration, seat: Seat) {
+        let state = &mut self.seats[seat.index()];
+        if !matches!(state.fill, Fill::Open { .. }) || state.retired {
+            return;
+        }
+        match self.state {
+            State::Waiting => self.abort(now, AbortReason::NeverStarted),
+            State::Playing => {
+                state.retiring = true;
+                self.advance(now);
+            }
+            State::Finished | State::Aborted(_) => {}
         }
     }
 
@@ -245,7 +266,7 @@ impl Core {
         let thought_until = paused_since.fold(arrived, Duration::min);
         let time = thought_until.saturating_sub(open.start.unwrap_or(open.released));
         let attempts = open.attempts + 1;
-        if time >= self.time_allowed(seat) {
+        if time >= self.time_allowed(open) {
             // It arrived after the deadline, but before the timer fired.
             self.tick(now, handed);
             let is_open = |open: &OpenDecision| open.id == answer.decision_id;
@@ -277,7 +298,8 @@ impl Core {
             }
             annotations => (annotations, input.annotations_refused),
         };
-        let bank_left = self.bank_after(seat, time);
+        let open = self.open.as_ref().expect("a decision is open");
+        let bank_left = self.bank_after(open, time);
         let mut decided = self.decided(
             seat,
             Self::action_from(input.action),

@@ -6,6 +6,7 @@
 //! change (`fold`) updates the state and the log, always with the same effect: a game is replayed
 //! from its journal by folding its changes again.
 
+mod absence;
 mod answers;
 mod clock;
 mod fold;
@@ -32,6 +33,7 @@ use chefshat_engine::{
     ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
 
+pub use absence::Awaited;
 pub use answers::{
     Answer, Answered, ExpressError, HintError, JoinError, LeaveError, ReportError, ReportOutcome,
     ReportVerdict, SeatStanding, Verdict,
@@ -110,6 +112,8 @@ struct SeatState {
     joined_at: Duration,
     ever_attached: bool,
     connection: Option<ConnectionId>,
+    /// When the last connection was lost.
+    lost_at: Duration,
     /// How late answers of the connection may arrive because another server measures their time.
     grace: Duration,
     entropy: Vec<u8>,
@@ -124,6 +128,10 @@ struct SeatState {
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
     ever_substituted: bool,
+    /// Whether its participant leaves for good, as soon as that reveals nothing.
+    retiring: bool,
+    /// Whether its participant has left for good.
+    retired: bool,
     ever_hinted: bool,
     decisions: u64,
     /// Timeouts since the agent's last valid answer in time. Silent decisions do not count.
@@ -190,6 +198,10 @@ pub struct OpenDecision {
     /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on
     /// a new connection.
     paused_since: Option<Duration>,
+    /// How long its seat was not connected, in absences that have ended.
+    absent: Duration,
+    /// How much of them the bank does not pay for, although it was beyond the decision time.
+    unbanked: Duration,
     /// Invalid attempts so far.
     attempts: u32,
     /// The search for it, if an agent that searches takes it.
@@ -213,6 +225,8 @@ impl OpenDecision {
         self.announced = false;
         self.start = None;
         self.recheck_at = Duration::ZERO;
+        self.absent = Duration::ZERO;
+        self.unbanked = Duration::ZERO;
         self.search = Search::NotStarted;
         self.hint_runs = false;
     }
@@ -236,6 +250,7 @@ impl Core {
                     joined_at: Duration::ZERO,
                     ever_attached: false,
                     connection: None,
+                    lost_at: Duration::ZERO,
                     grace: Duration::ZERO,
                     entropy: Vec::new(),
                     away: false,
@@ -257,6 +272,8 @@ impl Core {
                     },
                     substituted: false,
                     ever_substituted: false,
+                    retiring: false,
+                    retired: false,
                     ever_hinted: false,
                     decisions: 0,
                     timeouts: 0,
@@ -443,14 +460,15 @@ impl Core {
         self.game().and_then(Game::default_action)
     }
 
-    /// The seat with this ticket. Compares in constant time for each seat.
+    /// The seat with this ticket, unless its participant has left for good. Compares in constant time
+    /// for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
         let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
-            self.seats[seat.index()]
-                .participant
-                .as_ref()
-                .is_some_and(|participant| participant.ticket.is(&hash))
+            let state = &self.seats[seat.index()];
+            let participant = state.participant.as_ref();
+            let is_its = participant.is_some_and(|participant| participant.ticket.is(&hash));
+            is_its && !state.retiring && !state.retired
         })
     }
 

@@ -34,6 +34,8 @@ pub enum RoomEvent {
     Returned(Seat),
     /// A built-in agent plays for a seat.
     Substituted(Seat),
+    /// A built-in agent plays for a seat until the end.
+    Retired(Seat),
     /// The game started.
     GameStarted,
     /// An event of the engine.

@@ -46,6 +46,8 @@ pub struct KindClock {
     pub decision_time: Option<Duration>,
     /// The bank; `None`: the room's.
     pub bank: Option<Duration>,
+    /// The absence time; `None`: the room's.
+    pub absence_time: Option<Duration>,
 }
 
 impl KindClock {
@@ -54,8 +56,12 @@ impl KindClock {
         kind: ParticipantKind::Human,
         decision_time: Some(Duration::from_secs(60)),
         bank: Some(Duration::from_secs(300)),
+        absence_time: Some(ABSENCE_TIME_OF_PEOPLE),
     };
 }
+
+/// The default absence time of people.
+const ABSENCE_TIME_OF_PEOPLE: Duration = Duration::from_secs(20);
 
 /// Default pace of built-in agents and substitutes in a game with people.
 const PACE_WITH_PEOPLE: Duration = Duration::from_secs(1);
@@ -98,6 +104,9 @@ pub struct Policy {
     pub visibility: Visibility,
     /// Whether seats may ask for hints.
     pub hints: bool,
+    /// How long the game waits, at each decision, for a seat that is not connected. `None`, in games
+    /// of earlier servers: an absence changes nothing.
+    pub absence_time: Option<Duration>,
 }
 
 impl Policy {
@@ -109,6 +118,37 @@ impl Policy {
     /// The bank of a kind of participant.
     pub fn bank_of(&self, kind: Option<ParticipantKind>) -> Duration {
         (self.clock_of(kind).and_then(|clock| clock.bank)).unwrap_or(self.bank)
+    }
+
+    /// The absence time of a kind of participant: at most its decision time.
+    pub fn absence_time_of(&self, kind: Option<ParticipantKind>) -> Option<Duration> {
+        let own = self.clock_of(kind).and_then(|clock| clock.absence_time);
+        let time = own.or(self.absence_time)?;
+        Some(time.min(self.decision_time_of(kind)))
+    }
+
+    /// Sets the absence times that were not chosen: 20 seconds for people, the decision time for
+    /// others.
+    pub fn set_default_absence_times(&mut self) {
+        if self.absence_time.is_some() {
+            return;
+        }
+        self.absence_time = Some(self.decision_time);
+        for clock in &mut self.clocks {
+            let standard = match clock.kind {
+                ParticipantKind::Human => Some(ABSENCE_TIME_OF_PEOPLE),
+                _ => clock.decision_time,
+            };
+            clock.absence_time = clock.absence_time.or(standard);
+        }
+        let has_people = |clock: &KindClock| clock.kind == ParticipantKind::Human;
+        if !self.clocks.iter().any(has_people) && self.decision_time > ABSENCE_TIME_OF_PEOPLE {
+            self.clocks.push(KindClock {
+                decision_time: None,
+                bank: None,
+                ..KindClock::PEOPLE
+            });
+        }
     }
 
     /// How long a built-in agent or substitute waits before it decides. `with_people`: whether
@@ -146,6 +186,7 @@ impl Default for Policy {
             one_seat_per_client: false,
             visibility: Visibility::Public,
             hints: false,
+            absence_time: Some(Duration::from_secs(10)),
         }
     }
 }

@@ -11,6 +11,10 @@ use chefshat_engine::{Seat, Viewer};
 use super::Core;
 use crate::journal::{Change, Entry, Fill, GameHeader, Report, Source};
 
+/// How long a journal need not say again that the server was restarted: what takes a room over writes
+/// it before the room is restored.
+const SAID_FOR: Duration = Duration::from_secs(1);
+
 /// Why a game cannot be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("entry {entry} of its journal is inconsistent: {problem}")]
@@ -40,7 +44,11 @@ impl Core {
             core.advance_agents(&entry.change);
             core.refold(entry);
         }
-        if !core.state.is_over() {
+        let just_said = journal.last().is_some_and(|last| {
+            let says_so = matches!(last.change, Change::ServerRestarted);
+            says_so && now.saturating_sub(last.at) < SAID_FOR
+        });
+        if !core.state.is_over() && !just_said {
             core.commit(now, Change::ServerRestarted);
         }
         Ok(core)
@@ -63,9 +71,10 @@ impl Core {
                 self.check_open_seat(*seat)?;
                 check(!begun, "the game has already started")
             }
-            Change::Disconnected(seat) | Change::Returned(seat) | Change::Substituted(seat) => {
-                self.check_open_seat(*seat)
-            }
+            Change::Disconnected(seat)
+            | Change::Returned(seat)
+            | Change::Substituted(seat)
+            | Change::Retired(seat) => self.check_open_seat(*seat),
             Change::Started { entropy } => {
                 check(!begun, "the game starts twice")?;
                 check(
@@ -122,7 +131,7 @@ impl Core {
             {
                 decided.seat
             }
-            Change::Substituted(seat) => {
+            Change::Substituted(seat) | Change::Retired(seat) => {
                 self.give_substitute(*seat);
                 return;
             }

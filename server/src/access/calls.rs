@@ -165,6 +165,43 @@ pub const CALLS: &[Call] = &[
         Compared,
     )
     .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/WithdrawParticipant",
+        Player,
+        Compared,
+    )
+    .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/RemoveParticipant",
+        Host,
+        Compared,
+    )
+    .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/ReplaceParticipant",
+        Host,
+        Compared,
+    )
+    .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/PauseTournament",
+        Host,
+        Compared,
+    )
+    .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/ResumeTournament",
+        Host,
+        Compared,
+    )
+    .forwarded(),
+    call(
+        "/chefshat.v1.TournamentService/PostponeGame",
+        Player,
+        Compared,
+    )
+    .forwarded(),
+    call("/chefshat.v1.TournamentService/CallGame", Host, Compared).forwarded(),
     records("/chefshat.v1.RecordService/ListRecords"),
     records("/chefshat.v1.RecordService/GetRecord")
         .streaming()

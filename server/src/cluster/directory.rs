@@ -7,10 +7,11 @@ use std::sync::Arc;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
-use crate::store::ResumableGame;
+use crate::limits::Key;
 use crate::store::cluster::Kind;
 use crate::store::tournaments::StoredTournament;
-use chefshat_room::ids::Id;
+use crate::store::{ResumableGame, StoreError};
+use chefshat_room::ids::{Id, normal_code};
 
 /// Another node of the cluster.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -46,13 +47,27 @@ pub struct Elsewhere {
     pub found_by: FoundBy,
 }
 
-/// How a room or tournament was found.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How a room or tournament is found.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FoundBy {
     /// By its id.
     Id(Id),
     /// By its join code, in its normal form.
     Code(String),
+    /// A room by its game, which is not over.
+    Game(Id),
+}
+
+impl From<Id> for FoundBy {
+    fn from(id: Id) -> Self {
+        Self::Id(id)
+    }
+}
+
+impl From<&str> for FoundBy {
+    fn from(code: &str) -> Self {
+        Self::Code(normal_code(code))
+    }
 }
 
 /// Finds the owners of rooms and tournaments. It may remember nodes that it has named; a node that
@@ -62,23 +77,23 @@ pub trait Directory: Send + Sync + 'static {
     /// The name of this node, and the other nodes that are alive.
     fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)>;
 
-    /// The location of a room or tournament that is not in memory.
-    fn locate(&self, id: Id) -> BoxFuture<'_, Location>;
-
-    /// The location of the room or tournament with a join code in its normal form.
-    fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location>;
+    /// The location of a room or tournament that is not in memory, for this caller.
+    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;
 
     /// Whether a tournament of another node is over, so that no record of its games is withheld.
     fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool>;
 
-    /// The room of a game that is over.
-    fn ended_room(&self, _room: Id) -> BoxFuture<'_, Option<ResumableGame>> {
-        ready(None).boxed()
+    /// The room of a game that is over, if its end is still shown.
+    fn ended_room(&self, _room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        ready(Ok(None)).boxed()
     }
 
     /// A tournament that is over.
-    fn ended_tournament(&self, _tournament: Id) -> BoxFuture<'_, Option<StoredTournament>> {
-        ready(None).boxed()
+    fn ended_tournament(
+        &self,
+        _tournament: Id,
+    ) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
+        ready(Ok(None)).boxed()
     }
 
     /// The node that was named last does not own it any more, or cannot be reached.
@@ -104,11 +119,7 @@ impl Directory for SingleServer {
         ready(false).boxed()
     }
 
-    fn locate(&self, _id: Id) -> BoxFuture<'_, Location> {
-        ready(Location::Nowhere).boxed()
-    }
-
-    fn locate_code<'a>(&'a self, _code: &'a str) -> BoxFuture<'a, Location> {
+    fn locate<'a>(&'a self, _found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
         ready(Location::Nowhere).boxed()
     }
 

@@ -12,13 +12,17 @@ use tracing::{debug, warn};
 
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
+use crate::limits::{Key, Places, Shares};
 use crate::store::cluster::{self, ClusterStore, NodeId};
 use crate::store::tournaments::StoredTournament;
 use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::Id;
 
-/// Most rooms and tournaments of other nodes that are remembered, by id and by join code.
-const MAX_REMEMBERED: usize = 10_000;
+/// Most rooms and tournaments of other nodes that are remembered, by whatever they were found.
+const MAX_REMEMBERED: usize = 20_000;
+/// Most rooms and tournaments that are looked for in the database at a time, for callers in turns:
+/// whoever makes ids up leaves connections for everything else.
+const LOOKED_FOR_AT_ONCE: usize = 2;
 /// How long it is known which nodes have a lease.
 const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 
@@ -26,7 +30,9 @@ const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 pub struct StoreDirectory {
     store: Arc<dyn ClusterStore>,
     lease: Arc<NodeLease>,
-    known: Mutex<Known>,
+    /// Owners among the other nodes.
+    known: Mutex<BTreeMap<FoundBy, Peer>>,
+    looking: Arc<Places>,
     /// Locked while they are read, so that one request reads them for all.
     nodes: AsyncMutex<Option<Nodes>>,
 }
@@ -37,25 +43,32 @@ struct Nodes {
     alive: Result<BTreeMap<NodeId, Peer>, StoreError>,
 }
 
-#[derive(Default)]
-struct Known {
-    by_id: BTreeMap<Id, Peer>,
-    by_code: BTreeMap<String, Peer>,
-}
-
 impl StoreDirectory {
-    /// Reads from this database, for the node with this lease.
-    pub fn new(store: Arc<dyn ClusterStore>, lease: Arc<NodeLease>) -> Self {
+    /// Reads from this database, for the node with this lease. One caller has at most its share of
+    /// what is read at a time.
+    pub fn new(store: Arc<dyn ClusterStore>, lease: Arc<NodeLease>, shares: Shares) -> Self {
         Self {
             store,
             lease,
             known: Mutex::default(),
+            looking: Places::new(LOOKED_FOR_AT_ONCE, shares),
             nodes: AsyncMutex::default(),
         }
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
+    fn known(&self) -> MutexGuard<'_, BTreeMap<FoundBy, Peer>> {
         (self.known.lock()).expect("nothing panics under this lock")
+    }
+
+    /// Reads where something is.
+    async fn read(&self, found_by: &FoundBy, caller: Key) -> Result<Location, StoreError> {
+        let _place = self.looking.take(caller).await;
+        let found = match found_by {
+            FoundBy::Id(id) => self.store.locate(*id).await?,
+            FoundBy::Code(code) => self.store.locate_code(code).await?,
+            FoundBy::Game(game) => self.store.locate_game(*game).await?,
+        };
+        self.location(found).await
     }
 
     /// The location of something that stands in the database.
@@ -106,68 +119,34 @@ impl StoreDirectory {
     }
 }
 
-/// The answer, or that the directory cannot be read.
-fn readable(location: Result<Location, StoreError>) -> Location {
-    location.unwrap_or_else(|error| {
-        debug!(%error, "the owner of a room or tournament cannot be found");
-        Location::Unknown
-    })
-}
-
-/// Remembers a node that owns something.
-fn remember<K: Ord>(peers: &mut BTreeMap<K, Peer>, key: K, location: &Location) {
-    if let Location::Node(peer) = location {
-        if peers.len() >= MAX_REMEMBERED {
-            peers.clear();
-        }
-        peers.insert(key, peer.clone());
-    }
-}
-
-/// What was read about something that is over.
-fn read<T>(ended: Result<Option<T>, StoreError>) -> Option<T> {
-    ended.unwrap_or_else(|error| {
-        warn!(%error, "a room or tournament that is over cannot be read");
-        None
-    })
-}
-
 impl Directory for StoreDirectory {
-    fn ended_room(&self, room: Id) -> BoxFuture<'_, Option<ResumableGame>> {
-        self.store.ended_room(room).map(read).boxed()
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        self.store.ended_room(room)
     }
 
-    fn ended_tournament(&self, tournament: Id) -> BoxFuture<'_, Option<StoredTournament>> {
-        self.store.tournament(tournament).map(read).boxed()
+    fn ended_tournament(
+        &self,
+        tournament: Id,
+    ) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
+        self.store.tournament(tournament)
     }
 
-    fn locate(&self, id: Id) -> BoxFuture<'_, Location> {
+    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location> {
         async move {
-            if let Some(peer) = self.known().by_id.get(&id) {
+            if let Some(peer) = self.known().get(found_by) {
                 return Location::Node(peer.clone());
             }
-            let location = match self.store.locate(id).await {
-                Ok(found) => self.location(found).await,
-                Err(error) => Err(error),
-            };
-            let location = readable(location);
-            remember(&mut self.known().by_id, id, &location);
-            location
-        }
-        .boxed()
-    }
-
-    fn locate_code<'a>(&'a self, code: &'a str) -> BoxFuture<'a, Location> {
-        async move {
-            if let Some(peer) = self.known().by_code.get(code) {
-                return Location::Node(peer.clone());
+            let location = self.read(found_by, caller).await.unwrap_or_else(|error| {
+                debug!(%error, "the owner of a room or tournament cannot be found");
+                Location::Unknown
+            });
+            if let Location::Node(peer) = &location {
+                let mut known = self.known();
+                if known.len() >= MAX_REMEMBERED {
+                    known.clear();
+                }
+                known.insert(found_by.clone(), peer.clone());
             }
-            let location = match self.store.locate_code(code).await {
-                Ok(found) => self.location(found).await,
-                Err(error) => Err(error),
-            };
-            let location = readable(location);
-            remember(&mut self.known().by_code, code.to_owned(), &location);
             location
         }
         .boxed()
@@ -195,10 +174,6 @@ impl Directory for StoreDirectory {
     }
 
     fn forget(&self, found_by: &FoundBy) {
-        let mut known = self.known();
-        match found_by {
-            FoundBy::Id(id) => drop(known.by_id.remove(id)),
-            FoundBy::Code(code) => drop(known.by_code.remove(code)),
-        }
+        self.known().remove(found_by);
     }
 }

@@ -2,11 +2,11 @@
 //! answers in. Requests to the database run beside each other; what is done with one unit is done
 //! one after another.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, LeaseTimes, Node, Output, Phase};
+use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
 use futures::future::pending;
 use tokio::sync::{Semaphore, watch};
 use tokio::task::{JoinHandle, JoinSet};
@@ -26,8 +26,10 @@ use chefshat_room::ids::Id;
 /// How long an answer of the database is awaited, except to a beat. After that, the next beat says
 /// what happened.
 const ANSWER_TIME: Duration = Duration::from_secs(4);
-/// Time between two looks for units that nobody owns, so that those of a drained node soon run again.
+/// Time between two searches for units that nobody owns.
 const FIND_INTERVAL: Duration = Duration::from_millis(500);
+/// Time between two removals of what is over.
+const TIDY_INTERVAL: Duration = Duration::from_secs(30);
 /// Most orphans that are looked for at a time, so that several nodes share them.
 const ORPHANS_AT_ONCE: usize = 64;
 /// Units that are handed over at a time: each is away only from its own last commit on.
@@ -50,7 +52,6 @@ impl ClusterNode {
     pub fn start(
         id: NodeId,
         info: NodeInfo,
-        times: LeaseTimes,
         grace: Duration,
         store: Arc<dyn ClusterStore>,
         rooms: Arc<Rooms>,
@@ -65,8 +66,7 @@ impl ClusterNode {
         let units = Units::new(Arc::clone(&store), rooms, tournaments, grace);
         let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
-            node: Node::new(id, times, capacity),
-            times,
+            node: Node::new(id, store.lease(), capacity),
             capacity,
             info,
             store,
@@ -74,6 +74,7 @@ impl ClusterNode {
             units: Arc::new(units),
             began: Instant::now(),
             running: BTreeMap::new(),
+            not_resumable: BTreeSet::new(),
             turns: Turns::default(),
             answers: JoinSet::new(),
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
@@ -121,6 +122,12 @@ impl Drop for ClusterNode {
 /// What a request to the database, or work with a unit, comes to.
 enum Event {
     Answer(Input<Id>),
+    /// Orphans were found.
+    Found(Vec<(Id, Epoch)>),
+    /// Claims were answered.
+    Claimed(Vec<(Id, ClaimAnswer)>),
+    /// A unit was released because this node cannot resume it.
+    GivenUp(Id),
     /// A beat was answered, and the node was asked to hand over what it owns.
     AskedToDrain(Input<Id>),
     /// A unit was resumed or stopped, and nothing follows.
@@ -131,7 +138,6 @@ enum Event {
 
 struct Task {
     node: Node<Id>,
-    times: LeaseTimes,
     capacity: usize,
     info: NodeInfo,
     store: Arc<dyn ClusterStore>,
@@ -140,6 +146,8 @@ struct Task {
     began: Instant,
     /// The epochs at which units are resumed here.
     running: BTreeMap<Id, Epoch>,
+    /// Units that this node cannot resume, which it leaves to other versions of the program.
+    not_resumable: BTreeSet<Id>,
     turns: Turns,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
@@ -153,6 +161,9 @@ impl Task {
     async fn run(mut self, drain: CancellationToken) {
         let mut finding = interval(FIND_INTERVAL);
         finding.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut tidying = interval(TIDY_INTERVAL);
+        tidying.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let store = Arc::clone(&self.store);
         self.put_in(Input::Time);
         loop {
             let is_draining = self.node.phase() != Phase::Serving;
@@ -161,6 +172,9 @@ impl Task {
             tokio::select! {
                 Some(event) = self.answers.join_next() => match event {
                     Ok(Event::Answer(input)) => self.put_in(input),
+                    Ok(Event::Found(orphans)) => self.found(orphans),
+                    Ok(Event::Claimed(claims)) => self.claimed(claims),
+                    Ok(Event::GivenUp(unit)) => self.given_up(unit),
                     Ok(Event::AskedToDrain(input)) => {
                         self.asked.send_replace(true);
                         self.put_in(input);
@@ -180,7 +194,9 @@ impl Task {
                     }
                 }
                 () = sleep_until(alarm), if wakes_at.is_some() => self.put_in(Input::Time),
+                orphan = store.handed_over() => self.found(vec![orphan]),
                 _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
+                _ = tidying.tick() => self.tidy(),
                 () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
             }
             if self.node.phase() == Phase::Left && !drain.is_cancelled() {
@@ -195,8 +211,15 @@ impl Task {
 
     fn put_in(&mut self, input: Input<Id>) {
         let now_ms = self.now_ms();
+        let mut claims = Vec::new();
         for output in self.node.handle(input, now_ms) {
-            self.put_out(output);
+            match output {
+                Output::Claim(unit, seen) => claims.push((unit, seen)),
+                output => self.put_out(output),
+            }
+        }
+        if !claims.is_empty() {
+            self.claim(claims);
         }
         let until_ms = self.node.publishes_until_ms();
         self.lease.set(self.began + Duration::from_millis(until_ms));
@@ -216,29 +239,22 @@ impl Task {
                 let sent_ms = self.now_ms();
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
-                let within = Duration::from_millis(self.times.beat_every_ms());
+                let within = Duration::from_millis(store.lease().beat_every_ms());
                 self.answers
                     .spawn(async move { beat(&*store, within, sent_ms).await });
             }
             Output::FindOrphans(count) => self.find_orphans(count),
-            Output::Claim(unit, seen) => {
-                self.answers.spawn(async move {
-                    let answer = match answer("claim", ANSWER_TIME, store.claim(unit, seen)).await {
-                        Some(Some(epoch)) => ClaimAnswer::Won(epoch),
-                        Some(None) => ClaimAnswer::Lost,
-                        None => ClaimAnswer::None,
-                    };
-                    Event::Answer(Input::Claimed(unit, answer))
-                });
-            }
+            Output::Claim(unit, seen) => self.claim(vec![(unit, seen)]),
             Output::Serve(unit, epoch) => {
                 self.units.want(unit, epoch);
                 // One of its rooms may stop before all are resumed.
                 self.running.insert(unit, epoch);
                 let units = Arc::clone(&self.units);
                 self.queue(unit, async move {
-                    units.resume(unit, epoch).await;
-                    Event::Nothing
+                    if units.resume(unit, epoch).await || !units.give_up(unit, epoch).await {
+                        return Event::Nothing;
+                    }
+                    Event::GivenUp(unit)
                 });
             }
             Output::Stop(unit) => self.stop(unit),
@@ -264,6 +280,56 @@ impl Task {
         }
     }
 
+    /// Claims units together.
+    fn claim(&mut self, orphans: Vec<(Id, Epoch)>) {
+        let store = Arc::clone(&self.store);
+        self.answers.spawn(async move {
+            let units: Vec<Id> = orphans.iter().map(|(unit, _)| *unit).collect();
+            let claimed = answer("claim", ANSWER_TIME, store.claim_all(orphans)).await;
+            let answers = match claimed {
+                Some(claimed) => (claimed.into_iter())
+                    .map(|epoch| epoch.map_or(ClaimAnswer::Lost, ClaimAnswer::Won))
+                    .collect(),
+                None => vec![ClaimAnswer::None; units.len()],
+            };
+            Event::Claimed(units.into_iter().zip(answers).collect())
+        });
+    }
+
+    fn claimed(&mut self, claims: Vec<(Id, ClaimAnswer)>) {
+        let is_any_won = (claims.iter()).any(|(_, it)| matches!(it, ClaimAnswer::Won(_)));
+        for (unit, answer) in claims {
+            self.put_in(Input::Claimed(unit, answer));
+        }
+        if is_any_won {
+            // There may be more than are looked for at a time.
+            self.find_orphans(ORPHANS_AT_ONCE);
+        }
+    }
+
+    fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+        orphans.retain(|(unit, _)| !self.not_resumable.contains(unit));
+        self.put_in(Input::Orphans(orphans));
+    }
+
+    fn given_up(&mut self, unit: Id) {
+        self.not_resumable.insert(unit);
+        self.running.remove(&unit);
+        self.put_in(Input::Released(unit, true));
+    }
+
+    fn tidy(&mut self) {
+        // After an outage of the database, other nodes get time to renew their leases.
+        if !self.node.may_claim(self.now_ms()) {
+            return;
+        }
+        let store = Arc::clone(&self.store);
+        self.answers.spawn(async move {
+            answer("tidy up", TIDY_INTERVAL, store.tidy()).await;
+            Event::Nothing
+        });
+    }
+
     fn find_orphans(&mut self, count: usize) {
         if !self.node.may_claim(self.now_ms()) {
             return;
@@ -272,11 +338,13 @@ impl Task {
         let Ok(search) = Arc::clone(&self.search).try_acquire_owned() else {
             return;
         };
+        // Those that it cannot resume are found as well.
+        let count = count + self.not_resumable.len();
         let store = Arc::clone(&self.store);
         self.answers.spawn(async move {
             let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
             drop(search);
-            Event::Answer(Input::Orphans(orphans.unwrap_or_default()))
+            Event::Found(orphans.unwrap_or_default())
         });
     }
 
@@ -322,7 +390,7 @@ impl Task {
             }
         };
         self.lease.joined(id);
-        self.node = Node::new(id, self.times, self.capacity);
+        self.node = Node::new(id, self.store.lease(), self.capacity);
         self.put_in(Input::Time);
     }
 }
@@ -330,7 +398,7 @@ impl Task {
 /// Beats, and reads what the node owns.
 async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64) -> Event {
     let (answer, drain) = match answer("beat", within, store.beat()).await {
-        Some(Some(beat)) => (BeatAnswer::Kept(beat.owned), beat.drain),
+        Some(Some(beat)) => (BeatAnswer::Renewed(beat.owned), beat.drain),
         Some(None) => (BeatAnswer::Unknown, false),
         None => (BeatAnswer::None, false),
     };

@@ -69,36 +69,39 @@ impl Units {
     }
 
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
-    /// database cannot be read.
-    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) {
+    /// database cannot be read. Returns `false` if this version of the program cannot resume it.
+    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> bool {
         // It was created here, and its node learns of it from its beat.
         let is_new = epoch == Epoch::FIRST;
         if is_new && (self.rooms.runs(unit) || self.tournaments.runs(unit)) {
-            return;
+            return true;
         }
         self.stop(unit).await;
         while self.wanted().get(&unit) == Some(&epoch) {
             match self.load(unit, epoch).await {
-                Ok(()) => return,
+                Ok(is_resumed) => return is_resumed,
                 Err(error) => {
                     warn!(%unit, %error, "a room or tournament cannot be read; trying again");
                     sleep(RETRY).await;
                 }
             }
         }
+        true
     }
 
-    async fn load(&self, unit: Id, epoch: Epoch) -> Result<(), StoreError> {
+    /// Reads and runs a unit. Returns whether something of it is resumed, or it is not the node's.
+    async fn load(&self, unit: Id, epoch: Epoch) -> Result<bool, StoreError> {
         let _permit = self.loads.acquire().await.expect("it is never closed");
         let Some(loaded) = self.store.load(unit, epoch).await? else {
-            return Ok(());
+            return Ok(true);
         };
         let games = self.rooms.resume_all(loaded.games).await;
         if let Some(tournament) = loaded.tournament {
-            self.tournaments.resume(tournament);
+            self.tournaments.resume(tournament).await;
         }
-        info!(%unit, epoch = epoch.0, games, "taken over");
-        Ok(())
+        let is_resumed = games > 0 || self.tournaments.get(unit).is_some();
+        info!(%unit, epoch = epoch.0, games, is_resumed, "taken over");
+        Ok(is_resumed)
     }
 
     /// Ends everything of a unit that runs here.
@@ -112,6 +115,19 @@ impl Units {
     pub(super) async fn until_ephemeral_over(&self, unit: Id) {
         // If it is not over in time, it is ended.
         let _ = timeout(self.grace, self.rooms.until_ephemeral_over(unit)).await;
+    }
+
+    /// Releases a unit that cannot be resumed here, as long as it is wanted. Returns whether the
+    /// database knows.
+    pub(super) async fn give_up(&self, unit: Id, epoch: Epoch) -> bool {
+        while self.wanted().get(&unit) == Some(&epoch) {
+            if self.release(unit, epoch).await {
+                self.unwant(unit);
+                return true;
+            }
+            sleep(RETRY).await;
+        }
+        false
     }
 
     /// Ends everything of a unit after its next commits, and gives it up. Returns whether the

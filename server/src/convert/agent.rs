@@ -10,7 +10,7 @@ use crate::config::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
 ///
 /// # Errors
 /// There is no such agent.
-pub(super) fn agent_from_proto(
+pub fn agent_from_proto(
     field: &'static str,
     name: &str,
 ) -> Result<Option<NamedAgent>, FieldProblem> {

@@ -44,10 +44,13 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         RoomEvent::Returned(seat) => Kind::Returned(v1::Returned {
             seat: seat_number(*seat),
         }),
-        RoomEvent::Substituted(seat) => Kind::Substituted(v1::Substituted {
-            seat: seat_number(*seat),
-            built_in_agent: core.header().policy.substitute.name(),
-        }),
+        RoomEvent::Substituted(seat) | RoomEvent::Retired(seat) => {
+            Kind::Substituted(v1::Substituted {
+                seat: seat_number(*seat),
+                built_in_agent: core.header().policy.substitute.name(),
+                for_good: matches!(event, RoomEvent::Retired(_)),
+            })
+        }
         RoomEvent::GameStarted => {
             let mut started = game_started(core);
             for seat in &mut started.seats {

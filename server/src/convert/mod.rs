@@ -12,6 +12,8 @@ mod players;
 mod policy;
 mod ratings;
 mod record;
+#[cfg(test)]
+mod record_tests;
 mod room;
 mod standings;
 mod start;
@@ -19,18 +21,18 @@ mod summary;
 mod table;
 mod tournament;
 
-pub use agent::{check_budget, check_real_cards};
+pub use agent::{agent_from_proto, check_budget, check_real_cards};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
 pub use name::checked_name;
 pub use players::recorded_player;
-pub use policy::{millis, policy_from_proto, policy_to_proto};
+pub use policy::{millis, policy_from_proto, policy_to_proto, requested_policy};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines};
 pub use room::{
-    describe, display_names_from_proto, fills_from_proto, participants, seats_to_proto,
-    tournament_id,
+    awaited_to_proto, describe, describe_at, display_names_from_proto, fills_from_proto,
+    participants, seats_to_proto, tournament_id,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};

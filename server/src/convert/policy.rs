@@ -15,7 +15,18 @@ use chefshat_room::{Core, State};
 /// A day, the longest time in a policy, milliseconds.
 const DAY_MS: u32 = 86_400_000;
 
-/// The policy of a message. Unset fields take their defaults.
+/// The policy of a request. Unset fields take their defaults.
+///
+/// # Errors
+/// The first field that is out of its range.
+pub fn requested_policy(message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
+    let mut policy = policy_from_proto(message)?;
+    policy.set_default_absence_times();
+    Ok(policy)
+}
+
+/// A stored policy. Games of earlier servers have no absence time; other unset fields take their
+/// defaults.
 ///
 /// # Errors
 /// The first field that is out of its range.
@@ -73,6 +84,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Err(_) => return Err(FieldProblem::unknown("visibility", message.visibility)),
         },
         hints: message.hints,
+        absence_time: time("absence_time_ms", message.absence_time_ms, 0..=DAY_MS)?,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -83,7 +95,8 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
-/// A policy with every field set, except a pace that depends on the participants.
+/// A policy with every field set, except a pace that depends on the participants and the absence time
+/// of a game that has none.
 pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(millis(policy.decision_time)),
@@ -115,11 +128,13 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
                 kind: kind_to_proto(Some(clock.kind)),
                 decision_time_ms: clock.decision_time.map(millis),
                 bank_ms: clock.bank.map(millis),
+                absence_time_ms: clock.absence_time.map(millis),
             })
             .collect(),
         one_seat_per_client: policy.one_seat_per_client,
         visibility: visibility_to_proto(policy.visibility).into(),
         hints: policy.hints,
+        absence_time_ms: policy.absence_time.map(millis),
     }
 }
 
@@ -152,7 +167,7 @@ fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
 }
 
 /// Clocks for kinds of participants, each kind at most once. A time set for the room applies to
-/// everybody, people included.
+/// everybody, people included. [`Policy::set_default_absence_times`] completes them.
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
     for message in &policy.clocks {
@@ -165,12 +180,24 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
             kind,
             decision_time: time("clocks", message.decision_time_ms, 10..=DAY_MS)?,
             bank: time("clocks", message.bank_ms, 0..=DAY_MS)?,
+            absence_time: time("clocks", message.absence_time_ms, 0..=DAY_MS)?,
         });
     }
     let chosen = policy.decision_time_ms.is_some() || policy.bank_ms.is_some();
-    let for_people = (clocks.iter()).any(|clock| clock.kind == ParticipantKind::Human);
-    if !chosen && !for_people {
-        clocks.push(KindClock::PEOPLE);
+    let is_of_people = |clock: &&mut KindClock| clock.kind == ParticipantKind::Human;
+    match clocks.iter_mut().find(is_of_people) {
+        _ if chosen => {}
+        None => clocks.push(KindClock {
+            absence_time: None,
+            ..KindClock::PEOPLE
+        }),
+        Some(clock) => {
+            let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
+            if absence_alone && clock.absence_time.is_some() {
+                (clock.decision_time, clock.bank) =
+                    (KindClock::PEOPLE.decision_time, KindClock::PEOPLE.bank);
+            }
+        }
     }
     Ok(clocks)
 }
@@ -231,8 +258,9 @@ mod tests {
             ..v1::RoomPolicy::default()
         };
         let read =
-            |message: v1::RoomPolicy| policy_from_proto(&message).expect("the policy is valid");
+            |message: v1::RoomPolicy| requested_policy(&message).expect("the policy is valid");
         let chosen = read(chosen);
+        assert_eq!(read(v1::RoomPolicy::default()), policy);
         for policy in [&policy, &chosen] {
             assert_eq!(read(policy_to_proto(policy)), *policy);
         }
@@ -243,11 +271,96 @@ mod tests {
     }
 
     #[test]
+    fn absence_times_that_are_not_chosen_have_their_defaults() {
+        let clock_of =
+            |kind: v1::ParticipantKind, decision_time_ms, absence_time_ms| v1::KindClock {
+                kind: kind.into(),
+                decision_time_ms,
+                bank_ms: None,
+                absence_time_ms,
+            };
+        let (human, robot) = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
+        // The decision time and absence time of the room, its clocks, and the decision and absence
+        // times of people, robots and agents that follow.
+        let cases = [
+            (
+                None,
+                None,
+                vec![],
+                [(60_000, 20_000), (10_000, 10_000), (10_000, 10_000)],
+            ),
+            (Some(5_000), None, vec![], [(5_000, 5_000); 3]),
+            (
+                Some(90_000),
+                None,
+                vec![],
+                [(90_000, 20_000), (90_000, 90_000), (90_000, 90_000)],
+            ),
+            (
+                None,
+                Some(3_000),
+                vec![],
+                [(60_000, 3_000), (10_000, 3_000), (10_000, 3_000)],
+            ),
+            (
+                None,
+                None,
+                vec![
+                    clock_of(human, None, Some(7_000)),
+                    clock_of(robot, Some(30_000), None),
+                ],
+                [(60_000, 7_000), (30_000, 30_000), (10_000, 10_000)],
+            ),
+            (
+                None,
+                Some(0),
+                vec![clock_of(human, Some(4_000), Some(50_000))],
+                [(4_000, 4_000), (10_000, 0), (10_000, 0)],
+            ),
+        ];
+        for (decision_time_ms, absence_time_ms, clocks, expected) in cases {
+            let message = v1::RoomPolicy {
+                decision_time_ms,
+                absence_time_ms,
+                clocks,
+                ..v1::RoomPolicy::default()
+            };
+            let policy = requested_policy(&message).expect("the policy is valid");
+            let times = [
+                ParticipantKind::Human,
+                ParticipantKind::Robot,
+                ParticipantKind::Agent,
+            ]
+            .map(|kind| {
+                let absence = policy.absence_time_of(Some(kind)).expect("it has one");
+                (millis(policy.decision_time_of(Some(kind))), millis(absence))
+            });
+            assert_eq!(times, expected, "{message:?}");
+            let stored = policy_to_proto(&policy);
+            assert_eq!(policy_from_proto(&stored), Ok(policy), "{message:?}");
+        }
+        let earlier = v1::RoomPolicy {
+            absence_time_ms: None,
+            clocks: Vec::new(),
+            ..policy_to_proto(&Policy::default())
+        };
+        let policy = policy_from_proto(&earlier).expect("the policy is valid");
+        assert_eq!(policy.absence_time_of(Some(ParticipantKind::Human)), None);
+        let too_long = v1::RoomPolicy {
+            absence_time_ms: Some(DAY_MS + 1),
+            ..v1::RoomPolicy::default()
+        };
+        let problem = requested_policy(&too_long).expect_err("it is too long");
+        assert_eq!(problem.field, "absence_time_ms");
+    }
+
+    #[test]
     fn games_without_a_room_are_recorded_with_the_policy_of_one() {
         let policy = Policy {
             max_invalid_attempts: Some(5),
             pace: Some(Duration::ZERO),
             clocks: Vec::new(),
+            absence_time: None,
             ..Policy::default()
         };
         let recorded = chefshat_vector::simulation_policy(Some(5), None);

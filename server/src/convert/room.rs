@@ -1,6 +1,7 @@
 //! A room and its seats as messages.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
@@ -10,11 +11,11 @@ use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
 use super::name::checked_name;
-use super::policy::policy_of;
+use super::policy::{millis, policy_of};
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
-use chefshat_room::{Core, State};
+use chefshat_room::{Awaited, Core, State};
 
 /// The participants of a new room's seats. An empty list leaves all seats open.
 ///
@@ -126,7 +127,27 @@ fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
     }
 }
 
-/// The public view of a room.
+/// The public view of a room, with whom its game waits for.
+pub fn describe_at(core: &Core, now: Duration) -> v1::Room {
+    let delayed = core.header().policy.spectator_delay_decisions > 0;
+    let awaited = core.awaited_in_public().filter(|_| !delayed);
+    v1::Room {
+        awaited: awaited.map(|awaited| awaited_to_proto(Some(awaited), now)),
+        ..describe(core)
+    }
+}
+
+/// Whom a game waits for, as everybody may know.
+pub fn awaited_to_proto(awaited: Option<Awaited>, now: Duration) -> v1::Awaited {
+    awaited.map_or_else(v1::Awaited::default, |awaited| v1::Awaited {
+        seat: Some(seat_number(awaited.seat)),
+        away: awaited.away,
+        waited_ms: millis(now.saturating_sub(awaited.since)),
+        left_ms: millis(awaited.until.saturating_sub(now)),
+    })
+}
+
+/// The public view of a room, at no particular time.
 pub fn describe(core: &Core) -> v1::Room {
     let header = core.header();
     let seed_commitment = seed_commitment(header);
@@ -146,6 +167,7 @@ pub fn describe(core: &Core) -> v1::Room {
         abort_reason: aborted_because(core.state()).into(),
         tournament_id: tournament_id(header),
         series_id: series_id(header),
+        awaited: None,
     }
 }
 

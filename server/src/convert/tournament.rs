@@ -37,6 +37,8 @@ pub struct TournamentPlan {
     pub built_in: Vec<NamedAgent>,
     /// The seed of all deals, if the owner sets it.
     pub deal_seed: Option<[u8; 32]>,
+    /// When it starts by itself, milliseconds since the Unix epoch.
+    pub start_at_ms: Option<u64>,
 }
 
 /// Checks the settings of a new tournament and fills in defaults. `draw_seed` is used if the
@@ -114,6 +116,7 @@ pub fn tournament_plan(
         rules,
         built_in,
         deal_seed,
+        start_at_ms: (message.start_at_ms != 0).then_some(message.start_at_ms),
     })
 }
 
@@ -223,6 +226,7 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
         filler: core.filler.name().to_owned(),
         deal_seed: (plan.deal_seed).map_or_else(Vec::new, |seed| seed.to_vec()),
         physical_tables: number(core.physical_tables),
+        start_at_ms: plan.start_at_ms.unwrap_or(0),
     }
 }
 
@@ -266,8 +270,18 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
             filler: entrant.filler,
             stateless: entrant.stateless,
             max_games: number(entrant.max_games),
-            connected: tournament.is_present(index),
+            connected: tournament.is_present(index) && !tournament.is_withdrawn(index),
             at_table: entrant.at_table,
+            withdrawn: tournament.is_withdrawn(index),
+            former: (tournament.former(index).iter())
+                .map(|former| v1::FormerParticipant {
+                    name: former.entrant.name.clone(),
+                    kind: kind_to_proto(Some(former.entrant.kind)),
+                    built_in_agent: (former.entrant.built_in)
+                        .map_or_else(String::new, |kind| kind.name()),
+                    games: former.games,
+                })
+                .collect(),
         })
         .collect()
 }
@@ -295,12 +309,14 @@ pub fn tournament_game(
                 decision_time_us: seat.statistics.decision_time_us,
                 timed_decisions: seat.statistics.timed_decisions,
                 performance_score: seat.statistics.performance_score,
+                left: game.left.contains(&seat.participant),
             })
             .collect(),
         _ => (game.seats.iter())
             .map(|participant| v1::TournamentGameSeat {
                 participant: number(*participant),
                 forfeited: game.forfeited.contains(participant),
+                left: game.left.contains(participant),
                 ..v1::TournamentGameSeat::default()
             })
             .collect(),
@@ -326,6 +342,7 @@ pub fn tournament_game(
         rated: is_rated(game, plan),
         shifts: result.map_or(0, |result| result.shifts),
         physical: game.physical,
+        postponed: number(game.postponed.len()),
     }
 }
 

@@ -8,6 +8,7 @@ use chefshat_record::convert::FieldProblem;
 use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
+use super::limits::charged;
 use super::pages;
 use super::reach::Reach;
 use super::status::{Refusal, field, room_unknown, status, store_failed, tournament_unknown};
@@ -87,8 +88,10 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::AdminServiceCloseRoomRequest>,
     ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
+        let key = charged(request.extensions());
         let id = Id::parse(&request.into_inner().room_id).ok_or_else(room_unknown)?;
-        let handle = self.reach.room_here(id).await?.ok_or_else(room_unknown)?;
+        let handle = self.reach.room_here(id, key).await?;
+        let handle = handle.ok_or_else(room_unknown)?;
         info!(room = %handle.id(), "an operator closes a room");
         handle.close_without_token().await;
         let room = handle.describe().await.map_err(Refusal::from)?;
@@ -100,8 +103,9 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::AdminServiceCloseTournamentRequest>,
     ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
+        let key = charged(request.extensions());
         let id = Id::parse(&request.into_inner().tournament_id).ok_or_else(tournament_unknown)?;
-        let handle = self.reach.tournament_here(id).await?;
+        let handle = self.reach.tournament_here(id, key).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         info!(tournament = %handle.id(), "an operator closes a tournament");
         handle.close().await.map_err(tournaments::stopped)?;

@@ -1,7 +1,7 @@
 //! The layer that sends a call to the node that has its room or tournament. A call is first tried
 //! here; if its handler finds what it is about at another node (`status::elsewhere`), the same
 //! request goes to that node, and its answer comes back as it arrives. So no method knows anything
-//! of forwarding. A single server does not have this layer.
+//! of forwarding. Spectators share streams (`fanout`). A single server does not have this layer.
 //!
 //! The other node decides about access and charges the caller, so the headers that it needs for
 //! that pass with the request. It never passes the request on.
@@ -22,11 +22,13 @@ use tonic::metadata::MetadataMap;
 use tower::{Layer, Service, ServiceExt as _};
 use tracing::debug;
 
+use super::fanout::{self, Fanout};
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
 use crate::access::{Call, SECRET_HEADER};
 use crate::cluster::{Directory, Peers};
 use crate::config::MAX_MESSAGE_BYTES;
 use crate::connections::peer_address;
+use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
 
 /// How often a call looks for the node that has its room or tournament.
@@ -103,12 +105,18 @@ impl Gateway {
 pub struct ForwardLayer {
     directory: Arc<dyn Directory>,
     peers: Arc<Peers>,
+    fanout: Arc<Fanout>,
 }
 
 impl ForwardLayer {
-    /// Creates a layer that sends calls to these peers.
-    pub fn new(directory: Arc<dyn Directory>, peers: Arc<Peers>) -> Self {
-        Self { directory, peers }
+    /// Creates a layer that sends calls to these peers. `limits` counts the spectators that share a
+    /// stream.
+    pub fn new(directory: Arc<dyn Directory>, peers: Arc<Peers>, limits: Arc<CallLimits>) -> Self {
+        Self {
+            directory,
+            peers,
+            fanout: Arc::new(Fanout::new(limits)),
+        }
     }
 }
 
@@ -145,23 +153,24 @@ where
     }
 
     fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+        // Streams of seats, lists of everything and what is about several records ask other nodes
+        // themselves.
+        let gateway = Gateway {
+            layer: self.layer.clone(),
+            headers: passed_headers(&request),
+        };
+        request.extensions_mut().insert(gateway.clone());
         if !Call::find(request.uri().path()).is_some_and(|call| call.forwarded) {
-            // Streams of seats, and lists of everything, ask other nodes themselves.
-            let gateway = Gateway {
-                layer: self.layer.clone(),
-                headers: passed_headers(&request),
-            };
-            request.extensions_mut().insert(gateway);
             return Either::Left(self.services.call(request));
         }
         // The clone that is ready serves this call.
         let clone = self.services.clone();
         let services = std::mem::replace(&mut self.services, clone);
-        Either::Right(Box::pin(self.layer.clone().answer(services, request)))
+        Either::Right(Box::pin(gateway.answer(services, request)))
     }
 }
 
-impl ForwardLayer {
+impl Gateway {
     /// Answers a call here or at the node that has what it is about.
     async fn answer<S>(
         self,
@@ -173,8 +182,8 @@ impl ForwardLayer {
         S::Future: Send,
         S::Error: Send,
     {
-        let headers = passed_headers(&request);
         let (parts, body) = request.into_parts();
+        let caller = Key::of_address(peer_address(&parts.extensions));
         let kept = Kept::default();
         let mut body = Body::new(KeepingBody {
             body,
@@ -190,16 +199,22 @@ impl ForwardLayer {
             let Some(message) = kept.message() else {
                 break;
             };
+            let shared = fanout::key(parts.uri.path(), &self.headers, &message);
             let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
             *forwarded.method_mut() = parts.method.clone();
             *forwarded.uri_mut() = parts.uri.clone();
-            *forwarded.headers_mut() = headers.clone();
-            match self.peers.send(&elsewhere.peer, forwarded).await {
+            *forwarded.headers_mut() = self.headers.clone();
+            let sent = self.peers().send(&elsewhere.peer, forwarded);
+            let answered = match shared {
+                Some(key) => self.layer.fanout.answer(key, caller, sent).await,
+                None => sent.await,
+            };
+            match answered {
                 Ok(answer) if !is_not_owner(answer.headers()) => return Ok(returned(answer)),
-                Ok(_) => self.directory.forget(&elsewhere.found_by),
+                Ok(_) => self.directory().forget(&elsewhere.found_by),
                 Err(error) => {
                     debug!(peer = %elsewhere.peer.node, %error, "a call could not be forwarded");
-                    self.directory.forget(&elsewhere.found_by);
+                    self.directory().forget(&elsewhere.found_by);
                     // Whether it was executed is unknown.
                     break;
                 }

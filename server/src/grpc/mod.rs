@@ -4,6 +4,7 @@
 mod access;
 mod admin;
 mod analysis;
+mod fanout;
 mod follow;
 mod forward;
 mod info;
@@ -21,6 +22,7 @@ mod room_service;
 mod spectate;
 pub mod status;
 mod table;
+mod takeover;
 mod tournaments;
 mod vector;
 

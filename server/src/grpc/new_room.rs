@@ -12,6 +12,7 @@ use chefshat_referee::Referee;
 use prost::Message as _;
 use tonic::{Code, Status};
 
+use super::forward::Gateway;
 use super::recorded::Recorded;
 use super::status::{field, request_id, status};
 use crate::access::Caller;
@@ -32,8 +33,7 @@ struct Beginning {
 
 /// Checks a request for a new room.
 pub(super) async fn new_room(
-    recorded: &Recorded,
-    caller: &Caller,
+    (recorded, caller, gateway): (&Recorded, &Caller, Option<&Gateway>),
     mut request: v1::CreateRoomRequest,
     charged: Key,
 ) -> Result<NewRoom, Status> {
@@ -46,7 +46,13 @@ pub(super) async fn new_room(
     let game_seed = game_seed(&request.game_seed)?;
     let beginning = match &request.start {
         Some(Start::Branch(point)) => {
-            branched((recorded, caller), point, request.rules.as_ref(), game_seed).await?
+            branched(
+                (recorded, caller, gateway),
+                point,
+                request.rules.as_ref(),
+                game_seed,
+            )
+            .await?
         }
         start => {
             let rules = hosted_rules(&request.rules.clone().unwrap_or_default())?;
@@ -85,7 +91,7 @@ pub(super) async fn new_room(
     }
     Ok(NewRoom {
         name,
-        recorded: recorded_players((recorded, caller), &fills).await?,
+        recorded: recorded_players((recorded, caller, gateway), &fills).await?,
         rules: beginning.rules,
         policy,
         fills,
@@ -161,7 +167,7 @@ pub(super) fn supported_policy(
     recorded: &Recorded,
     message: &v1::RoomPolicy,
 ) -> Result<Policy, FieldProblem> {
-    let mut policy = convert::policy_from_proto(message)?;
+    let mut policy = convert::requested_policy(message)?;
     convert::check_budget("substitute", policy.substitute)?;
     if !recorded.rooms().store().outlives_server() {
         if message.durability() == v1::Durability::Durable {
@@ -221,7 +227,7 @@ fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
 
 /// A game that branches from a recorded one.
 async fn branched(
-    (recorded, caller): (&Recorded, &Caller),
+    (recorded, caller, gateway): (&Recorded, &Caller, Option<&Gateway>),
     point: &v1::BranchPoint,
     rules: Option<&v1::RuleSet>,
     game_seed: Option<[u8; 32]>,
@@ -239,10 +245,10 @@ async fn branched(
         return Err(refused("game_seed", message.to_owned()));
     }
     let decisions = point.decisions;
+    let lines = recorded.lines(caller, gateway, &point.game_id, |lines, _| lines);
+    let lines = lines.await?;
     let branch = recorded
-        .of_game(caller, &point.game_id, move |lines, _| {
-            branch_of(&lines, decisions)
-        })
+        .with_place(Key::of_caller(caller), move || branch_of(&lines, decisions))
         .await?
         .map_err(|error| branch_refused(&error))?;
     check_length(&branch.rules)?;
@@ -283,15 +289,18 @@ pub(super) fn branch_refused(error: &BranchError) -> Status {
 
 /// The recorded players of seats that replay one.
 async fn recorded_players(
-    (recorded, caller): (&Recorded, &Caller),
+    (recorded, caller, gateway): (&Recorded, &Caller, Option<&Gateway>),
     fills: &[Fill],
 ) -> Result<BTreeMap<usize, Arc<RecordedPlayer>>, Status> {
     let mut players = BTreeMap::new();
     for (index, fill) in fills.iter().enumerate() {
         let Fill::Replay(seat) = fill else { continue };
         let number = seat_number(seat.seat);
+        let game = seat.game.to_string();
+        let lines = recorded.lines(caller, gateway, &game, |lines, _| lines);
+        let lines = lines.await?;
         let player = recorded
-            .of_game(caller, &seat.game.to_string(), move |lines, _| {
+            .with_place(Key::of_caller(caller), move || {
                 convert::recorded_player(&lines, number)
             })
             .await?

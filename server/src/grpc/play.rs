@@ -1,6 +1,10 @@
 //! `PlayService`: streams of seats, and single commands without a stream. `reader` executes the
 //! requests of a stream; the responses come from its outbox, which rooms fill.
 
+mod attaching;
+#[cfg(test)]
+mod late_tests;
+mod participants;
 mod reader;
 mod remote;
 mod requests;

@@ -7,19 +7,21 @@ use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_line::Line};
 use tonic::Status;
+use tracing::warn;
 
 use super::access::check;
 use super::status::{
     elsewhere, owner_unreachable, read_failed, room_gone, room_unknown, tournament_unknown,
 };
+use super::takeover::settled;
 use crate::access::{Caller, Role, Standing};
 use crate::cluster::{Elsewhere, FoundBy, Location};
+use crate::limits::Key;
 use crate::room::Handle;
 use crate::rooms::Rooms;
 use crate::store::StoredGame;
-use crate::store::cluster::Kind;
 use crate::tournaments::{TournamentHandle, Tournaments};
-use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
+use chefshat_room::ids::{Id, RequestKey, Token};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Visibility;
 
@@ -50,66 +52,66 @@ impl Reach {
         &self.rooms
     }
 
-    /// The room with this id, if this node has it. If another node does, the error sends the request
-    /// there.
-    pub(super) async fn room_here(&self, id: Id) -> Result<Option<Handle>, Status> {
-        match self.rooms.get(id) {
+    /// The room with this id or join code, if this node has it. If another node does, the error sends
+    /// the request there.
+    pub(super) async fn room_here(
+        &self,
+        found_by: impl Into<FoundBy>,
+        caller: Key,
+    ) -> Result<Option<Handle>, Status> {
+        let found_by = found_by.into();
+        match self.room_in_memory(&found_by) {
             Some(handle) if !handle.is_gone() => Ok(Some(handle)),
             stopped => {
-                let is_known = || stopped.is_some() || self.tournaments.get(id).is_some();
-                let location = self.located(id).await;
-                not_elsewhere(location, FoundBy::Id(id), is_known)?;
-                Ok(stopped.or_else(|| self.rooms.get(id)))
+                let is_known =
+                    || stopped.is_some() || self.tournament_in_memory(&found_by).is_some();
+                let owned = self
+                    .check_not_elsewhere(&found_by, caller, is_known)
+                    .await?;
+                // What this node has stopped is about to be resumed.
+                let stopped = stopped.filter(|_| owned);
+                Ok(self.room_in_memory(&found_by).or(stopped))
             }
         }
     }
 
-    /// The room with this join code, as [`Reach::room_here`].
-    pub(super) async fn room_with_code(&self, code: &str) -> Result<Option<Handle>, Status> {
-        match self.rooms.by_code(code) {
-            Some(handle) if !handle.is_gone() => Ok(Some(handle)),
-            stopped => {
-                let code = normal_code(code);
-                let is_known = || stopped.is_some() || self.tournaments.by_code(&code).is_some();
-                let location = self.located_code(&code).await;
-                not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
-                Ok(stopped.or_else(|| self.rooms.by_code(&code)))
-            }
-        }
-    }
-
-    /// The tournament with this id, as [`Reach::room_here`].
+    /// The tournament with this id or join code, as [`Reach::room_here`].
     pub(super) async fn tournament_here(
         &self,
-        id: Id,
+        found_by: impl Into<FoundBy>,
+        caller: Key,
     ) -> Result<Option<Arc<TournamentHandle>>, Status> {
-        if let Some(handle) = self.tournaments.get(id) {
+        let found_by = found_by.into();
+        if let Some(handle) = self.tournament_in_memory(&found_by) {
             return Ok(Some(handle));
         }
-        let location = self.located(id).await;
-        not_elsewhere(location, FoundBy::Id(id), || self.rooms.get(id).is_some())?;
-        Ok(self.tournaments.get(id))
+        let is_known = || self.room_in_memory(&found_by).is_some();
+        self.check_not_elsewhere(&found_by, caller, is_known)
+            .await?;
+        Ok(self.tournament_in_memory(&found_by))
     }
 
-    /// The tournament with this join code, as [`Reach::room_here`].
-    pub(super) async fn tournament_with_code(
-        &self,
-        code: &str,
-    ) -> Result<Option<Arc<TournamentHandle>>, Status> {
-        if let Some(handle) = self.tournaments.by_code(code) {
-            return Ok(Some(handle));
+    fn room_in_memory(&self, found_by: &FoundBy) -> Option<Handle> {
+        match found_by {
+            FoundBy::Id(id) => self.rooms.get(*id),
+            FoundBy::Code(code) => self.rooms.by_code(code),
+            FoundBy::Game(game) => self.rooms.get(self.rooms.room_of(*game)?),
         }
-        let code = normal_code(code);
-        let location = self.located_code(&code).await;
-        let is_known = || self.rooms.by_code(&code).is_some();
-        not_elsewhere(location, FoundBy::Code(code.clone()), is_known)?;
-        Ok(self.tournaments.by_code(&code))
+    }
+
+    fn tournament_in_memory(&self, found_by: &FoundBy) -> Option<Arc<TournamentHandle>> {
+        match found_by {
+            FoundBy::Id(id) => self.tournaments.get(*id),
+            FoundBy::Code(code) => self.tournaments.by_code(code),
+            FoundBy::Game(_) => None,
+        }
     }
 
     /// Checks that no other node has created a room or tournament for this request before.
     pub(super) async fn check_not_created_elsewhere(
         &self,
         request: Option<RequestKey>,
+        caller: Key,
     ) -> Result<(), Status> {
         let Some(id) = request.map(|request| request.created_id()) else {
             return Ok(());
@@ -117,40 +119,35 @@ impl Reach {
         if self.rooms.get(id).is_some() || self.tournaments.get(id).is_some() {
             return Ok(());
         }
-        let location = self.located(id).await;
-        not_elsewhere(location, FoundBy::Id(id), || false)
+        let found_by = FoundBy::Id(id);
+        let checked = self.check_not_elsewhere(&found_by, caller, || false);
+        checked.await.map(drop)
     }
 
-    /// Where a room or tournament is that is not in memory. One that is over and whose node is gone
-    /// is in memory afterwards.
-    async fn located(&self, id: Id) -> Location {
-        let location = self.rooms.directory().locate(id).await;
-        self.load_end(&location).await;
-        location
-    }
-
-    /// As [`Reach::located`], by its join code in its normal form.
-    async fn located_code(&self, code: &str) -> Location {
-        let location = self.rooms.directory().locate_code(code).await;
-        self.load_end(&location).await;
-        location
-    }
-
-    async fn load_end(&self, location: &Location) {
-        let directory = self.rooms.directory();
-        match *location {
-            Location::Over(id, Kind::Room) => {
-                let ended = directory.ended_room(id).await;
-                self.rooms.resume_all(ended.into_iter().collect()).await;
+    /// Checks that what is not in memory is not at another node. Returns whether this node owns it:
+    /// then it is about to be resumed, if it is known here (`is_known`). What is over and whose node
+    /// is gone is in memory afterwards.
+    pub(super) async fn check_not_elsewhere(
+        &self,
+        found_by: &FoundBy,
+        caller: Key,
+        is_known: impl FnOnce() -> bool,
+    ) -> Result<bool, Status> {
+        match self.rooms.directory().locate(found_by, caller).await {
+            Location::Nowhere => Ok(false),
+            Location::Over(id, kind) => {
+                let shown = self.tournaments.show_ended(id, kind).await;
+                shown.map(|()| false).map_err(|error| {
+                    warn!(%error, "what is over cannot be read");
+                    owner_unreachable()
+                })
             }
-            Location::Over(id, Kind::Tournament) => {
-                let ended = directory.ended_tournament(id).await;
-                // Another request may have loaded it meanwhile.
-                if let Some(ended) = ended.filter(|_| self.tournaments.get(id).is_none()) {
-                    self.tournaments.resume(ended);
-                }
-            }
-            _ => {}
+            Location::Here if is_known() => Ok(true),
+            Location::Here | Location::Unknown => Err(owner_unreachable()),
+            Location::Node(peer) => Err(elsewhere(Elsewhere {
+                peer,
+                found_by: found_by.clone(),
+            })),
         }
     }
 
@@ -172,7 +169,8 @@ impl Reach {
             true => room_gone(),
             false => unknown(),
         };
-        let handle = self.room_here(id).await?.ok_or_else(unknown)?;
+        let found = self.room_here(id, Key::of_caller(caller)).await?;
+        let handle = found.ok_or_else(unknown)?;
         let header = self.rooms.header(id).ok_or_else(unknown)?;
         if header.policy.visibility == Visibility::Private
             && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
@@ -199,7 +197,9 @@ impl Reach {
         room: Id,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
-        let handle = self.room_here(room).await?.ok_or_else(&unknown)?;
+        let key = Key::of_caller(caller);
+        let found = settled(&self.rooms, || self.room_here(room, key)).await?;
+        let handle = found.ok_or_else(&unknown)?;
         if caller.scope.is_some() {
             let header = self.rooms.header(room).ok_or_else(&unknown)?;
             check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
@@ -229,7 +229,7 @@ impl Reach {
         id: &str,
     ) -> Result<Arc<TournamentHandle>, Status> {
         let id = Id::parse(id).ok_or_else(tournament_unknown)?;
-        let handle = self.tournament_here(id).await?;
+        let handle = self.tournament_here(id, Key::of_caller(caller)).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         if handle.visibility() == Visibility::Private
             && standing_in_tournament(caller, &handle) == Standing::Stranger
@@ -405,21 +405,6 @@ impl Reach {
         by_token
             .max(by_room)
             .max(by_tournament.unwrap_or(Standing::Stranger))
-    }
-}
-
-/// Checks that what a request is about is not at another node. Something of this node that is not
-/// in memory (`is_known`) is about to be resumed.
-fn not_elsewhere(
-    location: Location,
-    found_by: FoundBy,
-    is_known: impl FnOnce() -> bool,
-) -> Result<(), Status> {
-    match location {
-        Location::Nowhere | Location::Over(..) => Ok(()),
-        Location::Here if is_known() => Ok(()),
-        Location::Here | Location::Unknown => Err(owner_unreachable()),
-        Location::Node(peer) => Err(elsewhere(Elsewhere { peer, found_by })),
     }
 }
 

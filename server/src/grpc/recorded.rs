@@ -4,14 +4,16 @@
 
 use std::sync::Arc;
 
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, record_service_client::RecordServiceClient};
 use tonic::{Code, Status};
 
 use super::access::refused;
+use super::forward::Gateway;
 use super::reach::{Reach, Sight};
-use super::status::{self, is_elsewhere, status};
+use super::status::{self, is_elsewhere, is_refusal, owner_unreachable, status};
 use crate::access::{Caller, Refusal, Role};
-use crate::config::MAX_CONCURRENT_RECORDS;
+use crate::cluster::{FoundBy, Peer};
+use crate::config::{MAX_CONCURRENT_RECORDS, MAX_PEER_MESSAGE_BYTES};
 use crate::convert::lines_of;
 use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
@@ -78,14 +80,19 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        let place = self.places.take(Key::of_caller(caller)).await;
-        let stored = (self.rooms().store().finished(game).await)
-            .map_err(status::read_failed)?
-            .ok_or_else(unknown)?;
+        let key = Key::of_caller(caller);
+        let place = self.places.take(key).await;
+        let stored = (self.rooms().store().finished(game).await).map_err(status::read_failed)?;
+        let Some(stored) = stored else {
+            // It may be running at another node.
+            let found_by = FoundBy::Game(game);
+            let running = self.reach.check_not_elsewhere(&found_by, key, || false);
+            return running.await.and(Err(unknown()));
+        };
         // While its tournament runs, only the node that has it knows its tickets and which records
         // it withholds.
         if let Some(game) = stored.tournament()
-            && let Err(elsewhere) = self.reach.tournament_here(game.tournament).await
+            && let Err(elsewhere) = self.reach.tournament_here(game.tournament, key).await
             && !self.rooms().directory().is_over(game.tournament).await
         {
             return Err(elsewhere);
@@ -97,18 +104,29 @@ impl Recorded {
         in_background(place, move || work(lines_of(&stored).into_owned(), sight)).await
     }
 
-    /// As [`Recorded::of_game`], for a call that cannot be sent to another node: what another node
-    /// may withhold is withheld.
-    pub(super) async fn of_game_here<T: Send + 'static>(
+    /// The record of a finished game as `seen` makes it, for a call that cannot be sent to another
+    /// node. If one runs the game's tournament, it is what that node shows the caller.
+    pub(super) async fn lines(
         &self,
         caller: &Caller,
+        gateway: Option<&Gateway>,
         game_id: &str,
-        work: impl FnOnce(Vec<v1::RecordLine>, Sight) -> T + Send + 'static,
-    ) -> Result<T, Status> {
-        let done = self.of_game(caller, game_id, work).await;
-        done.map_err(|status| match is_elsewhere(&status) {
-            Some(_) => series_open(),
-            None => status,
+        seen: impl FnOnce(Vec<v1::RecordLine>, Sight) -> Vec<v1::RecordLine> + Send + 'static,
+    ) -> Result<Vec<v1::RecordLine>, Status> {
+        let here = self.of_game(caller, game_id, seen).await;
+        let (Err(status), Some(gateway)) = (&here, gateway) else {
+            return here;
+        };
+        let Some(elsewhere) = is_elsewhere(status) else {
+            return here;
+        };
+        let lines = record_at(&elsewhere.peer, gateway, game_id).await;
+        lines.map_err(|status| match is_refusal(&status) {
+            true => status,
+            false => {
+                gateway.directory().forget(&elsewhere.found_by);
+                owner_unreachable()
+            }
         })
     }
 
@@ -120,6 +138,26 @@ impl Recorded {
     ) -> Result<T, Status> {
         in_background(self.places.take(key).await, work).await
     }
+}
+
+/// The record of a game, as another node shows it to the caller.
+async fn record_at(
+    peer: &Peer,
+    gateway: &Gateway,
+    game: &str,
+) -> Result<Vec<v1::RecordLine>, Status> {
+    let channel = gateway.peers().channel(peer);
+    let mut service =
+        RecordServiceClient::new(channel).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
+    let request = v1::GetRecordRequest {
+        game_id: game.to_owned(),
+    };
+    let mut responses = (service.get_record(gateway.request(request)).await?).into_inner();
+    let mut lines = Vec::new();
+    while let Some(response) = responses.message().await? {
+        lines.extend(response.lines);
+    }
+    Ok(lines)
 }
 
 /// Games with the same deals are being played.

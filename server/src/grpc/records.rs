@@ -5,8 +5,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{
-    self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
-    record_service_server::RecordService,
+    self, game_event::Kind, record_line::Line, record_service_server::RecordService,
 };
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::jsonl::excess;
@@ -25,12 +24,11 @@ use super::limits::charged;
 use super::pages;
 use super::reach::Sight;
 use super::recorded::{Recorded, SERIES_OPEN};
-use super::status::{disk_nearly_full, field, has_reason, is_elsewhere, read_failed, status};
+use super::status::{disk_nearly_full, field, has_reason, read_failed, status};
 use crate::access::Caller;
-use crate::cluster::Peer;
 use crate::config::{
     IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,
-    MAX_PEER_MESSAGE_BYTES, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
+    MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use crate::limits::{Key, Places};
 use crate::store::Part;
@@ -108,13 +106,7 @@ impl Records {
                 let key = self.key.clone();
                 let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
                 let game = &summary.game_id;
-                let mut lines = self.recorded.of_game(caller, game, shown).await;
-                if let (Err(status), Some(gateway)) = (&lines, gateway)
-                    && let Some(elsewhere) = is_elsewhere(status)
-                {
-                    lines = record_at(&elsewhere.peer, gateway, game).await;
-                }
-                let lines = match lines {
+                let lines = match self.recorded.lines(caller, gateway, game, shown).await {
                     // Withheld while games with the same deals are being played.
                     Err(status) if has_reason(&status, SERIES_OPEN) => continue,
                     lines => lines?,
@@ -124,26 +116,6 @@ impl Records {
             }
         }
     }
-}
-
-/// The record of a game whose tournament another node has, as that node shows it to the caller.
-async fn record_at(
-    peer: &Peer,
-    gateway: &Gateway,
-    game: &str,
-) -> Result<Vec<v1::RecordLine>, Status> {
-    let channel = gateway.peers().channel(peer);
-    let mut service =
-        RecordServiceClient::new(channel).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
-    let request = v1::GetRecordRequest {
-        game_id: game.to_owned(),
-    };
-    let mut responses = (service.get_record(gateway.request(request)).await?).into_inner();
-    let mut lines = Vec::new();
-    while let Some(response) = responses.message().await? {
-        lines.extend(response.lines);
-    }
-    Ok(lines)
 }
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;

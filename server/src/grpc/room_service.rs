@@ -77,9 +77,9 @@ impl RoomCalls {
         let refused = |refused| Status::from(Refusal::from(refused));
         self.calls.may_try_code(key).map_err(refused)?;
         let found = match room_id {
-            "" => self.reach().room_with_code(join_code).await?,
+            "" => self.reach().room_here(join_code, key).await?,
             id => match Id::parse(id) {
-                Some(id) => self.reach().room_here(id).await?,
+                Some(id) => self.reach().room_here(id, key).await?,
                 None => None,
             },
         };
@@ -201,9 +201,13 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
-        let new = new_room(&self.recorded, &caller, request.into_inner(), key).await?;
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
+        let reading = (&self.recorded, &caller, gateway.as_ref());
+        let new = new_room(reading, request.into_inner(), key).await?;
         let request = new.request;
-        self.reach().check_not_created_elsewhere(request).await?;
+        self.reach()
+            .check_not_created_elsewhere(request, key)
+            .await?;
         let physical = new.physical;
         let built_in = new.fills.iter().all(|fill| fill.is_built_in());
         let cost = match built_in {
@@ -214,7 +218,9 @@ impl RoomService for RoomCalls {
         let created = self.rooms.create(new).await;
         if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
-            self.reach().check_not_created_elsewhere(request).await?;
+            self.reach()
+                .check_not_created_elsewhere(request, key)
+                .await?;
         }
         let created = created.map_err(Refusal::from)?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;

@@ -267,6 +267,12 @@ pub fn is_not_owner(headers: &http::HeaderMap) -> bool {
     Status::from_header_map(headers).is_some_and(|status| has_reason(&status, NOT_OWNER))
 }
 
+/// Whether another node has refused a call: not if it could not be reached, or does not have what the
+/// call is about.
+pub fn is_refusal(status: &Status) -> bool {
+    (status.get_details_error_info()).is_some_and(|info| info.reason != NOT_OWNER)
+}
+
 /// The node that has a room or tournament cannot be reached, or is just handing it over.
 pub fn owner_unreachable() -> Status {
     status(

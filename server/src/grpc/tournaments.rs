@@ -1,4 +1,7 @@
 //! `TournamentService`: checks requests, forwards them to the tournament, and converts the results.
+//! Changes by hand are in `by_hand`.
+
+mod by_hand;
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -102,9 +105,9 @@ impl TournamentCalls {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
         let reach = self.recorded.reach();
         let found = match id {
-            "" => reach.tournament_with_code(join_code).await?,
+            "" => reach.tournament_here(join_code, key).await?,
             id => match Id::parse(id) {
-                Some(id) => reach.tournament_here(id).await?,
+                Some(id) => reach.tournament_here(id, key).await?,
                 None => None,
             },
         };
@@ -240,13 +243,14 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
+        plan.policy.set_default_absence_times();
         let reach = self.recorded.reach();
-        reach.check_not_created_elsewhere(request_key).await?;
+        reach.check_not_created_elsewhere(request_key, key).await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.tournaments.create(&name, plan, request_key, key).await;
         if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
-            reach.check_not_created_elsewhere(request_key).await?;
+            reach.check_not_created_elsewhere(request_key, key).await?;
         }
         let (handle, owner) = created.map_err(create_refused)?;
         Ok(Response::new(v1::CreateTournamentResponse {
@@ -307,12 +311,7 @@ impl TournamentService for TournamentCalls {
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !handle.admits(kind) {
-            return Err(status(
-                Code::FailedPrecondition,
-                "KIND_NOT_ADMITTED",
-                "this tournament does not admit this kind of participant",
-                [("field", "kind")],
-            ));
+            return Err(kind_not_admitted());
         }
         let entry = Entry {
             name,
@@ -415,6 +414,69 @@ impl TournamentService for TournamentCalls {
         handle.close().await.map_err(stopped)?;
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::CloseTournamentResponse { tournament }))
+    }
+
+    async fn withdraw_participant(
+        &self,
+        request: Request<v1::WithdrawParticipantRequest>,
+    ) -> Result<Response<v1::WithdrawParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.withdraw(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn remove_participant(
+        &self,
+        request: Request<v1::RemoveParticipantRequest>,
+    ) -> Result<Response<v1::RemoveParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.remove(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn replace_participant(
+        &self,
+        request: Request<v1::ReplaceParticipantRequest>,
+    ) -> Result<Response<v1::ReplaceParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.replace(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn pause_tournament(
+        &self,
+        request: Request<v1::PauseTournamentRequest>,
+    ) -> Result<Response<v1::PauseTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.pause(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn resume_tournament(
+        &self,
+        request: Request<v1::ResumeTournamentRequest>,
+    ) -> Result<Response<v1::ResumeTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.resume(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn postpone_game(
+        &self,
+        request: Request<v1::PostponeGameRequest>,
+    ) -> Result<Response<v1::PostponeGameResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.postpone(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn call_game(
+        &self,
+        request: Request<v1::CallGameRequest>,
+    ) -> Result<Response<v1::CallGameResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.call(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
     }
 
     async fn follow_tournament(
@@ -550,6 +612,15 @@ fn create_refused(problem: CreateProblem) -> Status {
     }
 }
 
+fn kind_not_admitted() -> Status {
+    status(
+        Code::FailedPrecondition,
+        "KIND_NOT_ADMITTED",
+        "this tournament does not admit this kind of participant",
+        [("field", "kind")],
+    )
+}
+
 fn join_refused(refusal: JoinRefusal) -> Status {
     match refusal {
         JoinRefusal::Rules(problem) => join_problem(problem),
@@ -572,6 +643,7 @@ fn join_problem(problem: JoinProblem) -> Status {
         JoinProblem::Full => (Code::ResourceExhausted, "TOURNAMENT_FULL"),
         JoinProblem::Started => (Code::FailedPrecondition, "TOURNAMENT_STARTED"),
         JoinProblem::NameTaken => (Code::FailedPrecondition, "NAME_TAKEN"),
+        JoinProblem::NameReserved => (Code::FailedPrecondition, "NAME_RESERVED"),
         JoinProblem::NoTables => (Code::FailedPrecondition, "NO_PHYSICAL_TABLES"),
         JoinProblem::NotStateless => (Code::FailedPrecondition, "NOT_STATELESS"),
         JoinProblem::MaxGames => (Code::InvalidArgument, "MAX_GAMES_REFUSED"),

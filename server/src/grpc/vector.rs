@@ -25,6 +25,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::forward::Gateway;
 use super::limits::charged;
 use super::new_room::branch_refused;
 use super::pool::on_pool;
@@ -99,6 +100,7 @@ impl VectorService for Vectors {
         let runner = Runner {
             service: self.clone(),
             caller: Caller::of(request.extensions()),
+            gateway: request.extensions().get().cloned(),
             responses,
             _place: place,
             _counted: self.metrics().stream(StreamKind::Vector),
@@ -112,6 +114,7 @@ impl VectorService for Vectors {
 struct Runner {
     service: Vectors,
     caller: Caller,
+    gateway: Option<Gateway>,
     responses: mpsc::Sender<Result<v1::RunResponse, Status>>,
     _place: Held,
     _counted: Counted,
@@ -307,10 +310,12 @@ impl Runner {
             return Err(refused("rules", words));
         }
         let decisions = point.decisions;
-        let (branch, game) = self
-            .service
-            .recorded
-            .of_game_here(&self.caller, &point.game_id, move |lines, _| {
+        let recorded = &self.service.recorded;
+        let (caller, gateway) = (&self.caller, self.gateway.as_ref());
+        let lines = recorded.lines(caller, gateway, &point.game_id, |lines, _| lines);
+        let lines = lines.await?;
+        let (branch, game) = recorded
+            .with_place(Key::of_caller(caller), move || {
                 let branch = branch_of(&lines, decisions)?;
                 let game = branch.played(branch.later_deals.unwrap_or(Seed([0; 32])));
                 Ok((branch, game))

@@ -221,6 +221,11 @@ impl CallLimits {
         self.calls.charge(key, cost);
     }
 
+    /// Takes the place of a stream that is already open for others; `None` if the caller has too many.
+    pub fn share_stream(&self, key: Key) -> Option<Held> {
+        self.streams.try_take(key)
+    }
+
     /// Checks whether a caller may try a join code.
     ///
     /// # Errors

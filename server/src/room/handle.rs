@@ -10,8 +10,8 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, Ruled, SeatAction,
-    SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotAttached, Ruled,
+    SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
@@ -86,11 +86,14 @@ impl Handle {
             .await
     }
 
-    /// Attaches a stream to a seat; `None` if the room has no such ticket.
+    /// Attaches a stream to a seat.
     ///
     /// # Errors
-    /// The room is gone.
-    pub async fn attach(&self, request: AttachRequest) -> Result<Option<AttachedSeat>, RoomGone> {
+    /// The room is gone, or (inner result) the stream is not attached.
+    pub async fn attach(
+        &self,
+        request: AttachRequest,
+    ) -> Result<Result<AttachedSeat, NotAttached>, RoomGone> {
         self.ask(|reply| Message::Attach(Box::new(request), reply))
             .await
     }
@@ -279,6 +282,13 @@ impl Handle {
     /// The room is gone, or (inner result) too many watch it.
     pub async fn watch_table(&self, secret: [u8; 32]) -> Result<Option<Watching>, RoomGone> {
         self.ask(|reply| Message::WatchTable(secret, reply)).await
+    }
+
+    /// Gives up a seat whose participant has left the tournament: a substitute plays until the end. A
+    /// game that has not started is aborted.
+    pub async fn retire(&self, seat: Seat) {
+        // If the room is gone, there is nothing to do.
+        let _ = self.mailbox.send(Message::Retire(seat)).await;
     }
 
     /// Closes the room because its tournament is closed, or for the server's operator; a running

@@ -60,6 +60,8 @@ pub struct AttachRequest {
     pub options: DeliveryOptions,
     /// Whether the client is connected to another node, which measures the time of its answers.
     pub by_gateway: bool,
+    /// Which connection may lose the seat.
+    pub supersedes: Supersedes,
     /// The seat's contribution to the game seed.
     pub entropy: Vec<u8>,
     /// When the request was read.
@@ -68,6 +70,37 @@ pub struct AttachRequest {
     pub detached: Arc<AtomicBool>,
     /// The seat's ticket, if the server attaches the client.
     pub assigned_ticket: Option<Token>,
+}
+
+/// Which connection an attachment takes its seat or participant from. One that comes through another
+/// node may be late: its client may have attached on a newer stream, which must keep the seat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Supersedes {
+    /// Any.
+    Any,
+    /// This one alone. Its gateway knew of it when the client's stream was open.
+    Only(Option<u64>),
+}
+
+impl Supersedes {
+    /// The connection that keeps the seat, if this one has it now.
+    pub fn kept_by(self, holder: Option<u64>) -> Option<u64> {
+        match self {
+            Self::Any => None,
+            Self::Only(other) => holder.filter(|_| holder != other),
+        }
+    }
+}
+
+/// Why a stream was not attached to a seat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotAttached {
+    /// The room has no such ticket.
+    TicketUnknown,
+    /// The client has left the stream.
+    StreamOver,
+    /// The connection with this number keeps the seat.
+    HeldBy(u64),
 }
 
 /// A seat that was attached to a stream.
@@ -146,7 +179,10 @@ pub type Watching = Result<watch::Receiver<SentState>, SpectateError>;
 /// A message to a room.
 pub(super) enum Message {
     Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
-    Attach(Box<AttachRequest>, oneshot::Sender<Option<AttachedSeat>>),
+    Attach(
+        Box<AttachRequest>,
+        oneshot::Sender<Result<AttachedSeat, NotAttached>>,
+    ),
     Lost(Seat, ConnectionId, Option<v1::DetachReason>),
     Do(Seat, ConnectionId, SeatAction, Instant),
     Act(
@@ -175,6 +211,8 @@ pub(super) enum Message {
         oneshot::Sender<Option<Ruled>>,
     ),
     WatchTable([u8; 32], oneshot::Sender<Option<Watching>>),
+    /// The participant of a seat has left the tournament.
+    Retire(Seat),
     Abort(AbortReason),
     Suspend,
     /// Delivers and sets the timer again: a stream has space, or an answer was handled in place.

@@ -17,8 +17,8 @@ mod tests;
 
 pub use handle::{Handle, RoomGone, spawn_room};
 pub use message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, ReportRefusal, Ruled, SeatAction,
-    SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, NotAttached, ReportRefusal, Ruled,
+    SeatAction, SpectateError, SpectateRequest, Supersedes, Watching,
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use table_view::SentState;

@@ -14,7 +14,7 @@ use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_record::convert::{observation_to_proto, seat_number};
 use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
-use chefshat_room::{ConnectionId, Core};
+use chefshat_room::{Awaited, ConnectionId, Core};
 
 use crate::convert;
 use crate::limits::Held;
@@ -55,6 +55,8 @@ pub struct Subscriber {
     position: usize,
     /// Updates for the next flush.
     pending: Updates,
+    /// Whom the game waited for when that was last sent: the seat, its decision, whether it is away.
+    awaited: Option<(Seat, u64, bool)>,
     stalled: bool,
     ended: bool,
     role: Role,
@@ -171,6 +173,7 @@ impl Subscriber {
             on_space,
             position,
             pending: Updates::default(),
+            awaited: None,
             stalled: false,
             ended: false,
             role,
@@ -330,12 +333,16 @@ impl Subscriber {
             core.awaited()
                 .filter(|open| open.decision.seat == connection.seat && open.id != connection.sent)
         });
+        let awaited = self.awaited_of(core);
+        let key = awaited.map(|it| (it.seat, it.decision, it.away));
+        let awaits_another = !over && key != self.awaited;
         let backlog = visible - self.position;
         let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
         let due = decision.is_some()
             || urgent
             || over
             || self.stalled
+            || awaits_another
             || backlog >= MAX_PENDING_EVENTS
             || (at_once && (backlog > 0 || !self.pending.is_empty()));
         if !due {
@@ -349,6 +356,16 @@ impl Subscriber {
             self.add_events(core, public, end);
             if end < visible && !self.flush() {
                 return self.keeps_up(visible);
+            }
+        }
+        if awaits_another {
+            self.awaited = key;
+            let awaited = convert::awaited_to_proto(awaited, now);
+            match &self.role {
+                Role::Seat(connection) => {
+                    (self.pending).add(connection.handle, Update::Awaited(awaited));
+                }
+                Role::Spectator { .. } => self.pending.add_spectator_awaited(&awaited),
             }
         }
         if let (Some(open), Role::Seat(connection)) = (decision, &mut self.role) {
@@ -374,6 +391,16 @@ impl Subscriber {
             }
         }
         !self.ended && !self.outbox_is_abandoned_by_spectator()
+    }
+
+    /// Whom the game waits for, if the subscriber is told: not its own seat.
+    fn awaited_of(&self, core: &Core) -> Option<Awaited> {
+        let own = match &self.role {
+            Role::Seat(connection) if connection.options.at_once => Some(connection.seat),
+            Role::Spectator { .. } if core.header().policy.spectator_delay_decisions == 0 => None,
+            Role::Seat(_) | Role::Spectator { .. } => return None,
+        };
+        (core.awaited_in_public()).filter(|awaited| Some(awaited.seat) != own)
     }
 
     /// Adds the events up to a position to the pending updates.
@@ -533,7 +560,9 @@ fn spectator_view(core: &Core) -> Viewer {
 /// the end of a Shift and of the game, corrections and pauses at a physical table.
 pub fn is_urgent(event: &RoomEvent, seat: Seat) -> bool {
     match event {
-        RoomEvent::Substituted(own) | RoomEvent::Returned(own) => *own == seat,
+        RoomEvent::Substituted(own) | RoomEvent::Retired(own) | RoomEvent::Returned(own) => {
+            *own == seat
+        }
         RoomEvent::GameAborted(_) | RoomEvent::Correction(_) | RoomEvent::Paused(_) => true,
         RoomEvent::Game(game) => match &game.event {
             Event::SeatFinished { seat: own, .. } => *own == seat,

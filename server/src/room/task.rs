@@ -29,8 +29,8 @@ use tracing::{Instrument as _, debug, error, info, warn};
 
 use super::clients::Clients;
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotifySpace,
-    ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotAttached,
+    NotifySpace, ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::observed::Observed;
 use super::resting::Resting;
@@ -51,6 +51,9 @@ use crate::store::{Journal, Signed, Store, StoreError};
 
 /// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;
+/// How often a node reads a journal to sign the record, and the pause before the next time.
+const SIGNING_ATTEMPTS: u32 = 10;
+const SIGNING_PAUSE: Duration = Duration::from_secs(1);
 /// Most events that a room of built-in agents keeps for spectators who come late. Its record has
 /// all of them.
 const MAX_EVENTS_UNREAD: usize = 16_384;
@@ -153,7 +156,7 @@ enum Release {
         Box<AttachRequest>,
         Seat,
         ConnectionId,
-        oneshot::Sender<Option<AttachedSeat>>,
+        oneshot::Sender<Result<AttachedSeat, NotAttached>>,
     ),
     Result(Seat, ConnectionId, v1::AnswerResult),
     Refuse(Seat, ConnectionId, v1::Refused),
@@ -527,6 +530,7 @@ impl Room {
                 true => self.releases.push(Release::WatchTable(reply)),
                 false => answer(reply, None),
             },
+            Message::Retire(seat) => self.retire(seat),
             Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::Suspend => self.suspended = true,
             Message::Wake => {}
@@ -581,12 +585,17 @@ impl Room {
     fn attach(
         &mut self,
         request: Box<AttachRequest>,
-        reply: oneshot::Sender<Option<AttachedSeat>>,
+        reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
     ) {
         let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
-            answer(reply, None);
-            return;
+            return answer(reply, Err(NotAttached::TicketUnknown));
         };
+        if !request.outbox.is_open() {
+            return answer(reply, Err(NotAttached::StreamOver));
+        }
+        if let Some(holder) = request.supersedes.kept_by(self.holder(seat)) {
+            return answer(reply, Err(NotAttached::HeldBy(holder)));
+        }
         let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
         let handed = self.handed();
         let (entropy, arrived) = (request.entropy.clone(), self.clock.at(request.arrived));
@@ -610,6 +619,19 @@ impl Room {
         {
             subscriber.detach(reason);
         }
+    }
+
+    /// Gives up a seat whose participant has left the tournament.
+    fn retire(&mut self, seat: Seat) {
+        let handed = self.handed();
+        if let Some(mut subscriber) = self.connections[seat.index()].take() {
+            let connection = subscriber.connection().map(|attached| attached.id);
+            if let Some(connection) = connection {
+                self.core.lost(self.now, seat, connection, handed);
+            }
+            subscriber.detach(v1::DetachReason::Requested);
+        }
+        self.core.retire(self.now, seat);
     }
 
     fn is_current(&self, seat: Seat, connection: ConnectionId) -> bool {
@@ -835,7 +857,7 @@ impl Room {
             Release::Left(reply, left) => {
                 answer(reply, Some(left.map(|()| convert::describe(&self.core))));
             }
-            Release::Describe(reply) => answer(reply, convert::describe(&self.core)),
+            Release::Describe(reply) => answer(reply, convert::describe_at(&self.core, self.now)),
             Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
             Release::Reported(reply, outcome) => {
                 let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));
@@ -857,7 +879,7 @@ impl Room {
         request: AttachRequest,
         seat: Seat,
         connection: ConnectionId,
-        reply: oneshot::Sender<Option<AttachedSeat>>,
+        reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
     ) {
         let participant = self.core.standing(seat).participant;
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
@@ -884,7 +906,24 @@ impl Room {
             connection,
             stamp,
         };
-        answer(reply, Some(attached));
+        answer(reply, Ok(attached));
+    }
+
+    /// The number of the newest connection of a seat, attached or about to be.
+    fn holder(&self, seat: Seat) -> Option<u64> {
+        let mut attaching = self
+            .releases
+            .iter()
+            .rev()
+            .filter_map(|release| match release {
+                Release::Attach(_, of, connection, _) if *of == seat => Some(connection.0),
+                _ => None,
+            });
+        let attached = || {
+            let subscriber = self.connections[seat.index()].as_ref()?;
+            Some(subscriber.connection()?.id.0)
+        };
+        attaching.next().or_else(attached)
     }
 
     fn current(&mut self, seat: Seat, connection: ConnectionId) -> Option<&mut Subscriber> {
@@ -931,11 +970,16 @@ impl Room {
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
         let signed = match has_record {
             true => self.sign().await,
-            false => None,
+            false => Ok(None),
         };
-        let finished = self.journal.finish(summary.map(Box::new), signed);
-        let finished = unless_lost(&self.context, &self.fence, header.room_id, finished);
-        if let Err(error) = finished.await {
+        let finished = match signed {
+            Ok(signed) => {
+                let finished = self.journal.finish(summary.map(Box::new), signed);
+                unless_lost(&self.context, &self.fence, header.room_id, finished).await
+            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = finished {
             self.over_since = None;
             self.fail(&error);
             return false;
@@ -956,13 +1000,38 @@ impl Room {
         true
     }
 
-    /// Signs the record of the game.
-    async fn sign(&mut self) -> Option<Signed> {
+    /// Signs the record of the game. If its journal cannot be read, the record stays unsigned; a
+    /// node, whose database may be away, tries again before.
+    ///
+    /// # Errors
+    /// The room was fenced meanwhile.
+    async fn sign(&mut self) -> Result<Option<Signed>, StoreError> {
         let background = self.core.is_built_in_only();
         let background = background.then_some((&*self.context.background, self.context.owner));
-        let header = Arc::clone(self.core.header());
-        let journal = &mut *self.journal;
-        self.context.signer.sign(header, journal, background).await
+        let header = self.core.header();
+        let (game, unit) = (header.game_id, header.unit());
+        let mut attempts = match self.context.lease {
+            Some(_) => SIGNING_ATTEMPTS,
+            None => 1,
+        };
+        loop {
+            let header = Arc::clone(self.core.header());
+            let journal = &mut *self.journal;
+            let signing = self.context.signer.sign(header, journal, background);
+            let error = match signing.await {
+                Ok(signed) => return Ok(signed),
+                Err(error) => error,
+            };
+            attempts -= 1;
+            if attempts == 0 {
+                error!(%game, %error, "a record could not be signed; it stays unsigned");
+                return Ok(None);
+            }
+            tokio::select! {
+                () = self.fence.cancelled() => return Err(StoreError::Fenced(unit)),
+                () = tokio::time::sleep(SIGNING_PAUSE) => {}
+            }
+        }
     }
 
     /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that

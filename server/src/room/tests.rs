@@ -19,7 +19,7 @@ use tokio_util::task::TaskTracker;
 use super::subscriber::DeliveryOptions;
 use super::{
     AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, RoomWatcher, SeatAction, SpectateError,
-    SpectateRequest, TaskContext, spawn_room,
+    SpectateRequest, Supersedes, TaskContext, spawn_room,
 };
 use crate::clock::RoomClock;
 use crate::limits::{Background, Key, Searches, Shares};
@@ -160,6 +160,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
                 from: 0,
             },
             by_gateway: false,
+            supersedes: Supersedes::Any,
             entropy: Vec::new(),
             arrived: Instant::now(),
             detached: Arc::default(),

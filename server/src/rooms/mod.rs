@@ -40,6 +40,9 @@ use table::{Entry, Table};
 /// When it is worth trying again to create a room.
 const RETRY_ROOMS: Duration = Duration::from_secs(30);
 
+/// How many join codes are tried for a room or tournament: another one of the cluster may have a code.
+pub(crate) const CODES_TRIED: u32 = 3;
+
 /// The settings of a new room.
 #[derive(Debug)]
 pub struct NewRoom {
@@ -249,7 +252,7 @@ impl Rooms {
             .by_number
             .range(..before.unwrap_or(u64::MAX))
             .rev()
-            .filter(|(_, entry)| over.is_none_or(|over| entry.over == over))
+            .filter(|(_, entry)| entry.listed && over.is_none_or(|over| entry.over == over))
             .take(count)
             .map(|(number, entry)| (*number, entry.handle.clone()))
             .collect()
@@ -529,7 +532,7 @@ impl Reservation {
         let server_seed = seating.and_then(|seating| seating.server_seed);
         let owner = self.owner;
         let room_id = owner.room;
-        let header = Arc::new(GameHeader {
+        let mut header = Arc::new(GameHeader {
             room_id,
             game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
             name: new.name,
@@ -553,17 +556,28 @@ impl Reservation {
             tournament: seating.map(|seating| seating.game),
             table: new.physical.then(|| Token::of_table(&owner).hash()),
         });
-        let mut core = Core::new(Arc::clone(&header));
-        for (seat, participant) in at_table(&header) {
-            core.seat(seat, participant);
-        }
-        for (seat, participant) in new.seating.into_iter().flat_map(|it| it.participants) {
-            core.seat(Seat::new(seat), participant);
-        }
-        // The participants are committed with the room, so it never exists without them.
-        let seated = std::mem::take(core.pending());
+        let participants = new.seating.map_or_else(BTreeMap::new, |it| it.participants);
         let store = &rooms.context.store;
-        let mut journal = store.create(Arc::clone(&header), seated).await?;
+        let mut codes_left = CODES_TRIED;
+        let (core, mut journal) = loop {
+            let mut core = Core::new(Arc::clone(&header));
+            for (seat, participant) in at_table(&header) {
+                core.seat(seat, participant);
+            }
+            for (seat, participant) in &participants {
+                core.seat(Seat::new(*seat), participant.clone());
+            }
+            // The participants are committed with the room, so it never exists without them.
+            let seated = std::mem::take(core.pending());
+            match store.create(Arc::clone(&header), seated).await {
+                Ok(journal) => break (core, journal),
+                Err(StoreError::Taken(_)) if codes_left > 1 => {
+                    codes_left -= 1;
+                    Arc::make_mut(&mut header).join_code = join_code();
+                }
+                Err(error) => return Err(error.into()),
+            }
+        };
         // Checked and added under one lock, so that a shutdown in between cannot miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
@@ -584,6 +598,7 @@ impl Reservation {
                 header: Arc::clone(&header),
                 over: false,
                 suspended: false,
+                listed: true,
                 place: self.place.take(),
             });
             return Ok(Created {

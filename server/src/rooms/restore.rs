@@ -59,7 +59,7 @@ impl Rooms {
         for game in games {
             let id = game.header.game_id;
             let goes_on = !game.concluded;
-            match self.resume(game, &mut players).await {
+            match self.resume(game, &mut players, true).await {
                 Ok(()) => resumed += usize::from(goes_on),
                 Err(problem) => {
                     error!(game = %id, %problem, "a game cannot be resumed; it is left unchanged");
@@ -69,7 +69,29 @@ impl Rooms {
         resumed
     }
 
-    async fn resume(&self, game: ResumableGame, players: &mut Players) -> Result<(), String> {
+    /// Shows the end of a game whose node is gone, because somebody asked for its room. Other rooms
+    /// that are over make space for it. It is in no list: others may show it too.
+    pub(crate) async fn show_ended(&self, game: ResumableGame) {
+        let (room, id) = (game.header.room_id, game.header.game_id);
+        {
+            let mut table = self.lock();
+            // What stopped here before its end was known.
+            if let Some(number) = table.numbers.get(&room).copied() {
+                table.remove(number);
+            }
+            table.make_space(self.max_rooms);
+        }
+        if let Err(problem) = self.resume(game, &mut Players::default(), false).await {
+            error!(game = %id, %problem, "the end of a game cannot be shown");
+        }
+    }
+
+    async fn resume(
+        &self,
+        game: ResumableGame,
+        players: &mut Players,
+        listed: bool,
+    ) -> Result<(), String> {
         let mut header = game.header;
         if header.rules_version != RULES_VERSION {
             return Err(format!(
@@ -104,6 +126,7 @@ impl Rooms {
             durable: true,
             over: game.concluded,
             suspended: false,
+            listed,
             place: None,
         });
         Ok(())

@@ -54,6 +54,8 @@ pub(super) struct Entry {
     /// The room has ended but its game resumes when the server is restarted. It stays in the table,
     /// so that clients are told to try again rather than that the room is unknown.
     pub(super) suspended: bool,
+    /// Whether lists show it.
+    pub(super) listed: bool,
     /// Its place among its creator's rooms, until its game is over.
     pub(super) place: Option<Held>,
 }

@@ -70,6 +70,7 @@ fn create_room() -> v1::CreateRoomRequest {
                 kind: v1::ParticipantKind::Human.into(),
                 decision_time_ms: Some(5_000),
                 bank_ms: Some(0),
+                absence_time_ms: Some(1_000),
             }],
             ..v1::RoomPolicy::default()
         }),

@@ -6,8 +6,10 @@
 
 use std::time::Duration;
 
+use chefshat_cluster::LeaseTimes;
 pub use chefshat_cluster::{Epoch, NodeId};
 use futures::future::BoxFuture;
+use futures::{FutureExt as _, TryFutureExt as _};
 
 use super::tournaments::StoredTournament;
 use super::{ResumableGame, Store, StoreError};
@@ -99,6 +101,9 @@ pub struct Unit {
 ///
 /// Times are those of the database's clock.
 pub trait ClusterStore: Store {
+    /// The times of all leases.
+    fn lease(&self) -> LeaseTimes;
+
     /// Adds this server as a node, whose lease begins now. Called again, for example after the node
     /// was removed because it was away for long, it becomes a new node.
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>>;
@@ -109,21 +114,41 @@ pub trait ClusterStore: Store {
 
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
     /// epochs, in an order of this node's own, so that several nodes share them; only such that this
-    /// version of the program can resume. Ephemeral rooms of such nodes are removed.
+    /// version of the program can resume.
     fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>>;
 
-    /// Takes an orphan over if it still has the epoch that was seen: raises its epoch and adds "the
-    /// server was restarted" to the journal of each of its rooms that is not over, in one commit.
-    /// Returns the new epoch; `None` if it is not an orphan any more, or not at this epoch.
-    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>>;
+    /// Waits until another node releases a unit and names this one as its next owner; returns the
+    /// unit and its epoch. Some are missed: they are found as orphans.
+    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)>;
+
+    /// Removes what has been over for long, and the ephemeral rooms of nodes whose leases have
+    /// expired.
+    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>>;
+
+    /// Takes orphans over that still have the epochs that were seen: raises the epoch and adds "the
+    /// server was restarted" to the journal of each room that is not over, in one commit for each
+    /// unit or for several. Returns their new epochs, in the same order; `None` for a unit that is
+    /// not an orphan any more, or not at this epoch, or that this version cannot resume.
+    fn claim_all(
+        &self,
+        orphans: Vec<(Id, Epoch)>,
+    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>>;
+
+    /// Takes one orphan over. See [`ClusterStore::claim_all`].
+    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+        let claimed = self.claim_all(vec![(unit, seen)]);
+        claimed
+            .map_ok(|mut claimed| claimed.pop().flatten())
+            .boxed()
+    }
 
     /// Reads a unit that this node owns at this epoch, with journals that write at this epoch;
     /// `None` if it does not (any more). From here on, what is written for its tournament is
     /// written at this epoch, so what ran before at another one must have ended.
     fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>>;
 
-    /// Gives up a unit that this node owns at this epoch, so that others may claim it at once. The
-    /// last append to each of its journals must have been answered.
+    /// Gives up a unit that this node owns at this epoch, so that others may claim it at once, and
+    /// names one that is to. The last append to each of its journals must have been answered.
     fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>>;
 
     /// Removes this node if it owns nothing. Returns whether it is removed.
@@ -138,14 +163,14 @@ pub trait ClusterStore: Store {
         join_code: &'a str,
     ) -> BoxFuture<'a, Result<Option<Location>, StoreError>>;
 
+    /// Where the room of a game is that is not over.
+    fn locate_game(&self, game: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+
     /// The room of a durable game that is over, to show its end, if it has not been removed yet.
     fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
 
     /// Everything stored about a tournament, without becoming its owner.
     fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>>;
-
-    /// Number of rows of a tournament's journal; 0 if it does not exist.
-    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>>;
 
     /// The nodes that have a lease.
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>>;

@@ -3,6 +3,7 @@
 
 pub mod cluster;
 mod codec;
+mod ephemeral;
 mod failing;
 mod form;
 mod memory;

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_record::outcome;
 use chefshat_tournament::Ended;
@@ -12,7 +13,7 @@ use futures::future::join_all;
 use tokio::time::Instant;
 use tracing::warn;
 
-use super::handle::Call;
+use super::message::Call;
 use super::task::Task;
 use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
@@ -31,6 +32,7 @@ impl Task {
         }
         self.without_room.insert(game);
         self.seen.remove(&game);
+        self.retired.retain(|(other, _)| *other != game);
         self.push(TournamentEntry::Placed {
             game,
             room_id,
@@ -159,6 +161,29 @@ impl Task {
             }
         }
         Ok(())
+    }
+
+    /// Gives up the seats of participants who have left the tournament, or whose place somebody else
+    /// has taken.
+    pub(super) fn retire_seats(&mut self) {
+        let core = &self.state.core;
+        for number in core.playing() {
+            let game = &core.games()[number];
+            if game.left.is_empty() || self.without_room.contains(&number) {
+                continue;
+            }
+            let Some((room, _)) = self.state.placed.get(&number) else {
+                continue;
+            };
+            for (seat, participant) in game.seats.iter().enumerate() {
+                if game.left.contains(participant)
+                    && self.retired.insert((number, *participant))
+                    && let Some(room) = self.rooms.get(*room)
+                {
+                    tokio::spawn(async move { room.retire(Seat::new(seat)).await });
+                }
+            }
+        }
     }
 
     /// Notifies the connected participants of a game of its room.

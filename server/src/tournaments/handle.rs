@@ -1,102 +1,24 @@
 //! The handle of one tournament: what others can read of it, and messages to its task.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard};
 
 use chefshat_proto::v1;
-use chefshat_tournament::{BeginProblem, Entrant, GameState, JoinProblem, Tournament};
+use chefshat_tournament::{BeginProblem, Change, GameState, JoinProblem, State, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
+use super::message::{Call, Connection, Entry, JoinRefusal, Message, Stopped};
 use super::shared::{AsOf, Shared};
 use crate::access::{Secrets, Standing};
 use crate::convert::{self, TournamentPlan};
 use crate::limits::Key;
-use crate::outbox::{Outbox, StreamEnd};
 use crate::rooms::Rooms;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
-
-/// A message to a stream that is attached to a participant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Call {
-    /// Its game is played in this room.
-    Seat(Id),
-    /// A newer connection has taken over the participant.
-    Superseded,
-    /// The tournament is over.
-    Over,
-}
-
-/// A stream that is attached to a participant.
-#[derive(Clone)]
-pub struct Connection {
-    /// Number of the participant's attachment on the stream.
-    pub handle: u32,
-    /// Sends the participant's calls.
-    pub calls: mpsc::Sender<(u32, Call)>,
-    /// Cancels the stream.
-    pub outbox: Arc<Outbox>,
-}
-
-impl Connection {
-    /// Sends a call; `false` if the stream is gone or too many calls wait. In the latter case the
-    /// stream is ended, so that its client reconnects.
-    pub(super) fn call(&self, call: Call) -> bool {
-        let sent = self.calls.try_send((self.handle, call)).is_ok();
-        if !sent {
-            self.outbox.cut(StreamEnd::CallsNotTaken);
-        }
-        sent
-    }
-}
-
-/// A request to join.
-#[derive(Debug)]
-pub struct Entry {
-    /// Display name.
-    pub name: String,
-    /// Kind of participant.
-    pub kind: ParticipantKind,
-    /// Most games it can play at a time.
-    pub max_games: usize,
-    /// Declares that it is stateless.
-    pub stateless: bool,
-    /// Whether it plays at a physical table. Then nobody uses its ticket.
-    pub at_table: bool,
-    /// Identifies repetitions of the request.
-    pub request_id: Option<[u8; 32]>,
-}
-
-impl Entry {
-    pub(super) fn entrant(&self) -> Entrant {
-        Entrant {
-            name: self.name.clone(),
-            kind: self.kind,
-            built_in: None,
-            filler: false,
-            stateless: self.stateless,
-            max_games: self.max_games,
-            at_table: self.at_table,
-        }
-    }
-}
-
-/// Why a participant cannot join.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum JoinRefusal {
-    /// The rules of the tournament refuse it.
-    #[error(transparent)]
-    Rules(#[from] JoinProblem),
-    /// The request id was used for another participant.
-    #[error(
-        "this request id was used with another name, kind, number of games or statelessness; draw a new one"
-    )]
-    RequestIdUsed,
-}
 
 /// Why a game has no physical table now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -113,18 +35,6 @@ pub enum TableProblem {
     /// It is counted or void.
     #[error("the game is over")]
     Over,
-}
-
-/// The tournament's task has stopped because the server ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped;
-
-pub(super) enum Message {
-    Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
-    Begin(oneshot::Sender<Result<(), BeginProblem>>),
-    Close(oneshot::Sender<()>),
-    Enter(usize, u64, Connection),
-    Left(usize, u64),
 }
 
 /// The state of a tournament. Its task has one with pending changes; the handle has one with only
@@ -177,7 +87,21 @@ impl TournamentState {
     /// Applies an entry of the tournament's journal.
     pub(super) fn apply(&mut self, entry: &TournamentEntry) {
         match entry {
-            TournamentEntry::Change(change) => self.core.fold(change),
+            TournamentEntry::Change(change) => {
+                match change {
+                    Change::Withdrawn {
+                        participant,
+                        removed,
+                    } if *removed || self.core.state() == State::Open => {
+                        self.tickets.remove(participant);
+                    }
+                    Change::Replaced { participant, .. } => {
+                        self.tickets.remove(participant);
+                    }
+                    _ => {}
+                }
+                self.core.fold(change);
+            }
             TournamentEntry::Ticket {
                 participant,
                 ticket,
@@ -349,7 +273,12 @@ impl TournamentHandle {
 
     /// The ticket for a request to join.
     pub(super) fn ticket_of(&self, entry: &Entry) -> Token {
-        match &entry.request_id {
+        self.ticket_with(entry.request_id.as_ref())
+    }
+
+    /// The ticket for a request with this id, or a random one.
+    pub(super) fn ticket_with(&self, request_id: Option<&[u8; 32]>) -> Token {
+        match request_id {
             Some(id) => Token::of_request(self.header.id, &self.header.owner, id),
             None => Token::random(self.header.id),
         }
@@ -407,6 +336,7 @@ impl TournamentHandle {
             games_playing: convert::number(core.playing().count()),
             games: convert::number(core.games_expected()),
             created_at_ms: self.header.created_at_ms,
+            paused: core.is_paused(),
         }
     }
 
@@ -415,6 +345,11 @@ impl TournamentHandle {
         let state = self.committed();
         let numbers = (from..state.core.games().len()).take(most);
         numbers.map(|number| self.game(&state, number)).collect()
+    }
+
+    /// One of its games, as it is now.
+    pub fn game_now(&self, number: usize) -> Option<v1::TournamentGame> {
+        self.games(number, 1).pop()
     }
 
     /// One of its games, with its result.
@@ -497,7 +432,7 @@ impl TournamentHandle {
         (self.committed.lock()).expect("no code that holds this lock can panic")
     }
 
-    async fn ask<T>(
+    pub(super) async fn ask<T>(
         &self,
         message: impl FnOnce(oneshot::Sender<T>) -> Message,
     ) -> Result<T, Stopped> {

@@ -1,9 +1,12 @@
 //! The tournaments of a server: creates, finds and resumes them. `chefshat_tournament` decides
 //! pairings and results; `task` runs one tournament.
 
+mod by_hand;
+mod ended;
 mod games;
 mod handle;
 mod leaderboard;
+mod message;
 mod shared;
 mod table;
 mod task;
@@ -16,20 +19,21 @@ use std::time::Duration;
 
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
-use tokio::sync::{Notify, mpsc, watch};
+use tokio::sync::{Mutex as AsyncMutex, Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-pub use handle::{Call, Connection, Entry, JoinRefusal, Stopped, TableProblem, TournamentHandle};
+pub use handle::{TableProblem, TournamentHandle};
 pub use leaderboard::Leaderboard;
+pub use message::{ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Stopped};
 pub use shared::ComputeError;
 
 use crate::clock::since_epoch_ms;
 use crate::cluster::News;
-use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
+use crate::config::{MAX_START_AHEAD, MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
 use crate::limits::{Held, Key, Places, Refused};
-use crate::rooms::Rooms;
+use crate::rooms::{CODES_TRIED, Rooms};
 use crate::store::StoreError;
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
@@ -40,6 +44,8 @@ use task::{Stop, Task};
 
 /// When it is worth trying again to create a tournament.
 const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
+/// Most rooms and tournaments that are over and are read at a time.
+const READ_AT_ONCE: usize = 4;
 
 /// Why a tournament was not created.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +83,8 @@ pub struct Tournaments {
     /// Notified when the creation of a tournament has ended.
     created: Notify,
     places: Arc<Places>,
+    /// Locked while something that is over is read.
+    reading: [AsyncMutex<()>; READ_AT_ONCE],
 }
 
 impl Tournaments {
@@ -90,6 +98,7 @@ impl Tournaments {
             table: Mutex::default(),
             created: Notify::new(),
             places,
+            reading: Default::default(),
         })
     }
 
@@ -126,6 +135,7 @@ impl Tournaments {
                 None => created.await,
             }
         };
+        check_start(plan.start_at_ms)?;
         // Runs to completion even if the caller is cancelled: a half-created tournament would be
         // stored and restored with the server.
         let creating = self
@@ -143,8 +153,10 @@ impl Tournaments {
     /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let stored = self.rooms.store().tournaments(MAX_TOURNAMENTS).await?;
-        let playing = stored.into_iter().map(|stored| self.resume(stored));
-        let unfinished: usize = playing.map(usize::from).sum();
+        let mut unfinished = 0;
+        for stored in stored {
+            unfinished += usize::from(self.resume(stored).await);
+        }
         if unfinished > 0 {
             info!(tournaments = unfinished, "tournaments resumed");
         }
@@ -153,10 +165,17 @@ impl Tournaments {
 
     /// Resumes a tournament, whose rooms must be restored already. Returns whether it is playing. One
     /// that cannot be resumed is logged and left unchanged.
-    pub(crate) fn resume(&self, stored: StoredTournament) -> bool {
+    pub(crate) async fn resume(&self, stored: StoredTournament) -> bool {
         let id = stored.header.id;
-        match restored(&stored) {
-            Ok((plan, state)) => {
+        // A long one takes a while, and others are played meanwhile.
+        let restoring = tokio::task::spawn_blocking(move || {
+            restored(&stored).map(|(plan, state)| (stored, plan, state))
+        });
+        let restored = restoring.await;
+        match restored.unwrap_or_else(|problem| Err(problem.to_string())) {
+            // Another request has shown its end meanwhile.
+            Ok(_) if self.get(id).is_some() => false,
+            Ok((stored, plan, state)) => {
                 let is_playing = state.core.state() == State::Playing;
                 let charged = (Key::Tournament(id), None);
                 self.start_task(stored.header, stored.rows, plan, state, charged);
@@ -310,6 +329,26 @@ impl Tournaments {
     }
 }
 
+/// Checks when a new tournament starts by itself.
+fn check_start(at_ms: Option<u64>) -> Result<(), SettingsProblem> {
+    let Some(at_ms) = at_ms else { return Ok(()) };
+    let now_ms = since_epoch_ms();
+    let latest = now_ms.saturating_add(millis(MAX_START_AHEAD));
+    let problem = match at_ms {
+        at_ms if at_ms <= now_ms => "this time has passed; choose a later one, or none",
+        at_ms if at_ms > latest => "more than 366 days ahead; choose an earlier time",
+        _ => return Ok(()),
+    };
+    Err(SettingsProblem {
+        field: "start_at_ms",
+        problem: problem.to_owned(),
+    })
+}
+
+fn millis(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}
+
 /// Space in the table for a tournament that is being created.
 struct Reservation {
     tournaments: Arc<Tournaments>,
@@ -357,7 +396,7 @@ impl Reservation {
         let place = self.place.take();
         let tournaments = &self.tournaments;
         let owner = self.owner;
-        let header = TournamentHeader {
+        let mut header = TournamentHeader {
             id: owner.room,
             settings: convert::settings_to_proto(&name, &plan),
             created_at_ms: since_epoch_ms(),
@@ -368,9 +407,17 @@ impl Reservation {
         let built_in = built_in(&plan).into_iter().map(Change::Joined);
         let entries: Vec<_> = built_in.map(TournamentEntry::Change).collect();
         let store = tournaments.rooms.store();
-        store
-            .create_tournament(Arc::new(header.clone()), entries.clone())
-            .await?;
+        let mut codes_left = CODES_TRIED;
+        loop {
+            let created = store.create_tournament(Arc::new(header.clone()), entries.clone());
+            match created.await {
+                Err(StoreError::Taken(_)) if codes_left > 1 => {
+                    codes_left -= 1;
+                    header.join_code = join_code();
+                }
+                created => break created?,
+            }
+        }
         let mut state = TournamentState::new(core);
         entries.iter().for_each(|entry| state.apply(entry));
         if let Some(lease) = tournaments.rooms.lease() {

@@ -43,6 +43,7 @@ pub(super) struct Mark {
     pub(super) participants: usize,
     pub(super) games: usize,
     pub(super) over: usize,
+    pub(super) by_hand: u32,
 }
 
 /// The last computed value.

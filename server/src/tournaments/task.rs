@@ -11,11 +11,11 @@ use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use super::handle::{
-    Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
-};
+use super::handle::{TournamentHandle, TournamentState};
+use super::message::{Call, Connection, Entry, JoinRefusal, Message};
+use crate::clock::since_epoch_ms;
 use crate::cluster::News;
-use crate::config::TOURNAMENT_OPEN_TIME;
+use crate::config::{TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::limits::Held;
 use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
@@ -56,12 +56,18 @@ pub(super) struct Task {
     deals: BTreeSet<u32>,
     /// Whether something visible has changed that is not committed.
     pub(super) has_changed: bool,
+    /// Participants whose seats in a game were given up, by game, since the server was started.
+    pub(super) retired: BTreeSet<(usize, usize)>,
     /// When a participant last joined, or the server was started.
     joined_at: Instant,
+    /// When it starts by itself.
+    start_at: Option<Instant>,
+    /// When it was paused, or the server was started.
+    paused_at: Option<Instant>,
     /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
     /// Answers that wait for a commit.
-    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
+    pub(super) replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     began: Instant,
     /// Its place among its creator's tournaments.
     _place: Option<Held>,
@@ -76,7 +82,12 @@ impl Task {
         place: Option<Held>,
     ) -> Self {
         let state = handle.committed().clone();
+        let start_in = (handle.plan.start_at_ms).map(|at| at.saturating_sub(since_epoch_ms()));
+        let now = Instant::now();
         Self {
+            start_at: start_in.map(|time| now + Duration::from_millis(time)),
+            paused_at: state.core.is_paused().then_some(now),
+            retired: BTreeSet::new(),
             state,
             handle,
             rooms,
@@ -187,18 +198,38 @@ impl Task {
         core.into_iter()
             .chain(self.retry)
             .chain(self.open_until())
+            .chain(self.start_at.filter(|_| self.state.core.can_begin()))
+            .chain(self.paused_until())
             .min()
+    }
+
+    /// Whether it starts by itself now.
+    fn is_due_to_start(&self) -> bool {
+        let is_time = self.start_at.is_some_and(|at| at <= Instant::now());
+        is_time && self.state.core.can_begin()
+    }
+
+    /// When a paused tournament resumes by itself.
+    fn paused_until(&self) -> Option<Instant> {
+        let paused_at = self.paused_at.filter(|_| self.state.core.is_paused());
+        Some(paused_at? + TOURNAMENT_PAUSE)
     }
 
     /// When a tournament that nobody starts or joins is closed.
     fn open_until(&self) -> Option<Instant> {
         let is_open = self.state.core.state() == State::Open;
-        is_open.then(|| self.joined_at + TOURNAMENT_OPEN_TIME)
+        let since = self.start_at.unwrap_or(self.joined_at).max(self.joined_at);
+        is_open.then(|| since + TOURNAMENT_OPEN_TIME)
     }
 
     fn expire(&mut self) {
         if (self.open_until()).is_some_and(|until| until <= Instant::now()) {
             self.close();
+        }
+        if (self.paused_until()).is_some_and(|until| until <= Instant::now())
+            && let Ok(Some(change)) = self.state.core.set_paused(false)
+        {
+            self.fold(change);
         }
     }
 
@@ -237,6 +268,12 @@ impl Task {
                     let _ = reply.send(started);
                 }));
             }
+            Message::ByHand(what, reply) => {
+                let changed = self.change_by_hand(what);
+                self.replies.push(Box::new(move || {
+                    let _ = reply.send(changed);
+                }));
+            }
             Message::Close(reply) => {
                 self.close();
                 self.replies.push(Box::new(move || {
@@ -257,7 +294,7 @@ impl Task {
             return answer;
         }
         let change = self.state.core.join(entry.entrant())?;
-        let participant = self.state.core.participants().len();
+        let participant = self.state.core.next_number();
         self.fold(change);
         self.joined_at = Instant::now();
         let ticket = token.hash();
@@ -277,10 +314,18 @@ impl Task {
     }
 
     fn enter(&mut self, participant: usize, number: u64, connection: Connection) {
+        if !connection.outbox.is_open() {
+            return;
+        }
+        let holder = self.connections.get(&participant).map(|(held, _)| *held);
+        if let Some(holder) = connection.supersedes.kept_by(holder) {
+            connection.call(Call::HeldBy(holder));
+            return;
+        }
         if let Some((_, older)) = self.connections.remove(&participant) {
             older.call(Call::Superseded);
         }
-        if self.handle.is_over() {
+        if self.handle.is_over() || self.state.core.is_withdrawn(participant) {
             connection.call(Call::Over);
             return;
         }
@@ -294,7 +339,7 @@ impl Task {
         }
     }
 
-    fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
+    pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
         self.state.set_connection(participant, connection);
         (self.handle.committed()).set_connection(participant, connection);
         self.has_changed = true;
@@ -325,7 +370,7 @@ impl Task {
     }
 
     /// Applies a change and adds it to the next commit.
-    fn fold(&mut self, change: Change) {
+    pub(super) fn fold(&mut self, change: Change) {
         let placed = match &change {
             Change::Called { game, .. } => Some(*game),
             _ => None,
@@ -333,10 +378,12 @@ impl Task {
         match &change {
             Change::Rescheduled { game, .. }
             | Change::Counted { game, .. }
+            | Change::Recalled { game }
             | Change::Voided { game } => {
                 self.deals.extend(self.state.core.games()[*game].deal);
             }
             Change::Finished | Change::Closed => self.deals = self.state.deals(),
+            Change::Paused => self.paused_at = Some(Instant::now()),
             _ => {}
         }
         self.push(TournamentEntry::Change(change));
@@ -384,6 +431,7 @@ impl Task {
             }
             if !no_more_games {
                 self.make_rooms().await?;
+                self.retire_seats();
             }
             if std::mem::take(&mut self.has_changed) || has_entries {
                 self.handle.changes.send_modify(|count| *count += 1);
@@ -396,6 +444,10 @@ impl Task {
 
     /// Computes what follows now. A draw of a round runs on another thread.
     async fn advance(&mut self) -> Result<(), StoreError> {
+        if self.is_due_to_start() {
+            let begun = self.off_thread(|core| core.begin()).await?;
+            self.fold_all(begun.unwrap_or_default());
+        }
         let now_ms = self.now_ms();
         // If no game is running, a round may be due, which takes a while to draw.
         let core = &self.state.core;

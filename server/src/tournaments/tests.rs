@@ -235,3 +235,142 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     assert_eq!(refused, Err(JoinRefusal::RequestIdUsed));
     assert_eq!(handle.describe().participants.len(), 5);
 }
+
+/// A server's tournaments in memory.
+fn in_memory() -> Arc<Tournaments> {
+    let store: Arc<dyn Store> = Arc::new(crate::store::MemoryStore::default());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    Tournaments::new(rooms, TaskTracker::new())
+}
+
+/// Waits until a tournament is in this state, however long that takes on the paused clock.
+async fn until(handle: &TournamentHandle, wanted: impl Fn(&Tournament) -> bool) {
+    let mut changes = handle.changes();
+    while !handle.read(&wanted) {
+        changes.changed().await.expect("its handle is here");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
+    let tournaments = in_memory();
+    let hour_ms = 3_600_000;
+    let settings = |agents, start_at_ms| chefshat_proto::v1::TournamentSettings {
+        start_at_ms,
+        built_in_agents: vec!["random".into(); agents],
+        ..built_in("Coppa")
+    };
+    let create = async |agents, start_at_ms| {
+        let plan = convert::tournament_plan(&settings(agents, start_at_ms), [7; 32]);
+        let plan = plan.expect("valid settings");
+        tournaments.create("Coppa", plan, None, Key::Local).await
+    };
+    let now_ms = since_epoch_ms();
+    let before = tokio::time::Instant::now();
+    let (handle, _) = create(4, now_ms + hour_ms).await.expect("made");
+    assert_eq!(handle.read(Tournament::state), State::Open);
+    until(&handle, |core| core.state() != State::Open).await;
+    assert!(before.elapsed() >= Duration::from_millis(hour_ms - 60_000));
+
+    // With too few it waits for the second.
+    let (handle, _) = create(1, since_epoch_ms() + 1_000).await.expect("made");
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    assert_eq!(handle.read(Tournament::state), State::Open);
+    let joined = handle.join(entrant("Ada")).await.expect("the task runs");
+    joined.expect("joined");
+    until(&handle, |core| core.state() != State::Open).await;
+
+    for refused in [now_ms - 1, since_epoch_ms() + 367 * 24 * hour_ms] {
+        let problem = create(4, refused)
+            .await
+            .expect_err("not a time to start at");
+        assert!(problem.to_string().starts_with("start_at_ms"), "{problem}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_pause_ends_by_itself() {
+    let tournaments = in_memory();
+    let settings = chefshat_proto::v1::TournamentSettings {
+        built_in_agents: Vec::new(),
+        no_show_time_ms: 86_400_000,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    for name in ["Ada", "Bo", "Cem", "Dia"] {
+        let joined = handle.join(entrant(name)).await.expect("the task runs");
+        joined.expect("joined");
+    }
+    handle.begin().await.expect("the task runs").expect("begun");
+    let paused = handle.change_by_hand(ByHand::SetPaused(true)).await;
+    assert!(paused.expect("the task runs").is_ok());
+    let before = tokio::time::Instant::now();
+    until(&handle, |core| !core.is_paused()).await;
+    assert!(before.elapsed() >= crate::config::TOURNAMENT_PAUSE);
+    // Nobody comes, so it ends without results.
+    until(&handle, |core| core.state() == State::Finished).await;
+}
+
+#[tokio::test]
+async fn the_ticket_of_a_participant_ends_with_its_place() {
+    let tournaments = in_memory();
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let join = async |name| {
+        let joined = handle.join(entrant(name)).await.expect("the task runs");
+        joined.expect("joined")
+    };
+    let change = async |what| handle.change_by_hand(what).await.expect("the task runs");
+    let known = |ticket: &Token| handle.participant_of(&ticket.secret);
+    let (ada, ticket) = join("Ada").await;
+    assert_eq!(known(&ticket), Some(ada));
+    let leaves = ByHand::Withdraw {
+        participant: ada,
+        removed: false,
+    };
+    assert_eq!(change(leaves).await, Ok(None));
+    assert_eq!(known(&ticket), None, "the place is free");
+    let (bo, bos) = join("Bo").await;
+    assert_eq!(bo, ada, "the number is taken again");
+    let by = || Newcomer::Somebody {
+        name: "Cem".into(),
+        kind: None,
+        max_games: 1,
+        stateless: true,
+        request_id: Some([3; 32]),
+    };
+    let replaced = change(ByHand::Replace {
+        participant: bo,
+        by: by(),
+    });
+    let cems = replaced.await.expect("replaced").expect("a ticket");
+    assert_eq!((known(&bos), known(&cems)), (None, Some(bo)));
+    // The response was lost.
+    let again = change(ByHand::Replace {
+        participant: bo,
+        by: by(),
+    });
+    assert_eq!(
+        again.await.map(|it| it.map(|it| it.secret)),
+        Ok(Some(cems.secret))
+    );
+    let other = change(ByHand::Replace {
+        participant: 0,
+        by: by(),
+    });
+    assert_eq!(other.await, Err(ByHandRefusal::RequestIdUsed));
+    handle.begin().await.expect("the task runs").expect("begun");
+    let leaves = ByHand::Withdraw {
+        participant: bo,
+        removed: false,
+    };
+    assert_eq!(change(leaves).await, Ok(None));
+    assert_eq!(known(&cems), Some(bo), "it may look at the results");
+}

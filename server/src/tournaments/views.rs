@@ -49,6 +49,7 @@ impl TournamentHandle {
             participants: core.participants().len(),
             games: core.games().len(),
             over: core.games_over(),
+            by_hand: core.changes_by_hand(),
         })
     }
 

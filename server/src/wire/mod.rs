@@ -41,6 +41,8 @@ pub mod peer {
 
 /// Field of the updates in a response.
 const RESPONSE_UPDATES: u32 = 1;
+/// Field of a contested handle in the `PlayResponse` of a node.
+const RESPONSE_CONTESTED: u32 = 2;
 /// Typical size of a response: a few events and a decision request, bytes.
 const USUAL_LENGTH: usize = 384;
 /// Initial size of the buffers of a stream, bytes: two usual messages.
@@ -52,6 +54,7 @@ const USUAL_PARTS: usize = 4;
 /// Fields of `SpectatorServiceWatchResponse`; its events have the field number [`BATCH_EVENTS`].
 const SPECTATOR_ROOM: u32 = 2;
 const SPECTATOR_SNAPSHOT: u32 = 3;
+const SPECTATOR_AWAITED: u32 = 4;
 /// Fields of `SeatUpdate`.
 const UPDATE_HANDLE: u32 = 1;
 const UPDATE_EVENTS: u32 = 3;
@@ -143,6 +146,13 @@ impl Updates {
         self.end_part(1);
     }
 
+    /// Adds the question of a node whether the client's stream is open, so that this seat may be
+    /// attached.
+    pub fn add_contested(&mut self, handle: u32) {
+        prost::encoding::uint32::encode(RESPONSE_CONTESTED, &handle, &mut self.bytes);
+        self.end_part(1);
+    }
+
     /// Adds the room to a response for a spectator.
     pub fn add_room(&mut self, room: &v1::Room) {
         prost::encoding::message::encode(SPECTATOR_ROOM, room, &mut self.bytes);
@@ -152,6 +162,12 @@ impl Updates {
     /// Adds a snapshot to a response for a spectator.
     pub fn add_snapshot(&mut self, snapshot: &v1::Snapshot) {
         prost::encoding::message::encode(SPECTATOR_SNAPSHOT, snapshot, &mut self.bytes);
+        self.end_part(1);
+    }
+
+    /// Adds whom the game waits for to a response for a spectator.
+    pub fn add_spectator_awaited(&mut self, awaited: &v1::Awaited) {
+        prost::encoding::message::encode(SPECTATOR_AWAITED, awaited, &mut self.bytes);
         self.end_part(1);
     }
 
@@ -252,12 +268,19 @@ impl Message for Updates {
         buffer: &mut impl Buf,
         context: DecodeContext,
     ) -> Result<(), prost::DecodeError> {
-        if tag != RESPONSE_UPDATES {
-            return skip_field(wire_type, tag, buffer, context);
+        match tag {
+            RESPONSE_UPDATES => {
+                let mut update = Bytes::new();
+                prost::encoding::bytes::merge(wire_type, &mut update, buffer, context)?;
+                self.add_received(&update);
+            }
+            RESPONSE_CONTESTED => {
+                let mut handle = 0;
+                prost::encoding::uint32::merge(wire_type, &mut handle, buffer, context)?;
+                self.add_contested(handle);
+            }
+            _ => skip_field(wire_type, tag, buffer, context)?,
         }
-        let mut update = Bytes::new();
-        prost::encoding::bytes::merge(wire_type, &mut update, buffer, context)?;
-        self.add_received(&update);
         Ok(())
     }
 

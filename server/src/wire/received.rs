@@ -4,8 +4,8 @@
 use prost::encoding::{WireType, decode_key, decode_varint};
 
 use super::{
-    BATCH_EVENTS, RESPONSE_UPDATES, UPDATE_DECISION, UPDATE_EVENTS, UPDATE_HANDLE, Updates,
-    start_delimited,
+    BATCH_EVENTS, RESPONSE_CONTESTED, RESPONSE_UPDATES, UPDATE_DECISION, UPDATE_EVENTS,
+    UPDATE_HANDLE, Updates, start_delimited,
 };
 
 /// Fields of `SeatUpdate`.
@@ -27,6 +27,8 @@ pub enum Received {
     Refused,
     /// This decision is open.
     Decision(u64),
+    /// Another stream has the seat or participant. The client must not see this.
+    Contested,
     /// Anything else.
     Other,
 }
@@ -36,9 +38,25 @@ impl Updates {
     pub fn received(&self) -> impl Iterator<Item = (u32, Received)> + '_ {
         let starts = std::iter::once(0).chain(self.parts.iter().map(|part| part.end));
         starts.zip(&self.parts).filter_map(|(start, part)| {
-            let (_, update) = Fields(&self.bytes[start..part.end]).next()?;
-            Some(read(update.bytes()))
+            Some(match Fields(&self.bytes[start..part.end]).next()? {
+                (RESPONSE_CONTESTED, handle) => (handle.handle(), Received::Contested),
+                (_, update) => read(update.bytes()),
+            })
         })
+    }
+
+    /// The updates without the questions of another node.
+    pub fn without_contested(&self) -> Self {
+        let mut others = Self::default();
+        let mut start = 0;
+        for (part, (_, received)) in self.parts.iter().zip(self.received()) {
+            if received != Received::Contested {
+                others.bytes.extend(&self.bytes[start..part.end]);
+                others.end_part(part.weight);
+            }
+            start = part.end;
+        }
+        others
     }
 
     /// Adds an encoded `SeatUpdate`.
@@ -59,7 +77,7 @@ fn read(update: &[u8]) -> (u32, Received) {
     let (mut handle, mut received) = (0, Received::Other);
     for (field, value) in Fields(update) {
         match field {
-            UPDATE_HANDLE => handle = u32::try_from(value.number()).unwrap_or_default(),
+            UPDATE_HANDLE => handle = value.handle(),
             UPDATE_ATTACHED | UPDATE_ENTERED => received = Received::Attached,
             UPDATE_DETACHED => received = Received::Detached,
             UPDATE_REFUSED => received = Received::Refused,
@@ -87,6 +105,10 @@ impl<'a> Value<'a> {
             Self::Number(number) => number,
             Self::Bytes(_) => 0,
         }
+    }
+
+    fn handle(self) -> u32 {
+        u32::try_from(self.number()).unwrap_or_default()
     }
 
     fn bytes(self) -> &'a [u8] {
@@ -171,11 +193,17 @@ mod tests {
         for (handle, update, _) in sent.clone() {
             updates.add(handle, update);
         }
+        let without = updates.clone();
+        updates.add_contested(0);
+        updates.add_contested(1 << 31);
         let bytes = updates.encode_to_vec();
         let received = Updates::decode(bytes.as_slice()).expect("readable");
         assert_eq!(received, updates, "with the same weights");
+        assert_eq!(received.without_contested(), without);
+        let contested = [0, 1 << 31].map(|handle| (handle, Received::Contested));
         let expected: Vec<_> = (sent.into_iter())
             .map(|(handle, _, it)| (handle, it))
+            .chain(contested)
             .collect();
         assert_eq!(received.received().collect::<Vec<_>>(), expected);
         // What cannot be read is no reason to panic.

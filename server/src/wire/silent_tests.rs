@@ -119,6 +119,22 @@ impl World {
         self.table.pass_time(left + bank);
     }
 
+    /// Lets the open decision run out while seats are away.
+    fn run_out_without(&mut self, seats: [Seat; 2]) {
+        let joined = |world: &Self, seat: Seat| world.connections[seat.index()] != ConnectionId(0);
+        for seat in seats {
+            if joined(self, seat) {
+                self.lose(seat);
+            }
+        }
+        self.run_out();
+        for seat in seats {
+            if joined(self, seat) {
+                self.attach(seat);
+            }
+        }
+    }
+
     fn lose(&mut self, seat: Seat) {
         self.table.lost(seat, self.connections[seat.index()]);
     }
@@ -142,6 +158,9 @@ impl World {
             crate::wire::encode_decision(core, open, self.table.now, true, &mut written);
             messages.push(written);
         }
+        let awaited = core.awaited_in_public();
+        let awaited = awaited.filter(|it| see != Viewer::Seat(it.seat));
+        messages.push(convert::awaited_to_proto(awaited, self.table.now).encode_to_vec());
         messages.push(core.visible_to_spectators().to_be_bytes().to_vec());
         messages.push(leak(core).to_be_bytes().to_vec());
         messages
@@ -191,6 +210,7 @@ impl Plan {
                 kind: ParticipantKind::Human,
                 decision_time: Some(ms(3000)),
                 bank: Some(ms(chance.below(3) * 700)),
+                absence_time: chance.pick(&[None, Some(ms(600))]),
             }],
         };
         Self {
@@ -216,6 +236,7 @@ impl Plan {
                 pace: chance.pick(&[None, Some(ms(0)), Some(ms(300))]),
                 spectator_delay_decisions: chance.index(4),
                 clocks,
+                absence_time: chance.pick(&[None, Some(ms(0)), Some(ms(400)), Some(ms(1000))]),
                 ..Policy::default()
             },
             kinds: fills
@@ -338,20 +359,24 @@ fn play_pair(number: u64, leak: Leak) -> Result<usize, String> {
         if worlds.iter().any(ended) {
             break;
         }
-        step(&mut worlds, &mut chance);
+        step(&plan, &mut worlds, &mut chance);
     }
     Ok(messages)
 }
 
 /// Advances both games by the same inputs.
-fn step(worlds: &mut [World; 2], chance: &mut Chance) {
+fn step(plan: &Plan, worlds: &mut [World; 2], chance: &mut Chance) {
     match [worlds[0].is_silent(), worlds[1].is_silent()] {
         [false, false] => {}
         // A silent decision takes time only if there is one in both games.
         [one, other] => {
             let (runs_out, time) = (one && other && chance.below(2) == 0, chance.below(900));
+            // Whoever may hold the jokers is away, and returns afterwards.
+            let away = runs_out && chance.below(2) == 0;
             for world in worlds.iter_mut().filter(|world| world.is_silent()) {
-                if runs_out {
+                if away {
+                    world.run_out_without(plan.holders);
+                } else if runs_out {
                     world.run_out();
                 } else {
                     let thinks = if one && other { ms(time) } else { ms(0) };

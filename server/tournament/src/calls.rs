@@ -8,6 +8,8 @@
 //! behind the others. The last call starts it without the absentees. If a participant misses the
 //! last call itself, the game is called once more without it; other absentees are waited for as
 //! before. A game that all participants forfeit, or that is aborted on its last call, is voided.
+//! Those who have left forfeit without being waited for. While the tournament is paused, no game is
+//! called and no wait counts.
 
 #[cfg(test)]
 mod tests;
@@ -54,6 +56,7 @@ impl Tournament {
     /// The next change at this time, in milliseconds of any steady clock. Fold it and call again
     /// until the result is `None`; repeat after every other change, and at [`Tournament::wake_at`].
     pub fn next(&mut self, now_ms: u64) -> Option<Change> {
+        self.scheduler.see_time(now_ms);
         match self.state.phase {
             State::Open => {
                 let enough = self.state.settings.start_when_joined?;
@@ -86,10 +89,17 @@ impl Tournament {
             return None;
         }
         let is_last_call = played.calls >= state.settings.max_calls;
-        let missing = match ended {
+        let mut was_left = false;
+        let missing: Vec<usize> = match ended {
             Ended::Played { shifts, seats } if seats.len() == played.seats.len() => {
                 let result = result(state, played, shifts, &seats);
                 return Some(Change::Counted { game, result });
+            }
+            // It could not start without those who left; nobody else has missed it.
+            Ended::NeverStarted { .. } if !played.left.is_empty() => {
+                was_left = true;
+                let left = played.left.iter().copied();
+                left.filter(|&who| state.withdrawn[who]).collect()
             }
             Ended::NeverStarted { missing } => missing
                 .into_iter()
@@ -99,7 +109,7 @@ impl Tournament {
             Ended::Played { .. } | Ended::Aborted => Vec::new(),
         };
         // Participants missed the last call: call again without them.
-        Some(if is_last_call && missing.is_empty() {
+        Some(if is_last_call && missing.is_empty() && !was_left {
             Change::Voided { game }
         } else {
             Change::Rescheduled { game, missing }

@@ -23,11 +23,51 @@ pub struct Entrant {
     pub at_table: bool,
 }
 
+/// Who had a place before somebody else took it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Former {
+    /// The former participant.
+    pub entrant: Entrant,
+    /// Number of counted games of the place when it was replaced.
+    pub games: u32,
+}
+
 /// A step of a tournament. Folding the same changes again restores the tournament.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// A participant joined. Its number is the count of those before it.
+    /// A participant joined. Its number is the first that is free because its participant left
+    /// before the beginning, else the count of those before it.
     Joined(Entrant),
+    /// A participant left, by itself or because its organiser removed it.
+    Withdrawn {
+        /// The participant.
+        participant: usize,
+        /// Whether the organiser removed it.
+        removed: bool,
+    },
+    /// Somebody else took the place of a participant, with its results.
+    Replaced {
+        /// The participant.
+        participant: usize,
+        /// Who has the place from now on.
+        by: Entrant,
+    },
+    /// No game is called until the tournament is resumed.
+    Paused,
+    /// Games are called again.
+    Resumed,
+    /// A game that is not being played was moved to the end of the queue.
+    Postponed {
+        /// The game.
+        game: usize,
+        /// The participant who asked for it; `None`: the organiser.
+        by: Option<usize>,
+    },
+    /// A due or void game was moved to the front of the queue, with all its calls.
+    Recalled {
+        /// The game.
+        game: usize,
+    },
     /// The tournament began; joining is closed.
     Begun {
         /// Total number of rounds.
@@ -153,6 +193,11 @@ pub struct Game {
     pub forfeited: Vec<usize>,
     /// Participants who did not come when it was last rescheduled.
     pub missing: Vec<usize>,
+    /// Participants who withdrew or were replaced while it is or was being played. A substitute
+    /// plays for them, and built-in agents play on.
+    pub left: Vec<usize>,
+    /// Participants who postponed it, as often as they did; `None`: the organiser.
+    pub postponed: Vec<Option<usize>>,
     /// Position in the queue of due games.
     pub(super) turn: u64,
 }
@@ -163,9 +208,10 @@ impl Game {
         matches!(self.state, GameState::Counted(_) | GameState::Void)
     }
 
-    /// Whether a participant plays it: it has a seat and did not forfeit.
+    /// Whether a participant plays it: it has a seat, did not forfeit and has not left.
     pub fn is_played_by(&self, participant: usize) -> bool {
-        self.seats.contains(&participant) && !self.forfeited.contains(&participant)
+        let is_out = self.forfeited.contains(&participant) || self.left.contains(&participant);
+        self.seats.contains(&participant) && !is_out
     }
 
     /// The result, if it is counted.

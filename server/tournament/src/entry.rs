@@ -21,6 +21,9 @@ pub enum JoinProblem {
     /// Another participant has this name.
     #[error("another participant has this name")]
     NameTaken,
+    /// Fillers have names like this.
+    #[error("built-in agents that fill up tables have names like this; choose another")]
+    NameReserved,
     /// Deals are rotated, and the entrant did not declare itself stateless.
     #[error("each deal is met several times, so only stateless agents may take part")]
     NotStateless,
@@ -49,7 +52,7 @@ pub enum BeginProblem {
 }
 
 impl Tournament {
-    /// The change by which an entrant joins; its number is the current count of participants.
+    /// The change by which an entrant joins, with the number [`Tournament::next_number`].
     ///
     /// # Errors
     /// If the entrant cannot join.
@@ -61,10 +64,34 @@ impl Tournament {
         if self.joined() >= state.settings.max_participants {
             return Err(JoinProblem::Full);
         }
+        self.admits(&entrant, None)?;
+        Ok(Change::Joined(entrant))
+    }
+
+    /// Whether it has not begun, and enough have joined to begin.
+    pub fn can_begin(&self) -> bool {
+        self.state.phase == State::Open && self.joined() >= MIN_PARTICIPANTS
+    }
+
+    /// The number of the next participant to join.
+    pub fn next_number(&self) -> usize {
+        self.state.next_number()
+    }
+
+    /// Checks an entrant; `place`: the participant whose place it takes.
+    pub(super) fn admits(
+        &self,
+        entrant: &Entrant,
+        place: Option<usize>,
+    ) -> Result<(), JoinProblem> {
+        let state = &self.state;
         if !(1..=MAX_GAMES_AT_A_TIME).contains(&entrant.max_games) {
             return Err(JoinProblem::MaxGames);
         }
-        if self.is_name_taken(&entrant.name) {
+        if is_reserved(&entrant.name) {
+            return Err(JoinProblem::NameReserved);
+        }
+        if self.is_name_taken(&entrant.name, place) {
             return Err(JoinProblem::NameTaken);
         }
         if entrant.at_table && state.settings.physical_tables == 0 {
@@ -74,7 +101,7 @@ impl Tournament {
         if state.settings.deals == Deals::Rotated && !forgets {
             return Err(JoinProblem::NotStateless);
         }
-        Ok(Change::Joined(entrant))
+        Ok(())
     }
 
     /// The changes that begin the tournament: fillers, the beginning, and all rounds that can be
@@ -104,7 +131,7 @@ impl Tournament {
         match self.state.phase {
             State::Open => {
                 let state = &self.state;
-                let present = state.participants.len();
+                let present = state.everybody().len();
                 let field = state.settings.field_for(self.joined());
                 Some(if present < field {
                     Change::Joined(self.filler())
@@ -118,16 +145,18 @@ impl Tournament {
         }
     }
 
-    /// Number of participants without fillers.
+    /// Number of participants without fillers and without those who left before the beginning.
     pub(super) fn joined(&self) -> usize {
-        let participants = self.state.participants.iter();
-        participants.filter(|entrant| !entrant.filler).count()
+        let everybody = self.state.everybody().into_iter();
+        everybody
+            .filter(|&who| !self.state.participants[who].filler)
+            .count()
     }
 
     fn filler(&self) -> Entrant {
         let name = (1..)
-            .map(|number| format!("Filler {number}"))
-            .find(|name| !self.is_name_taken(name))
+            .map(|number| format!("{FILLER} {number}"))
+            .find(|name| !self.is_name_taken(name, None))
             .expect("there are more numbers than participants");
         Entrant {
             name,
@@ -140,10 +169,22 @@ impl Tournament {
         }
     }
 
-    fn is_name_taken(&self, name: &str) -> bool {
-        let mut participants = self.state.participants.iter();
+    /// Whether another participant than the one at `place` has this name.
+    pub fn is_name_taken(&self, name: &str, place: Option<usize>) -> bool {
+        let mut others = (self.state.everybody().into_iter()).filter(|&who| Some(who) != place);
         // Equal names would be indistinguishable in the standings.
         let name = name.to_lowercase();
-        participants.any(|entrant| entrant.name.to_lowercase() == name)
+        others.any(|who| self.state.participants[who].name.to_lowercase() == name)
     }
+}
+
+/// Name of fillers, before their number.
+const FILLER: &str = "Filler";
+
+/// Whether a name is, or looks like, that of a filler.
+fn is_reserved(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut rest = name.chars().filter(|symbol| symbol.is_alphanumeric());
+    let mut filler = FILLER.chars().flat_map(char::to_lowercase);
+    filler.all(|symbol| rest.next() == Some(symbol)) && rest.all(char::is_numeric)
 }

@@ -1,6 +1,6 @@
 //! Tables of a knockout. The first round is random, with fillers spread evenly. After that, the
 //! first two of two neighbouring tables form one table, so that the two halves of the field meet in
-//! the final.
+//! the final. Those who have left advance only if nobody else can.
 
 use super::chance::Chance;
 use super::settings::KNOCKOUT_SEATS;
@@ -24,11 +24,11 @@ pub(super) fn draw(state: &TournamentState, chance: &mut Chance) -> Pairings {
 }
 
 fn first_round(state: &TournamentState, chance: &mut Chance) -> Vec<Vec<usize>> {
-    let everybody = 0..state.participants.len();
+    let everybody = state.field.iter().copied();
     let (fillers, mut others): (Vec<usize>, Vec<usize>) =
         everybody.partition(|&who| state.participants[who].filler);
     chance.shuffle(&mut others);
-    let count = state.participants.len() / KNOCKOUT_SEATS;
+    let count = state.field.len() / KNOCKOUT_SEATS;
     let mut tables = vec![Vec::with_capacity(KNOCKOUT_SEATS); count];
     for (turn, filler) in fillers.into_iter().enumerate() {
         tables[bit_reversed(turn % count, count)].push(filler);
@@ -55,6 +55,8 @@ fn next_round(state: &TournamentState) -> Vec<Vec<usize>> {
         .collect();
     let advancing = |pairing: &&Pairing| {
         let mut order = order_of_pairing(state, pairing);
+        // Those who have left make room for the next.
+        order.sort_by_key(|&who| state.withdrawn[who]);
         order.truncate(ADVANCING);
         order
     };

@@ -47,6 +47,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod by_hand;
 mod calls;
 mod chance;
 mod change;
@@ -66,7 +67,8 @@ mod swiss;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use change::{Change, Ended, Entrant, Game, GameResult, GameState, SeatResult};
+pub use by_hand::{ByHandProblem, MAX_CHANGES_BY_HAND, MAX_REPLACEMENTS};
+pub use change::{Change, Ended, Entrant, Former, Game, GameResult, GameState, SeatResult};
 pub use chefshat_agents::ParticipantKind;
 pub use chefshat_engine::SeatStatistics;
 pub use confidence::{Neighbours, OrderConfidence, SURE, Scored, order_confidence};

@@ -40,17 +40,22 @@ impl Tournament {
     }
 
     /// A round of a round robin's plan, which is computed when first needed. The plan depends on
-    /// the settings and the number of participants only, so a restart reproduces it.
+    /// the settings and the field only, so a restart reproduces it.
     fn planned(&mut self, round: u32) -> Option<Pairings> {
         let state = &self.state;
         let plan = self.plan.get_or_insert_with(|| {
             let mut chance = Chance::of_round(state.settings.draw_seed, 0);
-            round_robin::plan(
-                state.participants.len(),
+            let mut plan = round_robin::plan(
+                state.field.len(),
                 state.settings.players,
                 state.rounds,
                 &mut chance,
-            )
+            );
+            for pairings in &mut plan {
+                let numbers = pairings.tables.iter_mut().flatten();
+                (numbers.chain(&mut pairings.byes)).for_each(|who| *who = state.field[*who]);
+            }
+            plan
         });
         let pairings = plan.get(round as usize - 1).cloned();
         if round == state.rounds {

@@ -11,6 +11,10 @@ use super::state::TournamentState;
 /// Queue position and number of a due game. Outdated once the game is called or queued again.
 pub(super) type DueGame = (u64, usize);
 
+/// Longest time that a game waits for participants because they had to wait themselves,
+/// milliseconds.
+const MAX_PATIENCE_MS: u64 = 600_000;
+
 /// The schedule at this moment. After a restart nobody is present.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scheduler {
@@ -26,16 +30,21 @@ pub(super) struct Scheduler {
     /// Games that wait for a physical table. When one is free, the first of them is checked; if it is
     /// not called, the next.
     without_table: BTreeSet<DueGame>,
-    /// Games blocked by absent participants only, with the time since when, in milliseconds.
+    /// Games blocked by absent participants only, with the time since when, in milliseconds; later by
+    /// what they wait longer than the no-show time.
     waits: BTreeMap<usize, u64>,
     /// The same games by time, except those whose time was up at the last check.
     by_time: BTreeSet<(u64, usize)>,
     /// The same games by participant.
     waits_by_participant: Vec<BTreeSet<usize>>,
-    /// Whether the maximum number of games is being played. No wait counts meanwhile.
+    /// Whether the maximum number of games is being played, or the tournament is paused. No wait
+    /// counts meanwhile.
     full: bool,
     /// When that last ended, in milliseconds; every wait restarts then.
     open_since: u64,
+    /// By participant that was present when its last game ended: when that was, in milliseconds;
+    /// `None` until the next time is seen.
+    free_since: BTreeMap<usize, Option<u64>>,
     /// Number of checks so far.
     #[cfg(test)]
     pub(super) checks: u64,
@@ -74,17 +83,34 @@ impl Scheduler {
     /// Updates the schedule for a change that the state has folded.
     pub(super) fn fold(&mut self, state: &TournamentState, change: &Change) {
         match change {
-            Change::Joined(_) | Change::Begun { .. } => {}
+            Change::Begun { .. } | Change::Paused | Change::Resumed => {}
+            Change::Joined(_) => self.seat(state),
+            Change::Withdrawn { participant, .. } | Change::Replaced { participant, .. } => {
+                self.on_new_standing(state, *participant);
+            }
             Change::Drawn { .. } => {
                 self.seat(state);
                 let drawn = self.known..state.games.len();
                 (self.to_check).extend(drawn.map(|index| (state.games[index].turn, index)));
                 self.known = state.games.len();
             }
-            Change::Called { game, .. }
-            | Change::Rescheduled { game, .. }
-            | Change::Counted { game, .. }
-            | Change::Voided { game } => self.on_game_change(state, *game),
+            Change::Rescheduled { game, missing } => {
+                self.free_since.retain(|who, _| !missing.contains(who));
+                self.on_game_change(state, *game);
+            }
+            Change::Counted { game, .. } => {
+                self.note_free(state, *game);
+                self.on_game_change(state, *game);
+            }
+            Change::Called { game, .. } => {
+                if let Some(game) = state.games.get(*game) {
+                    self.free_since.retain(|who, _| !game.seats.contains(who));
+                }
+                self.on_game_change(state, *game);
+            }
+            Change::Voided { game }
+            | Change::Postponed { game, .. }
+            | Change::Recalled { game } => self.on_game_change(state, *game),
             Change::Finished | Change::Closed => {
                 *self = Scheduler {
                     present: std::mem::take(&mut self.present),
@@ -94,6 +120,60 @@ impl Scheduler {
                 self.seat(state);
             }
         }
+    }
+
+    /// Handles a participant who has left, or whose place somebody else has taken: all its games may
+    /// be ready.
+    fn on_new_standing(&mut self, state: &TournamentState, participant: usize) {
+        self.seat(state);
+        self.free_since.remove(&participant);
+        let Some(present) = self.present.get_mut(participant) else {
+            return;
+        };
+        *present = false;
+        for &(turn, index) in &state.due {
+            if state.games[index].seats.contains(&participant) {
+                self.end_wait(state, index);
+                self.to_check.insert((turn, index));
+            }
+        }
+        // Some of them may need no table any more.
+        self.to_check.append(&mut self.without_table);
+    }
+
+    /// Notes who was present when a game ended.
+    fn note_free(&mut self, state: &TournamentState, index: usize) {
+        let Some(game) = state.games.get(index) else {
+            return;
+        };
+        for &who in &game.seats {
+            self.free_since.remove(&who);
+            if game.is_played_by(who) && self.is_present(state, who) {
+                self.free_since.insert(who, None);
+            }
+        }
+    }
+
+    /// Learns what time it is.
+    pub(super) fn see_time(&mut self, now_ms: u64) {
+        for since in self.free_since.values_mut() {
+            since.get_or_insert(now_ms);
+        }
+    }
+
+    /// How long a game waits beyond the no-show time, from `since` on: as long as those it waits for
+    /// had to wait for it.
+    pub(super) fn patience(&self, state: &TournamentState, game: &Game, since: u64) -> u64 {
+        let awaited = game
+            .seats
+            .iter()
+            .filter(|&&who| !state.forfeits(game, who) && !self.is_present(state, who));
+        let waited = awaited.filter_map(|who| {
+            let free = *self.free_since.get(who)?;
+            Some(since.saturating_sub(free?))
+        });
+        let longest = waited.max().unwrap_or(0).min(MAX_PATIENCE_MS);
+        longest.saturating_sub(state.settings.no_show_ms)
     }
 
     /// Handles a game that was called, queued again or ended: its participants may have gained or
@@ -139,10 +219,11 @@ impl Scheduler {
         }
     }
 
-    /// Whether games can be called: fewer than the maximum are being played.
+    /// Whether games can be called: fewer than the maximum are being played, and the tournament is not
+    /// paused.
     pub(super) fn is_open(&mut self, state: &TournamentState, now_ms: u64) -> bool {
         let was_full = self.full;
-        self.full = state.playing.len() >= state.settings.max_parallel;
+        self.full = state.paused || state.playing.len() >= state.settings.max_parallel;
         if was_full && !self.full {
             self.open_since = now_ms;
         }
@@ -199,8 +280,12 @@ impl Scheduler {
         now_ms: u64,
     ) -> bool {
         let (_, index) = checked;
+        let game = &state.games[index];
         let before = self.waits.get(&index).copied();
-        let since = before.map_or(now_ms, |since| since.max(self.open_since));
+        let since = match before {
+            Some(since) => since.max(self.open_since),
+            None => now_ms + self.patience(state, game, now_ms),
+        };
         if now_ms.saturating_sub(since) >= state.settings.no_show_ms {
             self.waits.insert(index, since);
             return true;
@@ -210,7 +295,6 @@ impl Scheduler {
         }
         self.waits.insert(index, since);
         self.by_time.insert((since, index));
-        let game = &state.games[index];
         for &who in &game.seats {
             if !state.forfeits(game, who) {
                 self.waits_by_participant[who].insert(index);

@@ -11,10 +11,10 @@ use crate::ratings::Ratings;
 /// The standing of a participant. Forfeited games count with a score of 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Place, from 1; 0 for all before a game has counted, in the order of joining. Sorted by mean
-    /// score of a game, then mean points, then head-to-head results among equals, then a random tie
-    /// break. In a knockout the round reached comes first, then the place at the last table once
-    /// its round is over.
+    /// Place, from 1; 0 for all before a game has counted, in the order of joining. Those who have
+    /// played a game come first. Sorted by mean score of a game, then mean points, then head-to-head
+    /// results among equals, then a random tie break. In a knockout the round reached comes first,
+    /// then the place at the last table once its round is over.
     pub place: u32,
     /// The participant's number.
     pub participant: usize,
@@ -117,7 +117,7 @@ impl Tournament {
         let format = state.settings.format;
         let standing = |who: usize| Standing::new(who, &state.sums[who], format);
         if !self.has_counted() {
-            return (0..state.participants.len()).map(standing).collect();
+            return state.everybody().into_iter().map(standing).collect();
         }
         let ordered = order(state).into_iter().zip(1..);
         let placed = |(who, place)| Standing {
@@ -138,13 +138,14 @@ pub(super) fn order(state: &TournamentState) -> Vec<usize> {
         } else {
             Ordering::Equal
         };
-        further
+        (right.has_played().cmp(&left.has_played()))
+            .then(further)
             .then_with(|| by_mean(left.score, left.games, right.score, right.games))
             .then_with(|| by_mean(left.points, left.games, right.points, right.games))
     };
-    let mut order: Vec<usize> = (0..state.participants.len()).collect();
+    let mut order = state.everybody();
     order.sort_by(level);
-    let mut group = vec![0; order.len()];
+    let mut group = vec![0; state.participants.len()];
     for pair in order.windows(2) {
         let apart = level(&pair[0], &pair[1]) != Ordering::Equal;
         group[pair[1]] = group[pair[0]] + usize::from(apart);

@@ -1,11 +1,11 @@
-//! The state of a tournament, and the effect of each change on it. Nothing here decides what
-//! happens next. A change that does not fit (for a finished game, say) has no effect, so the same
+//! The state of a tournament, and the effect of each change on it; that of changes by hand is in
+//! `by_hand`. Nothing here decides what happens next. A change that does not fit (for a finished game, say) has no effect, so the same
 //! changes always lead to the same state.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::change::{Change, Entrant, Game, GameResult, GameState};
+use super::change::{Change, Entrant, Former, Game, GameResult, GameState};
 use super::settings::{Deals, Settings};
 
 /// The phase of a tournament.
@@ -67,12 +67,31 @@ pub(super) struct Sums {
     pub(super) performance: f64,
 }
 
+impl Sums {
+    /// Whether it has played a game, that is, not forfeited it.
+    pub(super) fn has_played(&self) -> bool {
+        self.games > self.forfeited
+    }
+}
+
+/// Position in the queue of the first game. Recalled games come before it.
+const FIRST_TURN: u64 = 1 << 40;
+
 /// The state of a tournament.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TournamentState {
     pub(super) settings: Settings,
     pub(super) phase: State,
+    pub(super) paused: bool,
     pub(super) participants: Vec<Entrant>,
+    /// By participant: whether it has left.
+    pub(super) withdrawn: Vec<bool>,
+    /// By participant: who had its place before.
+    pub(super) former: Vec<Vec<Former>>,
+    /// The participants of the games, ascending; empty before the beginning.
+    pub(super) field: Vec<usize>,
+    /// Number of changes that a participant or the organiser made by hand.
+    pub(super) by_hand: u32,
     pub(super) sums: Vec<Sums>,
     /// Total number of rounds; 0 before the beginning.
     pub(super) rounds: u32,
@@ -92,6 +111,8 @@ pub(super) struct TournamentState {
     /// By deal: number of games that are not over.
     pub(super) deals: Vec<usize>,
     next_turn: u64,
+    /// The position in the queue before all others.
+    pub(super) front_turn: u64,
 }
 
 impl TournamentState {
@@ -99,7 +120,12 @@ impl TournamentState {
         TournamentState {
             settings,
             phase: State::Open,
+            paused: false,
             participants: Vec::new(),
+            withdrawn: Vec::new(),
+            former: Vec::new(),
+            field: Vec::new(),
+            by_hand: 0,
             sums: Vec::new(),
             rounds: 0,
             drawn: 0,
@@ -111,8 +137,25 @@ impl TournamentState {
             tables_in_use: 0,
             over: 0,
             deals: Vec::new(),
-            next_turn: 0,
+            next_turn: FIRST_TURN,
+            front_turn: FIRST_TURN - 1,
         }
+    }
+
+    /// The participants: before the beginning those who have not left, then those who were there at
+    /// the beginning.
+    pub(super) fn everybody(&self) -> Vec<usize> {
+        if self.rounds > 0 {
+            return self.field.clone();
+        }
+        let numbers = 0..self.participants.len();
+        numbers.filter(|&who| !self.withdrawn[who]).collect()
+    }
+
+    /// The number of the next participant to join.
+    pub(super) fn next_number(&self) -> usize {
+        let free = self.withdrawn.iter().position(|&withdrawn| withdrawn);
+        free.unwrap_or(self.participants.len())
     }
 
     /// Whether all games of the rounds paired so far are over.
@@ -131,25 +174,29 @@ impl TournamentState {
         self.tables_in_use < self.settings.physical_tables
     }
 
-    /// Whether a participant forfeits a due game: it missed the last call and is no longer waited
-    /// for.
+    /// Whether a participant forfeits a due game: it has left, or it missed the last call and is no
+    /// longer waited for.
     pub(super) fn forfeits(&self, game: &Game, participant: usize) -> bool {
         let is_decided = game.calls >= self.settings.max_calls;
-        game.forfeited.contains(&participant) || is_decided && game.missing.contains(&participant)
+        self.withdrawn[participant]
+            || game.forfeited.contains(&participant)
+            || is_decided && game.missing.contains(&participant)
     }
 
     pub(super) fn fold(&mut self, change: &Change) {
         match change {
-            Change::Joined(entrant) => {
-                self.participants.push(entrant.clone());
-                self.busy.push(0);
-                self.sums.push(Sums {
-                    places: vec![0; self.settings.players],
-                    ..Sums::default()
-                });
+            Change::Joined(entrant) => self.join(entrant),
+            Change::Withdrawn { participant, .. } => self.withdraw(*participant),
+            Change::Replaced { participant, by } => self.replace(*participant, by),
+            Change::Paused | Change::Resumed => {
+                self.by_hand += 1;
+                self.paused = *change == Change::Paused;
             }
+            Change::Postponed { game, by } => self.postpone(*game, *by),
+            Change::Recalled { game } => self.recall(*game),
             Change::Begun { rounds } => {
                 self.phase = State::Playing;
+                self.field = self.everybody();
                 self.rounds = *rounds;
             }
             Change::Drawn {
@@ -167,6 +214,24 @@ impl TournamentState {
                 self.phase = State::Closed;
             }
         }
+    }
+
+    fn join(&mut self, entrant: &Entrant) {
+        let number = self.next_number();
+        if let Some(free) = self.participants.get_mut(number) {
+            *free = entrant.clone();
+            self.withdrawn[number] = false;
+            self.former[number].clear();
+            return;
+        }
+        self.participants.push(entrant.clone());
+        self.withdrawn.push(false);
+        self.former.push(Vec::new());
+        self.busy.push(0);
+        self.sums.push(Sums {
+            places: vec![0; self.settings.players],
+            ..Sums::default()
+        });
     }
 
     fn draw(&mut self, round: u32, tables: &[Vec<usize>], byes: &[usize]) {
@@ -216,26 +281,28 @@ impl TournamentState {
             self.deals.resize(self.deals.len().max(deal + 1), 0);
             self.deals[deal] += 1;
         }
-        let physical = seats.iter().any(|who| self.participants[*who].at_table);
         let index = self.games.len();
         self.games.push(Game {
             round,
             table,
             number: game + 1,
             seats,
-            physical,
+            physical: false,
             deal: deal.map(|deal| deal as u32),
             state: GameState::Due,
             calls: 0,
             forfeited: Vec::new(),
             missing: Vec::new(),
+            left: Vec::new(),
+            postponed: Vec::new(),
             turn: 0,
         });
+        self.set_physical(index);
         self.queue(index);
     }
 
     /// Queues a game behind the others.
-    fn queue(&mut self, index: usize) {
+    pub(super) fn queue(&mut self, index: usize) {
         let game = &mut self.games[index];
         game.state = GameState::Due;
         game.turn = self.next_turn;
@@ -280,6 +347,8 @@ impl TournamentState {
             self.end_of_deal(deal);
         }
         self.leave(index);
+        self.games[index].left.clear();
+        self.set_physical(index);
         self.queue(index);
     }
 
@@ -320,13 +389,13 @@ impl TournamentState {
     }
 
     /// Removes a game from the queue and from the games being played.
-    fn leave(&mut self, index: usize) {
+    pub(super) fn leave(&mut self, index: usize) {
         let game = &self.games[index];
         self.due.remove(&(game.turn, index));
         if self.playing.remove(&index) {
             self.tables_in_use -= usize::from(game.physical);
             for participant in &game.seats {
-                if !game.forfeited.contains(participant) {
+                if game.is_played_by(*participant) {
                     self.busy[*participant] -= 1;
                 }
             }

@@ -96,7 +96,6 @@ async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-#[ignore = "rarely fails: an attach that was late through another node supersedes a newer one"]
 async fn a_tournament_whose_owner_is_killed_twice_counts_every_game_once() {
     let mut cluster = Cluster::start(NODES, Leases::Short).await;
     let client = Client::connect(cluster.url()).await.expect("it listens");

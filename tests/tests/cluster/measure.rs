@@ -8,6 +8,7 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use chefshat_client::Backoff;
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_tests::{BusyRooms, Launch, Ledger, RoomKind, patiently};
 use procfs::process::{Process as Running, all_processes};
@@ -45,6 +46,8 @@ fn rooms(count: usize, shifts: u32, decision_time_ms: u32, pace: Duration) -> Ve
         },
         one_stream: true,
         pace,
+        // As the clients of others.
+        backoff: Backoff::default(),
         ..RoomKind::default()
     };
     vec![kind; count]

@@ -1,5 +1,6 @@
 //! System tests over real sockets, from the view of participants, spectators and strangers.
 
+mod absences;
 mod access;
 mod analysis;
 mod answers;
@@ -19,6 +20,7 @@ mod lists;
 mod nodes;
 mod nodes_guarded;
 mod nodes_play;
+mod nodes_records;
 mod observing;
 mod operator;
 mod physical;
@@ -34,6 +36,7 @@ mod table_bridge;
 mod terminal;
 mod tmux;
 mod tournament_agents;
+mod tournament_by_hand;
 mod tournament_deals;
 mod tournament_refusals;
 mod tournament_tables;

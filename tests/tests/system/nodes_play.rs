@@ -7,19 +7,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::{Client, RandomAgent};
-use chefshat_proto::v1::{
-    self, play_service_client::PlayServiceClient, seat_update::Update,
-    tournament_service_client::TournamentServiceClient,
-};
+use chefshat_proto::v1::{self, play_service_client::PlayServiceClient, seat_update::Update};
 use chefshat_record::replay::replay;
 use chefshat_tests::{
-    Ledger, StreamSeat, TestNodes, first_legal, first_update, one_shift, patiently, play_on,
+    Held, Ledger, StreamSeat, TestNodes, first_legal, first_update, one_shift, patiently, play_on,
     random_agents,
 };
 use futures::future::join_all;
 
-use crate::tournament_deals::{counted, streamed, withheld};
-use crate::tournaments::{create, id_of, join, start, unhurried};
+use crate::tournament_deals::streamed;
 
 /// A room of one Shift at a node, and the tickets of its seats, joined through another node.
 async fn room(nodes: &TestNodes, node: usize, through: &Client) -> (String, Vec<String>) {
@@ -63,6 +59,17 @@ async fn refused(seat: &mut StreamSeat) -> v1::Refused {
     match seat.next().await {
         Update::Refused(refused) => refused,
         other => panic!("not refused, but {other:?}"),
+    }
+}
+
+/// Why a seat is detached.
+async fn detached(seat: &mut StreamSeat) -> v1::DetachReason {
+    loop {
+        match seat.next().await {
+            Update::Detached(detached) => return detached.reason(),
+            Update::Decision(_) => {}
+            other => panic!("{other:?}"),
+        }
     }
 }
 
@@ -121,14 +128,7 @@ async fn seats_are_played_step_by_step_and_detached_through_another_node() {
     }
     let newer = StreamSeat::attached(client.channel(), &tickets[3]).await;
     let mut older = std::mem::replace(&mut seats[3], newer);
-    let superseded = loop {
-        match older.next().await {
-            Update::Detached(detached) => break detached.reason(),
-            Update::Decision(_) => {}
-            other => panic!("{other:?}"),
-        }
-    };
-    assert_eq!(superseded, v1::DetachReason::Superseded);
+    assert_eq!(detached(&mut older).await, v1::DetachReason::Superseded);
     let playing = join_all(seats.iter_mut().map(play_on));
     let ends = patiently("the game to end", playing).await;
     assert!(
@@ -213,10 +213,11 @@ async fn a_spectator_at_another_node_sees_what_one_at_the_owner_sees() {
         events
     };
     let playing = client.play_many(random_agents(tickets));
-    let all = futures::future::join3(watch(&client), watch(&at_owner), playing);
-    let (far, near, _) = patiently("the game to end", all).await;
-    assert!(far.len() > 20);
-    assert_eq!(far, near);
+    let watching = join_all([&client, &client, &at_owner].map(watch));
+    let all = futures::future::join(watching, playing);
+    let (seen, _) = patiently("the game to end", all).await;
+    assert!(seen[0].len() > 20);
+    assert!(seen.iter().all(|events| *events == seen[2]));
 }
 
 #[tokio::test]
@@ -323,33 +324,51 @@ async fn participants_play_a_tournament_of_another_node() {
 }
 
 #[tokio::test]
-async fn records_that_the_node_of_a_tournament_withholds_are_withheld_by_all() {
-    let nodes = TestNodes::start(2).await;
-    let owner = nodes.nodes[1].client().await;
-    let mut service = TournamentServiceClient::new(owner.channel());
-    let settings = v1::TournamentSettings {
-        format: v1::TournamentFormat::RoundRobin.into(),
-        rounds: 1,
-        deals: v1::TournamentDeals::SameAtAllTables.into(),
-        built_in_agents: vec!["random".into(); 7],
-        policy: Some(unhurried()),
-        ..v1::TournamentSettings::default()
-    };
-    let created = create(&mut service, settings).await;
-    let id = id_of(&created);
-    nodes.place(1, &id, &created.join_code);
-    let joined = join(&mut service, &created.join_code, "Ada").await;
-    let client = nodes.nodes[0].client().await;
-    let stream = StreamSeat::open(client.channel()).await;
+async fn the_newest_stream_has_a_seat_through_whichever_node_it_comes() {
+    let nodes = TestNodes::start(3).await;
+    let mut clients = Vec::new();
+    for node in [0, 1, 2, 0] {
+        clients.push(nodes.nodes[node].client().await);
+    }
+    let (_, tickets) = room(&nodes, 2, &clients[0]).await;
+    let mut others = Vec::new();
+    for ticket in &tickets[1..] {
+        others.push(StreamSeat::attached(clients[1].channel(), ticket).await);
+    }
+    let mut newest = StreamSeat::attached(clients[0].channel(), &tickets[0]).await;
+    for client in &clients[1..] {
+        let newer = StreamSeat::attached(client.channel(), &tickets[0]).await;
+        let mut older = std::mem::replace(&mut newest, newer);
+        assert_eq!(detached(&mut older).await, v1::DetachReason::Superseded);
+    }
+    others.push(newest);
+    let playing = join_all(others.iter_mut().map(play_on));
+    let ends = patiently("the game to end", playing).await;
+    let over = |end: &v1::DetachReason| *end == v1::DetachReason::GameOver;
+    assert!(ends.iter().all(over), "{ends:?}");
+}
+
+#[tokio::test]
+async fn a_stream_that_its_client_has_left_takes_no_seat_although_another_node_sends_it_late() {
+    let nodes = TestNodes::start(3).await;
+    let (gateway, other) = (nodes.nodes[0].client().await, nodes.nodes[1].client().await);
+    let (_, tickets) = room(&nodes, 2, &other).await;
+    let late = nodes.link(0, 2);
+    late.way().hold(Held::Everything);
+    let left = StreamSeat::open(gateway.channel()).await;
     let attach = v1::Attach {
-        ticket: joined.ticket,
+        ticket: tickets[0].clone(),
         ..v1::Attach::default()
     };
-    stream.attach(attach).await;
-    start(&mut service, &created).await;
-    // The built-in agents' table ends while this participant does not play.
-    let done = patiently("the other table's end", counted(&mut service, &id)).await;
-    nodes.place(1, &done.room_id, "");
-    withheld(&owner, &done).await;
-    withheld(&client, &done).await;
+    left.attach(attach).await;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(other.channel(), ticket).await);
+    }
+    drop(left);
+    late.way().hold(Held::Nothing);
+    let playing = join_all(seats.iter_mut().map(play_on));
+    let ends = patiently("the game to end", playing).await;
+    let over = |end: &v1::DetachReason| *end == v1::DetachReason::GameOver;
+    assert!(ends.iter().all(over), "{ends:?}");
 }

@@ -490,6 +490,60 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
             ..Default::default()
         })
     );
+    ask!(
+        "WithdrawParticipant",
+        tournaments.withdraw_participant(v1::WithdrawParticipantRequest {
+            tournament_id: tournament_id.clone(),
+            ticket: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "RemoveParticipant",
+        tournaments.remove_participant(v1::RemoveParticipantRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "ReplaceParticipant",
+        tournaments.replace_participant(v1::ReplaceParticipantRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "PauseTournament",
+        tournaments.pause_tournament(v1::PauseTournamentRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+        })
+    );
+    ask!(
+        "ResumeTournament",
+        tournaments.resume_tournament(v1::ResumeTournamentRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+        })
+    );
+    ask!(
+        "PostponeGame",
+        tournaments.postpone_game(v1::PostponeGameRequest {
+            tournament_id: tournament_id.clone(),
+            ticket: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "CallGame",
+        tournaments.call_game(v1::CallGameRequest {
+            tournament_id: tournament_id.clone(),
+            owner_token: wrong(tournament_id),
+            ..Default::default()
+        })
+    );
     answers
 }
 

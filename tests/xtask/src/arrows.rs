@@ -23,6 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-search", &["chefshat-engine", "chefshat-agents"]),
     ("chefshat-referee", &["chefshat-engine"]),
     ("chefshat-cluster", &[]),
+    ("chefshat-study", &[]),
     (
         "chefshat-tournament",
         &["chefshat-engine", "chefshat-agents"],
@@ -78,6 +79,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-room",
             "chefshat-vector",
             "chefshat-cluster",
+            "chefshat-study",
         ],
     ),
     ("chefshat-client", &["chefshat-proto"]),

@@ -39,6 +39,12 @@ class Agent(ABC):
     def on_snapshot(self, snapshot: pb.Snapshot) -> None:
         """Called when the server sends the current state instead of the events so far."""
 
+    def on_awaited(self, awaited: pb.Awaited) -> None:
+        """Called when the game waits for another of the other seats, or for none (no `seat`).
+
+        Only with events delivered at once.
+        """
+
     def on_result(self, result: pb.AnswerResult) -> None:
         """Called with the result of an answer: accepted, invalid or too late, and the time it took."""
 

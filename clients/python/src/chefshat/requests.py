@@ -31,9 +31,19 @@ REPEATABLE = (
     pb.JoinTournamentRequest,
     pb.AddTableParticipantRequest,
 )
+# Requests that change nothing and are about a room or tournament.
+READING = (
+    pb.GetRoomRequest,
+    pb.GetTournamentRequest,
+    pb.GetTournamentResultsRequest,
+    pb.ListTournamentGamesRequest,
+)
 REQUEST_ID_BYTES = 32
 # Seconds before each further attempt of a request whose response was lost.
 PAUSES_S = (0.1, 0.2, 0.4)
+# The same while the server that runs its room or tournament cannot be reached: another one takes over within ten seconds.
+OWNER_PAUSES_S = (0.1, 0.2, 0.4, 0.8) + 15 * (1.0,)
+OWNER_UNREACHABLE = "OWNER_UNREACHABLE"
 
 Asked = TypeVar("Asked")
 Answered = TypeVar("Answered")
@@ -139,7 +149,10 @@ def attach(
 
 
 def called(method: Callable[[Asked], Answered], request: Asked) -> Answered:
-    """Makes a unary call. Repeats it if it can be repeated and its response was lost. Raises a gRPC error as `ChefsHatError`."""
+    """Makes a unary call. Raises a gRPC error as `ChefsHatError`.
+
+    Repeats it, if that is safe, when its response was lost or its room or tournament is just changing servers.
+    """
     pauses = _pauses(request)
     while True:
         try:
@@ -160,24 +173,22 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
         await asyncio.sleep(pause)
 
 
-def _pauses(request: object) -> Iterator[float]:
-    """Returns the pauses in seconds between the attempts of a call, and gives a request that can be repeated its id."""
+def _pauses(request: object) -> dict[str, Iterator[float]]:
+    """Returns the pauses in seconds between the attempts of a call, by the reason to repeat it; gives the request its id."""
     if isinstance(request, pb.ReportRequest):
         request.report_id = request.report_id or secrets.token_hex(REQUEST_ID_BYTES)
-        return iter(PAUSES_S)
-    if not isinstance(request, REPEATABLE):
-        return iter(())
-    if not request.request_id:
-        request.request_id = secrets.token_bytes(REQUEST_ID_BYTES)
-    return iter(PAUSES_S)
+    elif isinstance(request, REPEATABLE):
+        request.request_id = request.request_id or secrets.token_bytes(REQUEST_ID_BYTES)
+    elif not isinstance(request, READING):
+        return {}
+    return {grpc.StatusCode.UNAVAILABLE.name: iter(PAUSES_S), OWNER_UNREACHABLE: iter(OWNER_PAUSES_S)}
 
 
-def _pause_after(error: grpc.RpcError, pauses: Iterator[float]) -> float:
-    """Returns the pause before the next attempt; raises the error if the server answered or no attempt is left."""
+def _pause_after(error: grpc.RpcError, pauses: dict[str, Iterator[float]]) -> float:
+    """Returns the pause before the next attempt; raises the error if the server refused the call or no attempt is left."""
     failure = from_rpc_error(error)
-    pause = next(pauses, None)
-    # With a reason of its own the server has answered.
-    if pause is None or failure.reason != grpc.StatusCode.UNAVAILABLE.name:
+    pause = next(pauses.get(failure.reason, iter(())), None)
+    if pause is None:
         raise failure from error
     return pause
 

@@ -196,6 +196,8 @@ class PlaySession:
                 self._result(seat, update.result, asks)
             elif what == "snapshot":
                 self._snapshot(seat, update.snapshot)
+            elif what == "awaited":
+                seat.agent.on_awaited(update.awaited)
             elif what == "detached":
                 self._detached(seat, update.handle, update.detached)
             if seat.substituted:

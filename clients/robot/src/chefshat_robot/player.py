@@ -102,6 +102,10 @@ class RobotPlayer(chefshat.Agent):
         """Passes it to the agent."""
         self._agent.on_snapshot(snapshot)
 
+    def on_awaited(self, awaited: pb.Awaited) -> None:
+        """Passes it to the agent."""
+        self._agent.on_awaited(awaited)
+
     def on_result(self, result: pb.AnswerResult) -> None:
         """Passes it to the agent. Lets the robot carry a gift at a physical table."""
         if self._gift is not None and self._gift[0] == result.decision_id and result.status == pb.ANSWER_STATUS_ACCEPTED:

@@ -32,6 +32,14 @@ export function agentsFor({ agents, quickAgents }: Offered, real: boolean, chose
   return agents.filter((agent) => !real || quickAgents.includes(agent) || agent === chosen);
 }
 
+/** For programs only: it answers with illegal actions until one is legal. */
+const FOR_PROGRAMS = "random_unmasked";
+
+/** Whether people should be offered an agent. */
+export function isForPeople(agent: string): boolean {
+  return agent !== FOR_PROGRAMS;
+}
+
 /** The server's offer for a form, and the error in words; both null while loading. */
 export function useOffered(): { offered: Offered | null; fault: string | null } {
   const [offered, setOffered] = useState<Offered | null>(null);
@@ -39,7 +47,11 @@ export function useOffered(): { offered: Offered | null; fault: string | null } 
   useEffect(() => {
     serverInfo().then(
       ({ presets, builtInAgents, quickBuiltInAgents }) =>
-        setOffered({ presets, agents: builtInAgents, quickAgents: quickBuiltInAgents }),
+        setOffered({
+          presets,
+          agents: builtInAgents.filter(isForPeople),
+          quickAgents: quickBuiltInAgents.filter(isForPeople),
+        }),
       (error: unknown) => setFault(inWords(error)),
     );
   }, []);

@@ -10,6 +10,7 @@ import { MAX_NAME } from "../lobby/room-form";
 import { hostedRoom, invitation } from "../lobby/seat";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { seatNumber } from "../parts/SeatNumber";
 import css from "./Experiment.module.css";
 import { LinkList } from "./LinkList";
 import { OwnLinks, OwnRooms } from "./OwnRooms";
@@ -134,7 +135,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
             value={seat}
             options={[
               { value: "any", label: words.anySeat },
-              ...free.map((number) => ({ value: String(number), label: String(number) })),
+              ...free.map((number) => ({ value: String(number), label: String(seatNumber(number)) })),
             ]}
             onPick={setSeat}
           />

@@ -137,6 +137,7 @@ export function FaultFields(props: GameProps & { agents: string[]; children?: Co
     <div class={css.fields}>
       <Typed {...props} name="maxInvalidAttempts" label={words.invalid} hint={words.invalidHint} />
       <Typed {...props} name="maxTimeouts" label={words.timeouts} hint={words.timeoutsHint} />
+      <Typed {...props} name="absenceSeconds" label={words.absence} hint={words.absenceHint} />
       <SelectField
         label={words.substitute}
         value={form.substitute}

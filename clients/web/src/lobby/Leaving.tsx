@@ -12,6 +12,7 @@ import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
 import toolsCss from "../table/view/Tools.module.css";
 import css from "./Leaving.module.css";
+import { clockOfPeople } from "./rooms";
 import { closeRoom, giveBackSeat, hostedRoom } from "./seat";
 
 interface LeaveButtonProps {
@@ -68,13 +69,12 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
   };
   const givenUp =
     policy?.abort === AbortPolicy.ANY_LOST || (!others && policy?.abort !== AbortPolicy.NEVER) || policy === undefined;
-  const timeouts = policy?.maxTimeouts ?? 1;
   return (
     <Dialog title={words.title} onClose={onClose}>
       <div class="stack">
         {playing ? (
           <>
-            <p>{givenUp ? words.givenUp(timeouts) : words.substituted(timeouts, policy?.substitute ?? "")}</p>
+            <p>{awayWords(policy, givenUp, others)}</p>
             <p>{givenUp ? words.backUntilThen : words.back}</p>
           </>
         ) : (
@@ -98,6 +98,21 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
       </div>
     </Dialog>
   );
+}
+
+/** What happens at the decisions of somebody who has left. */
+function awayWords(policy: RoomPolicy | undefined, givenUp: boolean, others: boolean): string {
+  const words = t().lobby.leaving;
+  const { maxTimeouts = 1, substitute = "" } = policy ?? {};
+  const clock = policy && clockOfPeople(policy);
+  if (clock?.absenceTimeMs === undefined) {
+    return givenUp ? words.givenUp(maxTimeouts) : words.substituted(maxTimeouts, substitute);
+  }
+  if (!others && givenUp) return words.awayAlone;
+  // A player that nobody waits for has all the time that it would have if it stayed.
+  const timeMs = others ? Math.min(clock.absenceTimeMs, clock.decisionTimeMs) : clock.decisionTimeMs + clock.bankMs;
+  const seconds = Math.ceil(timeMs / 1000);
+  return givenUp ? words.awayGivenUp(seconds) : words.awaySubstituted(seconds, substitute);
 }
 
 /** A door, and an arrow out of it. */

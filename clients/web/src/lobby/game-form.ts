@@ -45,6 +45,7 @@ export interface GameForm {
   paceSeconds: string;
   maxInvalidAttempts: string;
   maxTimeouts: string;
+  absenceSeconds: string;
   substitute: string;
   spectators: boolean;
   spectatorDelay: string;
@@ -78,6 +79,7 @@ export function newGame(): GameForm {
     paceSeconds: String(PACE_MS / 1000),
     maxInvalidAttempts: "10",
     maxTimeouts: "3",
+    absenceSeconds: "20",
     substitute: "random",
     spectators: true,
     spectatorDelay: "0",
@@ -121,12 +123,14 @@ const WHOLE: Partial<Record<GameField, Bounds>> = {
 const PACE_SECONDS: Bounds = [0, 60];
 const DECISION_SECONDS: Bounds = [0.01, 86_400];
 const BANK_SECONDS: Bounds = [0, 86_400];
+const ABSENCE_SECONDS: Bounds = [0, 86_400];
 
 /** The problems of the fields. */
 export function gameProblems(form: GameForm, players: number): Partial<Record<GameField, NumberProblem>> {
   const found: Partial<Record<GameField, NumberProblem | undefined>> = {
     points: pointsProblem(form.points, players),
     paceSeconds: secondsProblem(form.paceSeconds, PACE_SECONDS),
+    absenceSeconds: secondsProblem(form.absenceSeconds, ABSENCE_SECONDS),
   };
   for (const [field, bounds] of Object.entries(WHOLE)) {
     found[field as GameField] = wholeProblem(String(form[field as GameField]), bounds);
@@ -179,6 +183,7 @@ export function policyOf(form: GameForm) {
     paceMs: milliseconds(form.paceSeconds),
     maxInvalidAttempts: Number(form.maxInvalidAttempts),
     maxTimeouts: Number(form.maxTimeouts),
+    absenceTimeMs: milliseconds(form.absenceSeconds),
     substitute: form.substitute,
     spectators: form.spectators,
     spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
@@ -210,6 +215,7 @@ export const GAME_FIELDS: Record<string, GameField> = {
   pace_ms: "paceSeconds",
   max_invalid_attempts: "maxInvalidAttempts",
   max_timeouts: "maxTimeouts",
+  absence_time_ms: "absenceSeconds",
   spectator_delay_decisions: "spectatorDelay",
   spectators_see_hands: "spectatorsSeeHands",
   visibility: "visibility",

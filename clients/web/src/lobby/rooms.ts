@@ -40,13 +40,19 @@ export function isForAgents(seats: readonly Participant[]): boolean {
 }
 
 /**
- * The clock of a person under a policy, milliseconds: per decision, and for the game beyond that.
+ * The clock of a person under a policy, milliseconds: per decision, and for the game beyond that. The
+ * absence time of people; undefined in games without one.
  */
-export function clockOfPeople(policy: RoomPolicy): { decisionTimeMs: number; bankMs: number } {
+export function clockOfPeople(policy: RoomPolicy): {
+  decisionTimeMs: number;
+  bankMs: number;
+  absenceTimeMs: number | undefined;
+} {
   const own = policy.clocks.find(({ kind }) => kind === ParticipantKind.HUMAN);
   return {
     decisionTimeMs: own?.decisionTimeMs ?? policy.decisionTimeMs ?? 0,
     bankMs: own?.bankMs ?? policy.bankMs ?? 0,
+    absenceTimeMs: own?.absenceTimeMs ?? policy.absenceTimeMs,
   };
 }
 

@@ -58,7 +58,7 @@ function Remarks({ id, hint, fault }: { id: string } & Pick<FieldFrame, "hint" |
 interface TextProps extends FieldFrame {
   value: string;
   onText: (text: string) => void;
-  type?: "text" | "number";
+  type?: "text" | "number" | "datetime-local";
   name?: string;
   min?: number;
   max?: number;
@@ -69,7 +69,7 @@ interface TextProps extends FieldFrame {
   required?: boolean;
 }
 
-/** A line of text, or a number as text. */
+/** A line of text, or a number or local time as text. */
 export function TextField({ label, hint, fault, faultId, onText, type = "text", ...rest }: TextProps) {
   return (
     <Field label={label} hint={hint} fault={fault} faultId={faultId}>

@@ -9,6 +9,7 @@ import { Announcer } from "./Announcer";
 import { Drawing } from "./Drawing";
 import css from "./Layout.module.css";
 import { Settings } from "./Settings";
+import { useTab } from "./tab";
 
 interface LayoutProps {
   here: Route;
@@ -32,10 +33,7 @@ export function Layout({ here, children }: LayoutProps) {
       <span>{words.name}</span>
     </>
   );
-  const title = `${pageName(here)} · ${words.name}`;
-  useEffect(() => {
-    document.title = title;
-  }, [title]);
+  useTab(`${pageName(here)} · ${words.name}`);
   return (
     <div class={css.layout} data-part="layout" data-page={here.page}>
       <a class={css.skip} href="#content">
@@ -83,7 +81,7 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
     { href: "/", label: words.lobby, pages: ["lobby", "new", "join"] },
     { href: "/tournaments", label: words.tournaments, pages: ["tournaments", "tournament", "newTournament"] },
     { href: "/leaderboard", label: words.leaderboard, pages: ["leaderboard", "person"] },
-    { href: "/tutorial", label: words.tutorial, pages: ["tutorial"] },
+    { href: "/tutorial", label: words.tutorial, pages: ["tutorial", "rules"] },
   ];
 }
 
@@ -116,6 +114,8 @@ function pageName(here: Route): string {
       return here.name;
     case "tutorial":
       return words.common.nav.tutorial;
+    case "rules":
+      return words.rules.title;
     case "unknown":
       return words.common.notFound.title;
   }

@@ -1,13 +1,16 @@
-// The settings of this device: language, theme, and deleting what is stored. Settings of a single
-// page (sound, replay speed) are on that page.
+// The settings of this device: language, theme, what happens at the table, full screen, and deleting
+// what is stored. Sound and replay speed are on their pages.
 
+import { useState } from "preact/hooks";
 import { type Language, language, languages, setLanguage, t } from "../i18n";
-
+import { isOn, type Preference, setPreference } from "../preferences";
 import { forgetAll } from "../store";
+import { askToNotify, canNotify } from "../table/attention";
 import { setTheme, type Theme, theme } from "../theme";
+import { Button } from "./Button";
 import { ConfirmButton } from "./ConfirmButton";
 import { Dialog } from "./Dialog";
-import { SelectField } from "./Field";
+import { CheckField, SelectField } from "./Field";
 import css from "./Layout.module.css";
 
 /** The dialog of settings. */
@@ -29,10 +32,74 @@ export function Settings({ onClose }: { onClose: () => void }) {
           options={themes.map((value) => ({ value, label: words.themes[value] }))}
           onPick={setTheme}
         />
+        <AtTheTable />
+        <FullScreen onClose={onClose} />
         <Forget />
       </div>
     </Dialog>
   );
+}
+
+/** The switches of the table. What this browser cannot do is left out. */
+function AtTheTable() {
+  const words = t().common.settings.table;
+  const possible: Preference[] = [
+    "tab",
+    ...("vibrate" in navigator ? (["vibration"] as const) : []),
+    ...("wakeLock" in navigator ? (["awake"] as const) : []),
+    "keys",
+    "plans",
+    "autoPass",
+    "moments",
+  ];
+  return (
+    <fieldset class={css.switches}>
+      <legend>{words.title}</legend>
+      {canNotify() && <Notifications />}
+      {possible.map((name) => (
+        <CheckField
+          key={name}
+          label={words.names[name]}
+          hint={words.hints[name]}
+          checked={isOn(name)}
+          onCheck={(on) => setPreference(name, on)}
+        />
+      ))}
+    </fieldset>
+  );
+}
+
+/** Asks the browser when it is switched on, never before. */
+function Notifications() {
+  const words = t().common.settings.table;
+  const [refused, setRefused] = useState(false);
+  const change = async (on: boolean) => {
+    const allowed = !on || (await askToNotify());
+    setRefused(!allowed);
+    setPreference("notification", on && allowed);
+  };
+  return (
+    <CheckField
+      label={words.names.notification}
+      hint={words.hints.notification}
+      fault={refused ? words.notAllowed : undefined}
+      checked={isOn("notification") && Notification.permission === "granted"}
+      onCheck={(on) => void change(on)}
+    />
+  );
+}
+
+/** Shows the page without the browser's bars, where the browser can. */
+function FullScreen({ onClose }: { onClose: () => void }) {
+  const words = t().common.settings;
+  if (!document.fullscreenEnabled) return null;
+  const on = document.fullscreenElement !== null;
+  const change = () => {
+    // First: the page would cover the dialog.
+    onClose();
+    void (on ? document.exitFullscreen() : document.documentElement.requestFullscreen());
+  };
+  return <Button onClick={change}>{on ? words.fullScreenOff : words.fullScreen}</Button>;
 }
 
 /** Deletes everything that is stored, after a confirmation: seats are lost with it. */

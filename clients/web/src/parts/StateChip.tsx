@@ -2,10 +2,10 @@
 
 import css from "./StateChip.module.css";
 
-/** A state: still open, under way, finished, or ended early. */
-export type ChipState = "open" | "playing" | "finished" | "ended";
+/** A state: still open, under way, paused, finished, or ended early. */
+export type ChipState = "open" | "playing" | "paused" | "finished" | "ended";
 
-const SIGNS: Record<ChipState, string> = { open: "◔", playing: "▶", finished: "✓", ended: "×" };
+const SIGNS: Record<ChipState, string> = { open: "◔", playing: "▶", paused: "‖", finished: "✓", ended: "×" };
 
 /** The state as a chip. */
 export function StateChip({ state, word }: { state: ChipState; word: string }) {

@@ -100,7 +100,7 @@ export function Controls({
           label={words.perspective}
           value={String(perspective)}
           options={[
-            { value: "all", label: words.allHands },
+            { value: "all", label: film.handsKnown ? words.allHands : words.noHands },
             ...frame.table.seats.map(({ seat }) => ({
               value: String(seat),
               label: words.as(nameOf(frame.table, seat)),

@@ -28,6 +28,8 @@ export interface Film {
   readonly length: number;
   /** Number of decisions. */
   readonly decisions: number;
+  /** Whether a hand is known at any moment; in some imported games none is. */
+  readonly handsKnown: boolean;
   /** The first moment of each Shift with its cards. */
   readonly shifts: readonly { readonly shift: number; readonly frame: number }[];
   /** A moment by number, from 0 to `length` - 1. */
@@ -50,6 +52,7 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
   let decisions = 0;
   const moments: Moment[] = [];
   const shifts: { shift: number; frame: number }[] = [];
+  let handsKnown = false;
   lines.forEach(({ line }, index) => {
     switch (line.case) {
       case "header":
@@ -66,6 +69,7 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
       }
       case "event":
         moments.push({ event: line.value, open: undefined, decisions });
+        handsKnown ||= showsHand(line.value);
         if (line.value.kind.case === "shiftStarted") {
           shifts.push({ shift: line.value.kind.value.shift, frame: moments.length - 1 });
         }
@@ -78,6 +82,7 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
     header,
     length: moments.length,
     decisions,
+    handsKnown,
     shifts,
     at: (number) => {
       const moment = moments[number];
@@ -88,6 +93,12 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
       return found < 0 ? undefined : found;
     },
   };
+}
+
+/** Whether an event says which cards somebody holds. */
+function showsHand({ kind }: GameEvent): boolean {
+  if (kind.case === "handReported") return (kind.value.hand?.cards.length ?? 0) > 0;
+  return kind.case === "shiftStarted" && kind.value.hands.some(({ cards }) => cards.length > 0);
 }
 
 /** The table at each moment, computed from the nearest stored or last requested one before it. */

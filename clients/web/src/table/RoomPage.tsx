@@ -125,20 +125,8 @@ function Held({ session }: { session: Session }) {
   const leave = <LeaveButton roomId={roomId} look={waiting ? "button" : "tool"} onClick={() => setLeaving(true)} />;
   return (
     <>
-      <Seated
-        acting={session}
-        banner={banner}
-        tools={!isOver(table) && leave}
-        onward={!others && hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} />}
-        below={
-          <>
-            <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
-            {leave}
-          </>
-        }
-      />
-      {!waiting && <KeptLinks roomId={roomId} />}
-      {/* Outside of waiting room and table, so that it stays open when one replaces the other. */}
+      {/* Outside of waiting room and table, and before them: it stays open, and in its place, when one
+          replaces the other. */}
       {leaving && !isOver(table) && (
         <LeaveDialog
           roomId={roomId}
@@ -148,6 +136,20 @@ function Held({ session }: { session: Session }) {
           onClose={() => setLeaving(false)}
         />
       )}
+      <Seated
+        acting={session}
+        study={studyIn(roomId) !== null}
+        banner={banner}
+        tools={!isOver(table) && leave}
+        onward={hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} others={others} />}
+        below={
+          <>
+            <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
+            {leave}
+          </>
+        }
+      />
+      {!waiting && <KeptLinks roomId={roomId} />}
     </>
   );
 }

@@ -1,15 +1,19 @@
-// The table from a seat, with announcements and sounds. The page knows where the seat comes from (a
+// The table from a seat, with announcements, sounds and what calls a person back on their turn. The page knows where the seat comes from (a
 // room or a tournament) and shows problems with it in the banner.
 
 import type { ComponentChildren } from "preact";
+import { isOn } from "../preferences";
 import type { Acting } from "./acting";
-import { gesture } from "./expressions";
+import { useAttention } from "./attention";
+import { useAutoPass } from "./auto-pass";
 import { useAnnounced } from "./following";
 import { TableView } from "./view/TableView";
 import { WaitingRoom } from "./view/WaitingRoom";
 
 interface SeatedProps {
   acting: Acting;
+  /** Whether the person takes part in a study: then every decision is made at its turn, by hand. */
+  study: boolean;
   banner?: ComponentChildren;
   /** Additional tools of the table. */
   tools?: ComponentChildren;
@@ -20,9 +24,11 @@ interface SeatedProps {
 }
 
 /** The table from a seat. */
-export function Seated({ acting, banner, tools, onward, below }: SeatedProps) {
-  const { table, own, decision } = acting.live.value;
+export function Seated({ acting, study, banner, tools, onward, below }: SeatedProps) {
+  const { table, own, decision, awaited } = acting.live.value;
   useAnnounced(table, own, decision);
+  useAttention(decision, table.phase !== "gameOver" && table.phase !== "aborted");
+  const autoPassing = useAutoPass(acting, !study && !table.physical && isOn("autoPass"));
   if (table.phase === "waiting") {
     return (
       <>
@@ -36,6 +42,7 @@ export function Seated({ acting, banner, tools, onward, below }: SeatedProps) {
       table={table}
       own={own}
       decision={decision}
+      awaited={awaited}
       sending={acting.sending.value !== undefined}
       trouble={acting.trouble.value}
       banner={banner}
@@ -43,9 +50,12 @@ export function Seated({ acting, banner, tools, onward, below }: SeatedProps) {
       onward={onward}
       caption={table.roomName}
       hint={acting.hint.value}
+      plans={!study && isOn("plans")}
+      autoPassing={autoPassing}
       onHint={table.policy?.hints ? acting.askHint : undefined}
       onAnswer={acting.answer}
-      onExpress={(label) => acting.express(gesture(label))}
+      onExpress={acting.express}
+      phrases={!study}
     />
   );
 }

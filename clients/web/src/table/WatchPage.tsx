@@ -34,6 +34,7 @@ function Watched({ spectating }: { spectating: Spectating }) {
     <TableView
       table={table}
       own={undefined}
+      awaited={spectating.awaited.value}
       banner={banner}
       caption={`${table.roomName} · ${t().table.watch.viewer}`}
     />

@@ -18,6 +18,11 @@ import { answerWords } from "./words";
  */
 export const PERSON_TIME_KEY = "person_decision_time_ms";
 
+/** Key of the annotation of an answer that the page sent for the person, as they had asked it to. */
+export const AUTOMATIC_KEY = "person_automatic";
+/** Passed because nothing else was legal, or chosen before the turn. */
+export type Automatic = "auto_pass" | "planned";
+
 /**
  * Whether decisions in a room or tournament are sent with the time measured here: only if the host
  * of a study asked for it.
@@ -47,8 +52,8 @@ export interface Acting {
   readonly hint: Signal<GivenHint | undefined>;
   /** Applies updates of the seat. */
   apply(updates: readonly SeatUpdate[]): void;
-  /** Answers the open decision. */
-  answer(action: number): void;
+  /** Answers the open decision; `automatic` if the person did not do so now. */
+  answer(action: number, automatic?: Automatic): void;
   /** Asks for a hint for the open decision. */
   askHint(): void;
   /** Shows an expression to the table. */
@@ -80,12 +85,16 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
     }
   };
 
-  const answer = async (action: number) => {
+  const answer = async (action: number, automatic?: Automatic) => {
     const { decision } = live.peek();
     if (!decision || sending.peek() !== undefined) return;
     const tookMs = shown.id === decision.id ? Math.round(performance.now() - shown.atMs) : undefined;
-    const extra: Record<string, string> = tookMs === undefined ? {} : { [PERSON_TIME_KEY]: String(tookMs) };
-    const value = { decisionId: decision.id, action, ...(timed ? { annotations: { extra } } : {}) };
+    const extra = {
+      ...(timed && tookMs !== undefined ? { [PERSON_TIME_KEY]: String(tookMs) } : {}),
+      ...(automatic ? { [AUTOMATIC_KEY]: automatic } : {}),
+    };
+    const noted = timed || automatic !== undefined;
+    const value = { decisionId: decision.id, action, ...(noted ? { annotations: { extra } } : {}) };
     sending.value = action;
     trouble.value = "";
     try {
@@ -142,7 +151,7 @@ export function startActing(ticket: string, table: TableState, seat: number, tim
     trouble,
     hint,
     apply,
-    answer: (action) => void answer(action),
+    answer: (action, automatic) => void answer(action, automatic),
     askHint: () => void askHint(),
     express: (gesture) => void tell({ case: "express", value: gesture }),
     resume: () => void tell({ case: "resume", value: {} }),

@@ -1,5 +1,6 @@
-// The expressions that a person can show with one click: label, valence and arousal as in the
-// protocol, reported by the person. The words are in the texts, the drawings in view/Face.tsx.
+// The expressions that a person can show with one click: feelings, with label, valence and arousal as
+// in the protocol, reported by the person; and quick phrases. The words are in the texts, the
+// drawings in view/Face.tsx.
 
 import { ExpressionSource } from "../gen/chefshat/v1/decision_pb";
 
@@ -11,9 +12,9 @@ export type Label = (typeof LABELS)[number];
 export interface Gesture {
   label: string;
   /** -1..1 */
-  valence: number;
+  valence?: number;
   /** -1..1 */
-  arousal: number;
+  arousal?: number;
   source: ExpressionSource;
 }
 
@@ -30,6 +31,37 @@ const PLACES: Record<Label, readonly [valence: number, arousal: number]> = {
 export function gesture(label: Label): Gesture {
   const [valence, arousal] = PLACES[label];
   return { label, valence, arousal, source: ExpressionSource.SELF_REPORT };
+}
+
+/**
+ * Quick phrases by id. The label of one is its id and this text: pages show it in their reader's
+ * language, everything else can show the text.
+ */
+export const PHRASES = {
+  "good-luck": "Good luck!",
+  "well-played": "Well played!",
+  thanks: "Thank you!",
+  "so-close": "That was close!",
+  oops: "Oops!",
+  sorry: "Sorry!",
+  thinking: "Let me think…",
+  "good-game": "Good game!",
+} as const;
+export type Phrase = keyof typeof PHRASES;
+
+const SAYS = "say:";
+
+export function phraseGesture(phrase: Phrase): Gesture {
+  return { label: `${SAYS}${phrase} ${PHRASES[phrase]}`, source: ExpressionSource.UNSPECIFIED };
+}
+
+/** The phrase of a label: its id if the page knows it, and its text; undefined for other labels. */
+export function phraseOf(label: string): { readonly id: Phrase | undefined; readonly text: string } | undefined {
+  if (!label.startsWith(SAYS)) return undefined;
+  const space = label.indexOf(" ");
+  const id = label.slice(SAYS.length, space < 0 ? undefined : space);
+  const known = Object.keys(PHRASES).find((phrase) => phrase === id) as Phrase | undefined;
+  return { id: known, text: space < 0 ? id : label.slice(space + 1) };
 }
 
 export function isLabel(label: string): label is Label {

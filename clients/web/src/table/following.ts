@@ -58,5 +58,5 @@ function requirementWords({ requirement }: OpenDecision): string {
   if (isOpening(requirement)) return `${lowestFace} ${goldenCard ? words.openingGolden : words.openingFace}.`;
   if (loneJoker) return words.anything;
   if (highestFace === 0) return words.nothing;
-  return `${words.face} ≤ ${highestFace}, ${fewestCards} ${words.cards(fewestCards)}.`;
+  return words.beat(highestFace, fewestCards);
 }

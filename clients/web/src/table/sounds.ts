@@ -39,6 +39,11 @@ const SOUNDS = {
     tone(784, 0.28, 0.2, 0.22),
     tone(1047, 0.42, 0.45, 0.22),
   ],
+  declared: [
+    tone(392, 0, 0.14, 0.24, "triangle"),
+    tone(523, 0.1, 0.14, 0.24, "triangle"),
+    tone(784, 0.2, 0.5, 0.26, "triangle"),
+  ],
   /** The rules do not allow it. */
   violated: [tone(330, 0, 0.16, 0.24, "triangle"), tone(247, 0.14, 0.3, 0.24, "triangle")],
   yourTurn: [tone(880, 0, 0.16, 0.24), tone(1175, 0.11, 0.3, 0.24)],
@@ -75,6 +80,7 @@ export function soundOf({ entry }: LogLine): Sound | undefined {
       return "play";
     case "passed":
       return "pass";
+    case "declared":
     case "pizzaDone":
     case "violated":
     case "finished":

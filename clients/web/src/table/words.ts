@@ -3,7 +3,8 @@
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
-import { isLabel } from "./expressions";
+import { seatNumber } from "../parts/SeatNumber";
+import { isLabel, phraseOf } from "./expressions";
 import type { Move } from "./model/actions";
 import { type Card, faceOf } from "./model/cards";
 import type { Reason } from "./model/picking";
@@ -18,7 +19,7 @@ export function nameOf(table: TableState, seat: number): string {
 export function distinctName(table: TableState, seat: number): string {
   const name = nameOf(table, seat);
   const same = table.seats.some((other) => other.seat !== seat && nameOf(table, other.seat) === name);
-  return same ? `${name} (${seat})` : name;
+  return same ? `${name} (${seatNumber(seat)})` : name;
 }
 
 /** A card, for screen readers and sentences. */
@@ -102,7 +103,10 @@ export function happeningWords(table: TableState, entry: LogEntry): SaidLine {
     case "shiftOver":
       return { seat: undefined, text: words.shiftOver(entry.shift, distinctName(table, entry.winner)) };
     case "expressed":
-      return { seat: entry.seat, text: words.shows(expressionWord(entry.label)) };
+      return {
+        seat: entry.seat,
+        text: (phraseOf(entry.label) ? words.says : words.shows)(expressionWord(entry.label)),
+      };
     case "substituted":
       return { seat: entry.seat, text: words.substituted(entry.agent) };
     case "handReported":
@@ -144,8 +148,10 @@ export function violationWords(table: TableState, { rule, text }: Breach, demand
   });
 }
 
-/** The word of an expression, or its label if it has none. */
+/** The word of an expression, the text of a phrase, or a label that has none. */
 export function expressionWord(label: string): string {
+  const phrase = phraseOf(label);
+  if (phrase) return phrase.id ? t().table.expressions.phrases[phrase.id] : phrase.text;
   return isLabel(label) ? t().table.expressions.words[label] : label;
 }
 

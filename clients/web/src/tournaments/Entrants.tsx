@@ -6,7 +6,7 @@ import { t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
 import css from "./Entrants.module.css";
 import { PersonName } from "./PersonName";
-import { nameOf } from "./structure";
+import { joinedIn, nameOf } from "./structure";
 
 interface EntrantsProps {
   tournament: Tournament;
@@ -22,7 +22,7 @@ const ON_WALL = 40;
 /** The list. */
 export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
   const words = t().tournaments.standings;
-  const { participants } = tournament;
+  const participants = joinedIn(tournament);
   if (participants.length === 0) return <p class="soft">{words.none}</p>;
   // The wall view shows the newest participants.
   const shown = large ? participants.slice(-ON_WALL) : participants;

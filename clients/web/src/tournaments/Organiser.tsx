@@ -1,6 +1,7 @@
 // The organiser's part of a tournament's page: inviting, adding those at physical tables, starting,
-// attending to physical games, closing.
+// attending to physical games, changing it by hand, closing.
 
+import { agentsFor, useOffered } from "../api/server";
 import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
@@ -10,16 +11,21 @@ import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
 import { AddAtTable } from "./AddAtTable";
+import { ManageGames, ManageParticipants, Pause } from "./ByHand";
 import type { LiveTournament } from "./following";
 import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
 import { PhysicalGames } from "./PhysicalGames";
-import { isEnded } from "./structure";
+import { isEnded, joinedIn } from "./structure";
 import css from "./Tournaments.module.css";
 import { isForAgents, isForPeople } from "./words";
 
 /** The organiser's part; null on other devices, and after the end. */
-export function Organiser({ live: { tournament, games } }: { live: LiveTournament }) {
+export function Organiser({ live }: { live: LiveTournament }) {
+  const { tournament, games } = live;
   const { tournamentId, state } = tournament;
+  const { offered } = useOffered();
+  const real = (tournament.settings?.physicalTables ?? 0) > 0;
+  const agents = offered ? agentsFor(offered, real, "") : [];
   const hosted = hostedTournament(tournamentId);
   if (!hosted || isEnded(tournament)) return null;
   const words = t().organise.own;
@@ -45,7 +51,10 @@ export function Organiser({ live: { tournament, games } }: { live: LiveTournamen
           {isForPeople(tournament) && <StudyLinks address={address} />}
         </>
       )}
+      {state === TournamentState.PLAYING && <Pause tournament={tournament} />}
       <PhysicalGames tournament={tournament} games={games} />
+      <ManageParticipants tournament={tournament} agents={agents} />
+      {state === TournamentState.PLAYING && <ManageGames live={live} />}
       <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
         {open ? words.closeOpen : words.closePlaying}
       </ConfirmButton>
@@ -55,10 +64,10 @@ export function Organiser({ live: { tournament, games } }: { live: LiveTournamen
 
 /** Starts the tournament, and says what follows. */
 function Begin({ tournament }: { tournament: Tournament }) {
-  const { tournamentId, participants, settings } = tournament;
+  const { tournamentId, settings } = tournament;
   const words = t().organise.own;
   const { busy, fault, run } = useAttempt();
-  const joined = participants.length;
+  const joined = joinedIn(tournament).length;
   const field = fieldFor(tournament);
   return (
     <div class={css.organiserBegin}>
@@ -76,8 +85,9 @@ function Begin({ tournament }: { tournament: Tournament }) {
 }
 
 /** Number of participants after state up: a knockout to a power of two, others to one table. */
-export function fieldFor({ participants, settings }: Tournament): number {
-  const joined = participants.length;
+export function fieldFor(tournament: Tournament): number {
+  const { settings } = tournament;
+  const joined = joinedIn(tournament).length;
   const table = settings?.rules?.players ?? 4;
   if (settings?.format !== TournamentFormat.KNOCKOUT) return Math.max(joined, table);
   return Math.max(table, 2 ** Math.ceil(Math.log2(Math.max(1, joined))));

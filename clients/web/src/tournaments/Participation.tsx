@@ -15,6 +15,7 @@ import { Notice } from "../parts/Notice";
 import { type Acting, asksForTimes } from "../table/acting";
 import { Seated } from "../table/Seated";
 import type { LiveTournament } from "./following";
+import { OwnPlace } from "./OwnPlace";
 import { type Participation as Part, startParticipation } from "./participation";
 import type { HeldPlace } from "./place";
 import { gameOf, isEnded } from "./structure";
@@ -22,12 +23,14 @@ import { gameOf, isEnded } from "./structure";
 interface ParticipationProps {
   held: HeldPlace;
   live: LiveTournament;
+  /** After the participant has left. */
+  onLeft: () => void;
   /** The rest of the page, shown between games. */
   children: ComponentChildren;
 }
 
 /** The page for a participant. */
-export function Participation({ held, live, children }: ParticipationProps) {
+export function Participation({ held, live, onLeft, children }: ParticipationProps) {
   const { tournamentId } = live.tournament;
   const ended = isEnded(live.tournament);
   const [part, setPart] = useState<Part | undefined>(undefined);
@@ -55,6 +58,7 @@ export function Participation({ held, live, children }: ParticipationProps) {
     return (
       <Seated
         acting={game}
+        study={study !== null}
         banner={
           <>
             {banner}
@@ -81,6 +85,7 @@ export function Participation({ held, live, children }: ParticipationProps) {
               {t().tournaments.part.toGame}
             </Button>
           )}
+          <OwnPlace {...{ held, live, onLeft }} />
         </OwnState>
       )}
       {children}
@@ -91,14 +96,16 @@ export function Participation({ held, live, children }: ParticipationProps) {
 /** The participant's status, and what happens next. */
 function OwnState(props: { held: HeldPlace; live: LiveTournament; children: ComponentChildren }) {
   const words = t().tournaments.part;
-  const { state } = props.live.tournament;
+  const { state, paused } = props.live.tournament;
   return (
     <Notice kind="good">
       <strong>{words.you(props.held.name)}</strong>{" "}
       {state === TournamentState.OPEN
         ? words.waitOpen
         : state === TournamentState.PLAYING
-          ? words.waitNext
+          ? paused
+            ? words.waitPaused
+            : words.waitNext
           : words.over}{" "}
       {props.children}
     </Notice>

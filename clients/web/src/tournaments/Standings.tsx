@@ -103,9 +103,11 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
   if (!participant) return null;
   const remarks = [
     participant.filler && words.filler,
+    participant.withdrawn && words.withdrawn,
+    participant.former.length > 0 && words.former(participant.former.map(({ name }) => name).join(", ")),
     standing.forfeited > 0 && words.forfeited(standing.forfeited),
     standing.byes > 0 && words.byes(standing.byes),
-    !participant.connected && !isEnded(tournament) && words.away,
+    !participant.connected && !participant.withdrawn && !isEnded(tournament) && words.away,
   ].filter(Boolean);
   return (
     <>

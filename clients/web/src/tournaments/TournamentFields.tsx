@@ -130,22 +130,28 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
 
 /** When it starts, and how long games wait for absent players. */
 export function StartFields(props: FormProps) {
-  const { form, change } = props;
+  const { form, faults, change } = props;
   const words = t().organise;
   return (
     <div class={formCss.fields}>
       <SelectField
         label={words.start.label}
-        hint={form.start === "byHand" ? words.start.byHandHint : words.start.joinedHint}
+        hint={words.start[`${form.start}Hint`]}
         value={form.start}
-        options={[
-          { value: "byHand", label: words.start.byHand },
-          { value: "joined", label: words.start.joined },
-        ]}
+        options={(["byHand", "joined", "time"] as const).map((value) => ({ value, label: words.start[value] }))}
         onPick={(start) => change({ start })}
       />
       {form.start === "joined" && (
         <Typed {...props} name="startWhen" label={words.startWhen} hint={words.startWhenHint} />
+      )}
+      {form.start === "time" && (
+        <TextField
+          type="datetime-local"
+          label={words.startAt}
+          value={form.startAt}
+          fault={faults.startAt}
+          onText={(startAt) => change({ startAt })}
+        />
       )}
       <Typed {...props} name="noShowSeconds" label={words.noShow} hint={words.noShowHint} />
     </div>

@@ -2,19 +2,20 @@
 // organiser starts it here. With ?wall it is shown as a wall view.
 
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { hidden, useHiding } from "../experiment/hiding";
 import { StudyJoin } from "../experiment/StudyJoin";
 import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
-import { TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
+import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import joinCss from "../lobby/Join.module.css";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
+import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
 import {
   type FollowedTournament,
@@ -24,19 +25,22 @@ import {
   useGames,
   useTournament,
 } from "./following";
+import { hostedTournament } from "./hosting";
 import { JoinTournament } from "./JoinTournament";
 import { Organiser } from "./Organiser";
 import { Participation } from "./Participation";
-import { type HeldPlace, heldPlace, takePlace } from "./place";
+import { type HeldPlace, heldPlace, placeFromLink, takePlace } from "./place";
 import { Rounds } from "./Rounds";
 import { Confidence, Standings } from "./Standings";
-import { isEnded } from "./structure";
+import { isEnded, participantOf } from "./structure";
 import tournamentsCss from "./Tournaments.module.css";
 import { Wall } from "./Wall";
 import { dealsWords, inShort, playWords, TournamentStateChip } from "./words";
 
 /** The page. */
 export function TournamentPage({ route }: PageProps<"tournament">) {
+  // Before anything is requested: a private tournament is shown only to those who have a place.
+  useMemo(() => placeFromLink(route.tournamentId), [route.tournamentId]);
   const followed = useTournament(route.tournamentId);
   return followed ? <Followed followed={followed} /> : null;
 }
@@ -79,9 +83,19 @@ function Visited({ live }: { live: LiveTournament }) {
     setHeld(heldPlace(tournamentId));
     setAnother(false);
   };
+  const lost = held && lostPlace(tournament, held);
+  if (held && lost) {
+    return (
+      <Overview live={live} mine={lost === "left" ? held.participant : undefined}>
+        <Notice kind="hint">{t().tournaments.part[lost]}</Notice>
+        <Organiser live={live} />
+        {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
+      </Overview>
+    );
+  }
   if (held && holder === "reader") {
     return (
-      <Participation held={held} live={live}>
+      <Participation held={held} live={live} onLeft={() => setHeld(heldPlace(tournamentId))}>
         <Overview live={live} mine={held.participant}>
           <Organiser live={live} />
         </Overview>
@@ -170,11 +184,13 @@ function Overview({ live, mine, children }: OverviewProps) {
             </ul>
           )}
           {deals && <p class="soft small">{deals}</p>}
+          <Countdown tournament={tournament} />
         </div>
         {!hidden.value.includes("pages") && (
-          <ButtonLink href={`${pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}?wall`}>
-            {words.wall.open}
-          </ButtonLink>
+          <div class={tournamentsCss.links}>
+            {tournament.round > 0 && <Button onClick={() => window.print()}>{words.print}</Button>}
+            <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
+          </div>
         )}
       </header>
       {children}
@@ -200,6 +216,21 @@ function Overview({ live, mine, children }: OverviewProps) {
       )}
     </>
   );
+}
+
+/** The address of the wall view; on the organiser's device with the code, so that any screen shows it. */
+function wallOf({ tournamentId, state }: Tournament): string {
+  const code = state === TournamentState.OPEN ? hostedTournament(tournamentId)?.joinCode : undefined;
+  const path = `${pathOf({ page: "tournament", tournamentId })}?wall`;
+  return code ? `${path}&code=${encodeURIComponent(code)}` : path;
+}
+
+/** Whether the place of this device was given up, or somebody else has it. */
+function lostPlace(tournament: Tournament, { participant, name }: HeldPlace): "left" | "replaced" | null {
+  const here = participantOf(tournament, participant);
+  if (!here || isEnded(tournament)) return null;
+  if (here.withdrawn) return "left";
+  return here.name !== name && here.former.some((former) => former.name === name) ? "replaced" : null;
 }
 
 function standingsTitle({ tournament }: LiveTournament): string {

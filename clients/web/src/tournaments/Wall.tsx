@@ -1,16 +1,19 @@
 // The wall view of a tournament: name, standings and current tables, as large as the screen allows;
-// before the start, the participants. What does not fit is shown in turns.
+// before the start, the participants and the way in. What does not fit is shown in turns.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
-import { TournamentFormat } from "../gen/chefshat/v1/tournament_pb";
+import { TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import { QrCode } from "../lobby/Invite";
 import { Drawing } from "../parts/Drawing";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
+import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
 import { useFit } from "./fit";
 import { type LiveTournament, useGames } from "./following";
+import { hostedTournament, invitationTo } from "./hosting";
 import { TablesOnWall } from "./Rounds";
 import { Standings } from "./Standings";
 import { bracket, playedRounds } from "./structure";
@@ -31,6 +34,7 @@ export function Wall({ live }: { live: LiveTournament }) {
   const { tournament } = live;
   const words = t().tournaments;
   useWithoutFrame();
+  const code = tournament.state === TournamentState.OPEN ? codeFor(tournament.tournamentId) : undefined;
   return (
     <div class={css.wall}>
       <header class={css.head}>
@@ -38,24 +42,47 @@ export function Wall({ live }: { live: LiveTournament }) {
         <h1>{tournament.settings?.name}</h1>
         <TournamentStateChip tournament={tournament} />
         <span class={css.course}>{inShort(tournament)}</span>
+        <Countdown tournament={tournament} />
         <a class={css.leave} href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}>
           <span aria-hidden="true">×</span>
           <span class="visually-hidden">{words.wall.close}</span>
         </a>
       </header>
       {tournament.round === 0 ? (
-        <section class={`${css.part} ${css.field}`}>
-          <h2>{words.standings.field}</h2>
-          <Fitted>
-            <Entrants tournament={tournament} large />
-          </Fitted>
-          <p class={css.play}>{playWords(tournament).join(" · ")}</p>
-        </section>
+        <>
+          <section class={`${css.part} ${css.field} ${code ? "" : css.alone}`}>
+            <h2>{words.standings.field}</h2>
+            <Fitted>
+              <Entrants tournament={tournament} large />
+            </Fitted>
+            <p class={css.play}>{playWords(tournament).join(" · ")}</p>
+          </section>
+          {code && <WayIn tournamentId={tournament.tournamentId} code={code} />}
+        </>
       ) : (
         <Played live={live} />
       )}
     </div>
   );
+}
+
+/** The join code and its QR code, while anybody may join. */
+function WayIn({ tournamentId, code }: { tournamentId: string; code: string }) {
+  const words = t().tournaments.wall;
+  return (
+    <section class={`${css.part} ${css.wayIn}`} data-part="wall-invitation">
+      <h2>{words.join}</h2>
+      <QrCode text={invitationTo(tournamentId, code)} label={t().lobby.invite.qr} />
+      <p>
+        {words.orCode} <b class={css.code}>{code}</b>
+      </p>
+    </section>
+  );
+}
+
+/** The join code: in the address, or known to the organiser's device. */
+function codeFor(tournamentId: string): string | undefined {
+  return new URLSearchParams(location.search).get("code") ?? hostedTournament(tournamentId)?.joinCode;
 }
 
 /** The standings and the tables after the start. */

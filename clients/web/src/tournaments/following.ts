@@ -85,8 +85,8 @@ function quietMs(tournament: Tournament): number {
  * A key that changes when something in the server's lists has changed, but at most once per
  * `SOONEST_MS`.
  */
-function useChanges({ tournamentId, state, round, gamesOver }: Tournament): string {
-  const now = `${tournamentId} ${state} ${round} ${gamesOver}`;
+function useChanges({ tournamentId, state, round, gamesOver, gamesPlaying }: Tournament): string {
+  const now = `${tournamentId} ${state} ${round} ${gamesOver} ${gamesPlaying}`;
   const [throttled, setThrottled] = useState(now);
   const toldAtMs = useRef(performance.now());
   useEffect(() => {

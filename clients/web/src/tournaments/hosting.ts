@@ -1,14 +1,15 @@
-// Organising a tournament: creating, starting and closing it, and the secrets that this device
-// stores for it. Taking part is in place.ts.
+// Organising a tournament: creating, starting, changing and closing it, and the secrets that this
+// device stores for it. Taking part is in place.ts.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
-import type { ParticipantKind } from "../gen/chefshat/v1/room_pb";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
+import { linkToPlace } from "./place";
 
 /** The secrets of a tournament that this device created. */
 export interface HostedTournament {
@@ -44,6 +45,47 @@ export async function startTournament(tournamentId: string): Promise<void> {
 /** Closes a tournament that this device created; running games are aborted. */
 export async function closeTournament(tournamentId: string): Promise<void> {
   await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Pauses or resumes a tournament that this device created. */
+export async function setPaused(tournamentId: string, paused: boolean): Promise<void> {
+  const call = { timeoutMs: CALL_LIMIT_MS };
+  if (paused) await tournamentApi.pauseTournament(ownership(tournamentId), call);
+  else await tournamentApi.resumeTournament(ownership(tournamentId), call);
+}
+
+/** Removes a participant of a tournament that this device created. */
+export async function removeParticipant(tournamentId: string, participant: number): Promise<void> {
+  await tournamentApi.removeParticipant({ ...ownership(tournamentId), participant }, { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Gives the place of a participant to a built-in agent. */
+export async function replaceByAgent(tournamentId: string, participant: number, builtInAgent: string): Promise<void> {
+  const request = { ...ownership(tournamentId), participant, builtInAgent };
+  await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Gives the place of a participant to somebody else. Returns the address to send to that person. */
+export async function replaceByPerson(tournamentId: string, participant: number, name: string): Promise<string> {
+  const request = {
+    ...ownership(tournamentId),
+    participant,
+    name: name.trim(),
+    kind: ParticipantKind.HUMAN,
+    requestId: crypto.getRandomValues(new Uint8Array(32)),
+  };
+  const { ticket } = await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+  return linkToPlace(tournamentId, { ticket, participant, name: name.trim() });
+}
+
+/** Postpones a game of a tournament that this device created. */
+export async function postponeGame(tournamentId: string, game: number): Promise<void> {
+  await tournamentApi.postponeGame({ ...ownership(tournamentId), game }, { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Calls a due or void game before all others. */
+export async function callGame(tournamentId: string, game: number): Promise<void> {
+  await tournamentApi.callGame({ ...ownership(tournamentId), game }, { timeoutMs: CALL_LIMIT_MS });
 }
 
 /** Adds a participant at a physical table to a tournament that this device created. */

@@ -10,8 +10,7 @@ import {
   TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
 
-/** Participants per table of a knockout, and how many of them advance. */
-const KNOCKOUT_SEATS = 4;
+/** Participants of a knockout's table that advance. */
 const ADVANCING = 2;
 
 /** The games of a table in a round: the same participants, with rotated seats. */
@@ -74,7 +73,8 @@ export function bracket(tournament: Tournament, games: readonly TournamentGame[]
   const played = playedRounds(games);
   const first = played[0];
   if (!first) return [];
-  const count = Math.max(1, Math.floor(tournament.participants.length / KNOCKOUT_SEATS));
+  // The last round has one table.
+  const count = 2 ** Math.max(0, tournament.rounds - 1);
   const rounds = Array.from({ length: Math.log2(count) + 1 }, (_, index) => index + 1);
   return rounds.map((round) => ({
     round,
@@ -129,7 +129,8 @@ export function mergedGames(listed: readonly TournamentGame[], streamed: readonl
   const byNumber = new Map(listed.map((game) => [game.game, game]));
   for (const game of streamed) {
     const before = byNumber.get(game.game);
-    if (!before || !isOver(before)) byNumber.set(game.game, game);
+    // A void game may be called again.
+    if (before?.state !== TournamentGameState.COUNTED) byNumber.set(game.game, game);
   }
   return [...byNumber.values()].sort((one, other) => one.game - other.game);
 }
@@ -147,6 +148,11 @@ export function isEnded(tournament: Tournament): boolean {
 /** The running game of a participant, if any. */
 export function gameOf(games: readonly TournamentGame[], gameId: string): TournamentGame | undefined {
   return games.find((game) => game.gameId === gameId);
+}
+
+/** The participants, without those who left before the start. */
+export function joinedIn({ state, participants }: Tournament): TournamentParticipant[] {
+  return participants.filter(({ withdrawn }) => !withdrawn || state !== TournamentState.OPEN);
 }
 
 /** A participant by number. */

@@ -33,8 +33,10 @@ export interface TournamentForm extends GameForm {
   robots: boolean;
   maxParticipants: string;
   physicalTables: string;
-  start: "byHand" | "joined";
+  start: "byHand" | "joined" | "time";
   startWhen: string;
+  /** As a date field has it: local time, without a zone. */
+  startAt: string;
   noShowSeconds: string;
   maxCalls: string;
   maxParallel: string;
@@ -53,7 +55,7 @@ export type TournamentField = keyof TournamentForm;
 
 /** Why a field is invalid. */
 export type Problem = NumberProblem | OwnProblem;
-export type OwnProblem = "nameMissing" | "tooMany" | "nobody" | "notASeed" | "realOpening";
+export type OwnProblem = "nameMissing" | "tooMany" | "nobody" | "notASeed" | "realOpening" | "startPassed";
 
 /** Most participants of a tournament in the protocol. */
 const MAX_PARTICIPANTS = 1024;
@@ -76,6 +78,7 @@ export function newTournament(agents: readonly string[]): TournamentForm {
     physicalTables: "0",
     start: "byHand",
     startWhen: "8",
+    startAt: "",
     noShowSeconds: "60",
     maxCalls: "2",
     maxParallel: "64",
@@ -135,6 +138,7 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
     if (form[seed].trim() !== "" && !/^[0-9a-f]{64}$/i.test(form[seed].trim())) problems[seed] = "notASeed";
   if (Number(form.physicalTables) > 0 && form.opening !== "golden") problems.opening = "realOpening";
   if (!form.people && !form.agents && !form.robots) problems.people = "nobody";
+  if (form.start === "time" && !(Date.parse(form.startAt) > Date.now())) problems.startAt = "startPassed";
   if (form.name.trim() === "") problems.name = "nameMissing";
   return problemsAlone(problems);
 }
@@ -178,6 +182,7 @@ export function settingsOf(form: TournamentForm): MessageInitShape<typeof Tourna
     physicalTables: Number(form.physicalTables),
     builtInAgents: Object.entries(form.builtIn).flatMap(([agent, count]) => Array<string>(Number(count)).fill(agent)),
     startWhenJoined: joined,
+    startAtMs: form.start === "time" ? BigInt(Date.parse(form.startAt)) : 0n,
     noShowTimeMs: milliseconds(form.noShowSeconds),
     maxCalls: Number(form.maxCalls),
     maxParallelGames: Number(form.maxParallel),
@@ -201,6 +206,7 @@ export const TOURNAMENT_FIELDS: Record<string, TournamentField> = {
   physical_tables: "physicalTables",
   built_in_agents: "builtIn",
   start_when_joined: "startWhen",
+  start_at_ms: "startAt",
   no_show_time_ms: "noShowSeconds",
   max_calls: "maxCalls",
   max_parallel_games: "maxParallel",

@@ -1,10 +1,17 @@
 // A tournament in words: format, state, how it is played.
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
-import { type Tournament, TournamentDeals, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
+import {
+  type Tournament,
+  TournamentDeals,
+  TournamentFormat,
+  type TournamentSettings,
+  TournamentState,
+} from "../gen/chefshat/v1/tournament_pb";
 import { dateLocale, t } from "../i18n";
 import { clockOfPeople, visibilityWords } from "../lobby/rooms";
 import { StateChip } from "../parts/StateChip";
+import { joinedIn } from "./structure";
 
 /** The state of a tournament. */
 export function TournamentStateChip({ tournament }: { tournament: Tournament }) {
@@ -13,7 +20,11 @@ export function TournamentStateChip({ tournament }: { tournament: Tournament }) 
     case TournamentState.OPEN:
       return <StateChip state="open" word={words.open} />;
     case TournamentState.PLAYING:
-      return <StateChip state="playing" word={words.playing} />;
+      return tournament.paused ? (
+        <StateChip state="paused" word={words.paused} />
+      ) : (
+        <StateChip state="playing" word={words.playing} />
+      );
     case TournamentState.FINISHED:
       return <StateChip state="finished" word={words.finished} />;
     default:
@@ -25,7 +36,8 @@ export function TournamentStateChip({ tournament }: { tournament: Tournament }) 
 export function inShort(tournament: Tournament): string {
   const words = t().tournaments;
   const parts = [formatWord(tournament)];
-  if (tournament.participants.length > 0) parts.push(words.participants(tournament.participants.length));
+  const joined = joinedIn(tournament).length;
+  if (joined > 0) parts.push(words.participants(joined));
   if (tournament.state === TournamentState.PLAYING) parts.push(words.roundOf(tournament.round, tournament.rounds));
   if (tournament.state !== TournamentState.OPEN) parts.push(words.gamesOver(tournament.gamesOver, tournament.games));
   return [...parts, ...visibilityWords(tournament.settings?.policy)].join(" · ");
@@ -33,8 +45,21 @@ export function inShort(tournament: Tournament): string {
 
 /** When it was created, which tells apart tournaments of the same name. */
 export function madeWords({ createdAtMs }: Tournament): string {
+  return t().tournaments.made(moment(createdAtMs));
+}
+
+/** A point in time, milliseconds since the Unix epoch. */
+function moment(ms: bigint): string {
   const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
-  return t().tournaments.made(dates.format(Number(createdAtMs)));
+  return dates.format(Number(ms));
+}
+
+/** When it starts, before the start. */
+function startWords({ startAtMs, startWhenJoined }: TournamentSettings): string {
+  const words = t().tournaments.play;
+  if (startAtMs === 0n) return startWhenJoined ? words.beginsAt(startWhenJoined) : words.beginsByHand;
+  const at = moment(startAtMs);
+  return startWhenJoined ? words.beginsAtOrOn(startWhenJoined, at) : words.beginsOn(at);
 }
 
 /**
@@ -45,7 +70,7 @@ export function playWords(tournament: Tournament): string[] {
   const words = t().tournaments.play;
   const { settings } = tournament;
   if (!settings) return [];
-  const parts = [settings.startWhenJoined ? words.beginsAt(settings.startWhenJoined) : words.beginsByHand];
+  const parts = [startWords(settings)];
   if (settings.format === TournamentFormat.KNOCKOUT) parts.push(words.knockout(settings.gamesPerPairing));
   else parts.push(words.rounds(settings.rounds, settings.gamesPerPairing));
   const stop = settings.rules?.stop;

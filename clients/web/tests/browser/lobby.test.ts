@@ -16,7 +16,7 @@ test("a room is created, and a guest with its invitation takes the seat reserved
   await host.page.goto(`${server.url}/`);
   await host.page.getByRole("link", { name: "Create a room…" }).click();
   await host.page.getByLabel("Name of the room").fill("Friday evening");
-  await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
+  await host.page.getByLabel("Seat 2").selectOption({ label: "Free for a person" });
   await host.page.getByRole("button", { name: "Create the room" }).click();
   await host.page.waitForURL(/\/rooms\/[0-9a-f]{32}$/);
   await host.page.getByRole("heading", { name: "Friday evening" }).waitFor();
@@ -109,7 +109,7 @@ test("leaving frees the seat before the game, explains what happens during it, a
   const host = await person(browser);
   await host.page.goto(`${server.url}/new`);
   await host.page.getByLabel("Name of the room").fill("To be left");
-  await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
+  await host.page.getByLabel("Seat 2").selectOption({ label: "Free for a person" });
   await host.page.getByRole("button", { name: "Create the room" }).click();
   // No seat is free for an agent, and the address works on this machine only.
   await host.page.getByText("This address works on this machine only.").waitFor();
@@ -217,7 +217,7 @@ test("a private game is found and replayed by the one who created it alone", asy
   const host = await person(browser);
   await host.page.goto(`${server.url}/new`);
   await host.page.getByLabel("Name of the room").fill("Behind closed doors");
-  await host.page.getByLabel("Seat 0").selectOption("built-in random");
+  await host.page.getByLabel("Seat 1").selectOption("built-in random");
   await host.page.getByLabel("Visible to").selectOption({ label: "Only participants" });
   await host.page.getByText("Nobody else can find it").waitFor();
   await host.page.getByLabel("Delay of built-in agents").fill("0");

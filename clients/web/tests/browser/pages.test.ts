@@ -87,6 +87,18 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
     ready: "[data-decision]",
     opened: '[data-part~="tool-lookup"]',
   },
+  "what can I do": {
+    path: () => `/rooms/${rooms.table}`,
+    ready: "[data-decision]",
+    opened: '[data-part~="help"]',
+  },
+  phrases: {
+    path: () => `/rooms/${rooms.table}`,
+    ready: "[data-decision]",
+    opened: '[data-part~="expressions"] button:last-of-type',
+  },
+  settings: { path: () => "/tutorial", ready: '[data-part~="lesson"]', opened: '[data-part~="header-settings"]' },
+  rules: { path: () => "/rules", ready: '[data-part~="rules"]' },
   leaving: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: '[data-part~="tool-leave"]' },
   "table with real cards": { path: () => `/rooms/${physicalId}/table`, ready: '[data-part~="entry"]' },
   "entering a play": {

@@ -25,12 +25,12 @@ async function createTable(page: Page): Promise<string> {
   await page.getByLabel("Name of the room").fill("Kitchen table");
   await page.getByLabel("Cards", { exact: true }).selectOption({ label: "Real cards on a table" });
   await page.getByLabel("Players", { exact: true }).selectOption("3");
-  await page.getByLabel("Seat 1", { exact: true }).selectOption({ label: "A person at the table" });
-  await page.getByLabel("Seat 2", { exact: true }).selectOption({ label: "Remote: free for a person" });
+  await page.getByLabel("Seat 2", { exact: true }).selectOption({ label: "A person at the table" });
+  await page.getByLabel("Seat 3", { exact: true }).selectOption({ label: "Remote: free for a person" });
   await page.getByRole("button", { name: "Create the room" }).click();
   await page.getByRole("alert").filter({ hasText: "Enter the name" }).first().waitFor();
-  await page.getByLabel("Name, seat 0").fill("Ada");
-  await page.getByLabel("Name, seat 1").fill("Bo");
+  await page.getByLabel("Name, seat 1").fill("Ada");
+  await page.getByLabel("Name, seat 2").fill("Bo");
   // A refused form is unfolded, so that all its fields are there.
   await page.getByLabel("The game ends").selectOption({ label: "after a number of Shifts" });
   await page.getByLabel("Shifts", { exact: true }).fill("1");
@@ -176,7 +176,7 @@ test("with the keyboard alone: a hand is typed, a play and a pass are reported, 
   await tabTo(page, (on) => on.label === "Cards", "Shift+Tab");
   await page.keyboard.press("Enter");
   await hears("The player with the Golden 11 opens the Shift.");
-  await press("0 Ada");
+  await press("1 Ada");
   await press("11, mozzarella");
   await press("More: How many");
   await press("Ada lays 2 × 11, Golden");

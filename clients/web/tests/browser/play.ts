@@ -114,6 +114,35 @@ export async function hearing(page: Page): Promise<string[]> {
 export const HAND = "Your hand";
 
 /**
+ * Takes the decision with the keys of cards: the key of a face and Enter, or p. Returns the number of
+ * keys.
+ */
+export async function byCardKeys(page: Page): Promise<number> {
+  let pressed = 0;
+  const press = async (key: string) => {
+    await page.keyboard.press(key);
+    pressed += 1;
+  };
+  if (await page.locator('[data-action="decline"]').isVisible()) {
+    await press("n");
+    return pressed;
+  }
+  const free = page.locator('[data-part~="hand-card"][aria-disabled="false"]');
+  if ((await free.count()) === 0) {
+    await press("p");
+    return pressed;
+  }
+  const faces = free.and(page.locator(':not([data-card="J"])'));
+  const card = (await faces.count()) > 0 ? faces : free;
+  await press((await card.last().getAttribute("aria-keyshortcuts")) ?? "");
+  await page
+    .locator('[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]')
+    .waitFor();
+  await press("Enter");
+  return pressed;
+}
+
+/**
  * Takes the decision with the keyboard: arrow keys along the hand, the space bar picks a card,
  * Enter plays.
  */

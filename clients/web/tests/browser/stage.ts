@@ -13,6 +13,9 @@ const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
 FLAGS.push("--disable-background-networking", "--disable-component-update", "--disable-sync");
 
+/** How many times slower than this machine the pages run: no test may depend on their speed. */
+const SLOWDOWN = Number(process.env.CHEFSHAT_SLOWDOWN ?? 1);
+
 /** A running server. */
 export class Server {
   private constructor(
@@ -116,6 +119,10 @@ export async function person(
   });
   context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
+  if (SLOWDOWN > 1) {
+    const devtools = await context.newCDPSession(page);
+    await devtools.send("Emulation.setCPUThrottlingRate", { rate: SLOWDOWN });
+  }
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => {

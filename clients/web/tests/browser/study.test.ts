@@ -230,7 +230,7 @@ test("a room closed before its game has no last questionnaire, and a room that i
 test("the host of a room creates links for its participants", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/new`);
-  await page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
+  await page.getByLabel("Seat 2").selectOption({ label: "Free for a person" });
   await page.getByRole("button", { name: "Create the room" }).click();
   await page.getByText("Links for a study").click();
   await page.getByLabel("Participants, one per line").fill("P01\nP02");

@@ -4,6 +4,7 @@
 //! Shift, a growing line for a pizza. The text always has colours; the caller prints it and may
 //! strip them.
 
+pub(crate) mod awaited;
 mod chain;
 pub(crate) mod hand;
 mod results;
@@ -18,6 +19,7 @@ use chefshat_engine::{Opening, RuleSet};
 
 use crate::kind::kind_name;
 use crate::output::{stop_in_words, variations};
+use awaited::AwaitedSeat;
 use chain::Chain;
 use story::Line;
 pub(super) use story::{abort_reason, aborted, title};
@@ -80,6 +82,18 @@ impl Narrator {
             _ => String::new(),
         };
         before + &after
+    }
+
+    /// Returns the text about a seat that is away and awaited; empty for others.
+    pub(super) fn wait_for(&mut self, awaited: &v1::Awaited) -> String {
+        let away = AwaitedSeat::new(awaited, 0).filter(AwaitedSeat::is_away);
+        let words = away.and_then(|awaited| awaited.words(&self.view, 0));
+        let line = words.map(|words| Line {
+            seat: None,
+            words,
+            heading: false,
+        });
+        self.remarks(line.as_slice(), DIM)
     }
 
     /// Ends an open line when no more events will come.

@@ -199,6 +199,7 @@ fn roles_special_actions_and_incidents() {
         Kind::Substituted(v1::Substituted {
             seat: 0,
             built_in_agent: "random".into(),
+            for_good: false,
         }),
         play(0, (2, 6, 0), 15),
         done(1, Some(0), 0),

@@ -155,7 +155,9 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
     }
     for tournament in store.tournaments(usize::MAX).await? {
         for entry in &tournament.entries {
-            if let TournamentEntry::Change(Change::Joined(entrant)) = entry
+            if let TournamentEntry::Change(
+                Change::Joined(entrant) | Change::Replaced { by: entrant, .. },
+            ) = entry
                 && entrant.built_in.is_none()
                 && entrant.name == name
             {

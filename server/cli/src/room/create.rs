@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use chefshat_agents::{AgentNameError, NamedAgent};
 use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
-use chefshat_engine::RuleSet;
+use chefshat_engine::{MAX_SEATS, RuleSet};
 use chefshat_record::convert::kind_from_name;
 use clap::Args;
 
-use super::super::connect::{ServerArg, attendant_link, free_seats};
+use super::super::connect::{ServerArg, attendant_link};
 use super::super::policy_args::PolicyArgs;
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::secret_file::SecretFile;
@@ -33,13 +33,13 @@ pub(super) struct Create {
     name: String,
     #[command(flatten)]
     server: ServerArg,
-    /// How to fill the next seat: random, random_unmasked, greedy or trained (played by the
-    /// server), replay:GAME-ID:SEAT (imitates the player who had that seat in a recorded game),
-    /// each optionally with =NAME for another name; open, agent, human or robot (who may join); or,
-    /// with --physical, table=NAME or table_robot=NAME (a person or a robot at the table).
-    /// Repeatable; seats not listed are open.
-    #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
-    seats: Vec<v1::SeatConfig>,
+    /// How to fill the next seat: random, greedy, trained or monte_carlo (played by the server),
+    /// replay:GAME-ID:SEAT (imitates the player who had that seat, from 0, in a recorded game), each
+    /// optionally with =NAME for another name; open, agent, human or robot (who may join); or, with
+    /// --physical, table=NAME or table_robot=NAME (a person or a robot at the table). Several seats
+    /// as in human*3. Repeatable; seats not listed are open.
+    #[arg(long = "seat", value_name = "SEAT", value_parser = seats)]
+    seats: Vec<Seats>,
     /// Play with real cards: the server deals nothing, and what happens at the table is reported, by
     /// a camera, on the page, or with `chefshat table`.
     #[arg(long, conflicts_with_all = ["game_seed", "branch", "hands"])]
@@ -135,7 +135,7 @@ impl Create {
                     table.ticket
                 ))?;
             }
-            if let Some(words) = next_step(&room, self.server.url(), &code) {
+            for words in next_steps(&room, self.server.url(), &code) {
                 say(words)?;
             }
         }
@@ -163,21 +163,22 @@ impl Create {
         start: Option<Start>,
         players: usize,
     ) -> Result<v1::CreateRoomRequest, CommandError> {
-        if self.seats.len() > players {
-            let described = self.seats.len();
+        let seats: Vec<_> = (self.seats.iter().flat_map(Seats::each)).collect();
+        if seats.len() > players {
+            let described = seats.len();
             return Err(
                 format!("--seat: {described} seats are described, but {players} play").into(),
             );
         }
         let at_table = |seat: &v1::SeatConfig| matches!(seat.filled_by, Some(FilledBy::AtTable(_)));
-        if !self.physical && self.seats.iter().any(at_table) {
+        if !self.physical && seats.iter().any(at_table) {
             return Err("--seat table: only a room with --physical has seats at a table".into());
         }
         let open = v1::SeatConfig {
             filled_by: Some(FilledBy::ReservedFor(0)),
             ..v1::SeatConfig::default()
         };
-        let all = self.seats.iter().cloned().chain(std::iter::repeat(open));
+        let all = seats.into_iter().chain(std::iter::repeat(open));
         Ok(v1::CreateRoomRequest {
             name: self.name.clone(),
             rules: (self.start.branch().is_none()).then(|| self.rules.message()),
@@ -200,6 +201,32 @@ impl Create {
 struct Table {
     ticket: String,
     link: String,
+}
+
+/// Seats that are filled in the same way.
+#[derive(Debug, Clone)]
+struct Seats {
+    seat: v1::SeatConfig,
+    count: usize,
+}
+
+impl Seats {
+    fn each(&self) -> impl Iterator<Item = v1::SeatConfig> {
+        std::iter::repeat_n(self.seat.clone(), self.count)
+    }
+}
+
+fn seats(word: &str) -> Result<Seats, String> {
+    let (word, count) = match word.rsplit_once('*') {
+        Some((word, count)) => (word, count.parse().ok()),
+        None => (word, Some(1)),
+    };
+    let count = count.filter(|count| (1..=MAX_SEATS).contains(count));
+    let count = count.ok_or_else(|| format!("after * give a number from 1 to {MAX_SEATS}"))?;
+    Ok(Seats {
+        seat: seat(word)?,
+        count,
+    })
 }
 
 fn seat(word: &str) -> Result<v1::SeatConfig, String> {
@@ -284,26 +311,42 @@ fn refused(error: chefshat_client::Error) -> CommandError {
     }
 }
 
-/// How to fill the free seats.
-fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
-    let free = free_seats(room);
-    let first = room.seats.iter().find(|seat| seat.name.is_empty())?;
-    let free = match free {
-        1 => "1 seat is free; fill it with:".to_owned(),
-        _ => format!("{free} seats are free; fill each with:"),
+/// How to fill the free seats: a line for each kind of participant that they are for.
+fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
+    let kinds = [
+        v1::ParticipantKind::Unspecified,
+        v1::ParticipantKind::Agent,
+        v1::ParticipantKind::Robot,
+        v1::ParticipantKind::Human,
+    ];
+    let free = |kind: v1::ParticipantKind| {
+        let free = room.seats.iter().filter(|seat| seat.name.is_empty());
+        free.filter(|seat| seat.reserved_for() == kind).count()
     };
     let there = format!("--server {server} --code {code}");
-    Some(match first.reserved_for() {
-        v1::ParticipantKind::Unspecified | v1::ParticipantKind::Agent => {
-            format!("{free} chefshat agent greedy {there}")
+    let steps = kinds.into_iter().filter_map(|kind| {
+        let (whom, command) = match kind {
+            v1::ParticipantKind::Unspecified => ("", format!("chefshat agent greedy {there}")),
+            v1::ParticipantKind::Agent => (" for agents", format!("chefshat agent greedy {there}")),
+            v1::ParticipantKind::Robot => {
+                let command = format!("chefshat agent greedy {there} --kind-of robot");
+                (" for robots", command)
+            }
+            v1::ParticipantKind::Human => {
+                let page = format!("{server}/join/{code}");
+                let command = format!("chefshat play {there}, or in a browser at {page}");
+                (" for people", command)
+            }
+        };
+        match free(kind) {
+            0 => None,
+            1 => Some(format!("1 seat is free{whom}; fill it with: {command}")),
+            free => Some(format!(
+                "{free} seats are free{whom}; fill each with: {command}"
+            )),
         }
-        v1::ParticipantKind::Human => {
-            format!("{free} chefshat play {there}, or in a browser at {server}/join/{code}")
-        }
-        v1::ParticipantKind::Robot => {
-            format!("{free} chefshat agent greedy {there} --kind-of robot")
-        }
-    })
+    });
+    steps.collect()
 }
 
 #[cfg(test)]
@@ -436,18 +479,52 @@ mod tests {
                 seats,
                 ..v1::Room::default()
             };
-            next_step(&room, "http://[::1]:7", "BCDF2345")
+            next_steps(&room, "http://[::1]:7", "BCDF2345")
         };
-        let (any, human) = (v1::ParticipantKind::Unspecified, v1::ParticipantKind::Human);
-        assert_eq!(words(vec![seat("Ada", any)]), None);
+        let any = v1::ParticipantKind::Unspecified;
+        let (human, robot) = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
+        assert!(words(vec![seat("Ada", any)]).is_empty());
+        let there = "--server http://[::1]:7 --code BCDF2345";
+        let page = "http://[::1]:7/join/BCDF2345";
+        let people = format!("chefshat play {there}, or in a browser at {page}");
         assert_eq!(
-            words(vec![seat("Ada", any), seat("", human)]).as_deref(),
-            Some(
-                "1 seat is free; fill it with: \
-                 chefshat play --server http://[::1]:7 --code BCDF2345, or in a browser at http://[::1]:7/join/BCDF2345"
-            )
+            words(vec![seat("Ada", any), seat("", human)]),
+            [format!("1 seat is free for people; fill it with: {people}")]
         );
-        let two = words(vec![seat("", any), seat("", any)]).expect("two are free");
-        assert!(two.starts_with("2 seats are free;"), "{two}");
+        assert_eq!(
+            words(vec![seat("", any), seat("", any)]),
+            [format!(
+                "2 seats are free; fill each with: chefshat agent greedy {there}"
+            )]
+        );
+        // Each command is for seats that admit its kind.
+        let all = [robot, human, human, human].map(|kind| seat("", kind));
+        assert_eq!(
+            words(all.to_vec()),
+            [
+                format!(
+                    "1 seat is free for robots; fill it with: chefshat agent greedy {there} --kind-of robot"
+                ),
+                format!("3 seats are free for people; fill each with: {people}"),
+            ]
+        );
+    }
+
+    #[test]
+    fn several_seats_may_be_filled_at_once() {
+        let request = request("--seat robot --seat human*3").expect("a room");
+        let kinds = [
+            v1::ParticipantKind::Robot,
+            v1::ParticipantKind::Human,
+            v1::ParticipantKind::Human,
+            v1::ParticipantKind::Human,
+        ];
+        assert_eq!(request.seats.len(), 4);
+        for (seat, kind) in request.seats.iter().zip(kinds) {
+            assert_eq!(seat.filled_by, Some(FilledBy::ReservedFor(kind.into())));
+        }
+        for word in ["human*", "human*0", "human*x", "*3"] {
+            assert!(seats(word).is_err(), "{word}");
+        }
     }
 }

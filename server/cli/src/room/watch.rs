@@ -4,8 +4,9 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use chefshat_client::v1::game_event::Kind;
-use chefshat_client::{Backoff, Error};
+use chefshat_client::{Backoff, Error, Watched};
 use clap::Args;
+use serde::Serialize;
 
 use super::super::CommandError;
 use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
@@ -26,7 +27,7 @@ pub(super) struct Watch {
     server: ServerArg,
     #[command(flatten)]
     secrets: SecretArgs,
-    /// Print each event as a JSON line.
+    /// Print each event, and whom the game waits for when that changes, as JSON lines.
     #[arg(long)]
     json: bool,
 }
@@ -57,8 +58,17 @@ impl Watch {
         });
         let mut end = None;
         loop {
-            let event = match spectator.next().await {
-                Ok(Some(event)) => event,
+            let event = match spectator.next_watched().await {
+                Ok(Some(Watched::Event(event))) => *event,
+                Ok(Some(Watched::Awaited(awaited))) => {
+                    if self.json {
+                        writeln!(out, "{}", json_line("awaited", "awaited", &awaited)?)?;
+                    } else {
+                        write!(out, "{}", narrator.wait_for(&awaited))?;
+                    }
+                    out.flush()?;
+                    continue;
+                }
                 Ok(None) if end.is_some() => break,
                 interrupted => {
                     if !self.json {
@@ -74,10 +84,7 @@ impl Watch {
                 _ => {}
             }
             if self.json {
-                // A message may have values that JSON has not, such as NaN: an error, not a panic.
-                let game_event = serde_json::to_value(&event)?;
-                let line = serde_json::json!({"event": "game", "game_event": game_event});
-                writeln!(out, "{line}")?;
+                writeln!(out, "{}", json_line("game", "game_event", &event)?)?;
             } else {
                 write!(out, "{}", narrator.narrate(&event))?;
             }
@@ -85,6 +92,16 @@ impl Watch {
         }
         Ok(end.unwrap_or(ExitCode::FAILURE))
     }
+}
+
+/// A line of JSON. A message may have values that JSON has not, such as NaN: an error, not a panic.
+fn json_line(
+    event: &str,
+    field: &str,
+    message: &impl Serialize,
+) -> serde_json::Result<serde_json::Value> {
+    let message = serde_json::to_value(message)?;
+    Ok(serde_json::json!({"event": event, field: message}))
 }
 
 /// Why the stream ended before the game.

@@ -14,7 +14,7 @@ use super::super::remote::named_agent;
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
-use super::words::{DealsArg, FormatArg};
+use super::words::{DealsArg, FormatArg, time, time_in_words};
 
 /// Maximum number of participants.
 const MAX_BUILT_IN: usize = 1024;
@@ -45,6 +45,10 @@ pub(super) struct Create {
     /// start` starts it.
     #[arg(long, value_name = "N")]
     start_when: Option<u32>,
+    /// Start by itself at this time, with those who have joined: as in 2026-05-01T18:00:00Z,
+    /// 2026-05-01T20:00:00+02:00, or 30m from now.
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    start_at: Option<u64>,
     /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to
     /// find a winner.
     #[arg(long, value_name = "N")]
@@ -180,6 +184,7 @@ impl Create {
             deal_seed: self.deal_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             filler: self.filler.clone().unwrap_or_default(),
             physical_tables: asked("--physical-tables", self.physical_tables)?,
+            start_at_ms: self.start_at.unwrap_or(0),
         })
     }
 
@@ -197,9 +202,14 @@ impl Create {
             Some(file) => format!("--owner-file {}", file.display()),
             None => "--owner-token TOKEN".to_owned(),
         };
-        let starts = match self.start_when {
-            Some(count) => format!("it starts when {count} have joined"),
-            None => {
+        let starts = match (self.start_when, self.start_at) {
+            (Some(count), None) => format!("it starts when {count} have joined"),
+            (None, Some(at)) => format!("it starts at {}", time_in_words(at)),
+            (Some(count), Some(at)) => {
+                let at = time_in_words(at);
+                format!("it starts when {count} have joined, at the latest at {at}")
+            }
+            (None, None) => {
                 format!("start it with: chefshat tournament start {id} --server {server} {owner}")
             }
         };
@@ -236,7 +246,7 @@ pub(super) fn built_in(words: &str) -> Result<BuiltIn, String> {
     }
 }
 
-fn agent_name(name: &str) -> Result<String, String> {
+pub(super) fn agent_name(name: &str) -> Result<String, String> {
     named_agent(name).map(NamedAgent::name)
 }
 
@@ -273,6 +283,7 @@ fn flagged(field: &str, message: &str) -> CommandError {
             _ => message.to_owned(),
         },
         "start_when_joined" => by_flag("start_when", message),
+        "start_at_ms" => by_flag("start_at", message),
         "built_in_agents" => by_flag("built_in", message),
         "kinds" => by_flag("kind", message),
         _ => by_flag(field, message),
@@ -304,7 +315,7 @@ mod tests {
         let flags = format!(
             "--built-in greedy*2,trained --built-in random --start-when 9 --rounds 5 --games-per-pairing 3 --deals same --kind human \
              --kind robot --max-participants 20 --no-show-time-ms 5000 --max-calls 3 --max-parallel-games 7 --draw-seed {seed} --deal-seed {seed} \
-             --filler greedy --physical-tables 2 --target-shifts 3 --decision-time-ms 700 --clock human:60000"
+             --filler greedy --physical-tables 2 --start-at 2026-05-01T20:00:00+02:00 --target-shifts 3 --decision-time-ms 700 --clock human:60000"
         );
         let rules = v1::RuleSet {
             preset: "paper".into(),
@@ -315,6 +326,7 @@ mod tests {
             kind: v1::ParticipantKind::Human.into(),
             decision_time_ms: Some(60_000),
             bank_ms: None,
+            absence_time_ms: None,
         };
         let policy = v1::RoomPolicy {
             decision_time_ms: Some(700),
@@ -345,6 +357,7 @@ mod tests {
             deal_seed: vec![7; 32],
             filler: "greedy".into(),
             physical_tables: 2,
+            start_at_ms: 1_777_658_400_000,
         };
         assert_eq!(settings(&flags).expect("they make sense"), expected);
     }
@@ -363,6 +376,7 @@ mod tests {
                 "--built-in: 1200 of at most 1024",
             ),
             ("--draw-seed 07", "64 hexadecimal digits"),
+            ("--start-at 18:00", "2026-05-01T18:00:00Z"),
         ] {
             let error = settings(flags).expect_err(flags).to_string();
             assert!(error.contains(words), "{error}");

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
 use super::super::{CommandError, progress, say};
 use super::tables::{self, Field};
-use super::words::{is_over, state};
+use super::words::{is_over, state, time_in_words};
 use crate::narration::clean;
 
 /// Rows of the table while a tournament is in progress.
@@ -156,13 +156,22 @@ fn title(tournament: &v1::Tournament) -> String {
     let name = clean(&settings.name, 40);
     match tournament.state() {
         v1::TournamentState::Open => {
-            let joined = tournament.participants.len();
+            let participants = tournament.participants.iter();
+            let joined = participants.filter(|it| !it.withdrawn).count();
             let begins = match settings.start_when_joined {
                 0 => String::new(),
                 count => format!(" of {count}"),
             };
-            format!("{name}: open, {joined}{begins} have joined")
+            let at = match settings.start_at_ms {
+                0 => String::new(),
+                at => format!(", starts at {}", time_in_words(at)),
+            };
+            format!("{name}: open, {joined}{begins} have joined{at}")
         }
+        v1::TournamentState::Playing if tournament.paused => format!(
+            "{name}: paused in round {} of {}, {} being played",
+            tournament.round, tournament.rounds, tournament.games_playing
+        ),
         v1::TournamentState::Playing => format!(
             "{name}: round {} of {}, {} being played",
             tournament.round, tournament.rounds, tournament.games_playing

@@ -148,7 +148,10 @@ fn in_a_line(tournament: &v1::Tournament) -> String {
 }
 
 /// A game in one line: number, state, players with results, record.
-fn game_in_a_line(game: &v1::TournamentGame, participants: &[v1::TournamentParticipant]) -> String {
+pub(super) fn game_in_a_line(
+    game: &v1::TournamentGame,
+    participants: &[v1::TournamentParticipant],
+) -> String {
     let name = |seat: &v1::TournamentGameSeat| {
         let who = usize::try_from(seat.participant)
             .ok()
@@ -166,10 +169,11 @@ fn game_in_a_line(game: &v1::TournamentGame, participants: &[v1::TournamentParti
     let seats: Vec<String> = seats
         .into_iter()
         .map(|seat| {
-            let note = match (seat.forfeited, seat.substituted) {
-                (true, _) => " (forfeited)",
-                (false, true) => " (substituted)",
-                (false, false) => "",
+            let note = match (seat.forfeited, seat.left, seat.substituted) {
+                (true, _, _) => " (forfeited)",
+                (false, true, _) => " (left)",
+                (false, false, true) => " (substituted)",
+                (false, false, false) => "",
             };
             match over {
                 true => format!(

@@ -1,7 +1,8 @@
-//! `chefshat tournament`: creates, joins, starts, follows and closes tournaments of a server, and
-//! shows results. Pairings and standings are those of `chefshat_tournament`, computed by the
+//! `chefshat tournament`: creates, joins, starts, changes, follows and closes tournaments of a server,
+//! and shows results. Pairings and standings are those of `chefshat_tournament`, computed by the
 //! server.
 
+mod by_hand;
 mod create;
 mod files;
 mod follow;
@@ -46,6 +47,26 @@ enum TournamentAction {
     Add(owner::Add),
     /// Show the secrets of the physical table at which a game is being played.
     Table(owner::Table),
+    /// Withdraw a participant, with its ticket or the owner token.
+    Withdraw(by_hand::Withdraw),
+    /// Remove a participant: it is withdrawn, and its ticket ends.
+    Remove(by_hand::Remove),
+    /// Give the place of a participant to a built-in agent or to somebody else.
+    Replace(by_hand::Replace),
+    /// Pause a tournament: no game is called until it is resumed. Games in progress continue.
+    #[command(
+        after_help = "Example:\n  chefshat tournament pause 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+    )]
+    Pause(owner::Owned),
+    /// Resume a paused tournament.
+    #[command(
+        after_help = "Example:\n  chefshat tournament resume 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+    )]
+    Resume(owner::Owned),
+    /// Postpone a game that is not in progress: it moves to the end of the queue.
+    Postpone(by_hand::Postpone),
+    /// Call a due or void game before all others.
+    Call(by_hand::CallAgain),
     /// Close a tournament early: games in progress are aborted, counted games keep their results.
     #[command(
         after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
@@ -71,6 +92,13 @@ impl TournamentCommand {
             TournamentAction::Start(owned) => owned.start().await,
             TournamentAction::Add(command) => command.run().await,
             TournamentAction::Table(command) => command.run().await,
+            TournamentAction::Withdraw(command) => command.run().await,
+            TournamentAction::Remove(command) => command.run().await,
+            TournamentAction::Replace(command) => command.run().await,
+            TournamentAction::Pause(owned) => owned.pause().await,
+            TournamentAction::Resume(owned) => owned.resume().await,
+            TournamentAction::Postpone(command) => command.run().await,
+            TournamentAction::Call(command) => command.run().await,
             TournamentAction::Close(owned) => owned.close().await,
             TournamentAction::Follow(command) => command.run().await,
             TournamentAction::Results(command) => command.run().await,

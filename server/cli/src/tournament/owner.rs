@@ -1,5 +1,5 @@
-//! Commands for the owner of a tournament: `chefshat tournament start` and `close`, `add` for a
-//! participant at a physical table, and `table` for the secrets of such a table.
+//! Commands for the owner of a tournament: `chefshat tournament start`, `pause`, `resume` and
+//! `close`, `add` for a participant at a physical table, and `table` for the secrets of such a table.
 
 use std::process::ExitCode;
 
@@ -16,14 +16,14 @@ use super::words::state;
 pub(super) struct Owned {
     /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
-    tournament_id: String,
+    pub(super) tournament_id: String,
     #[command(flatten)]
-    owner: OwnerArgs,
+    pub(super) owner: OwnerArgs,
     #[command(flatten)]
-    server: ServerArg,
+    pub(super) server: ServerArg,
     /// Print the result as a JSON line.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Add a participant who plays at a physical table with real cards.
@@ -128,11 +128,33 @@ impl Owned {
         self.print("closed", &tournament)
     }
 
+    /// Pauses the tournament.
+    pub(super) async fn pause(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.owner.token()?, self.server.connect().await?);
+        let tournament = client
+            .pause_tournament(self.tournament_id.as_str(), token)
+            .await?;
+        self.print("paused", &tournament)
+    }
+
+    /// Resumes the tournament.
+    pub(super) async fn resume(self) -> Result<ExitCode, CommandError> {
+        let (token, client) = (self.owner.token()?, self.server.connect().await?);
+        let tournament = client
+            .resume_tournament(self.tournament_id.as_str(), token)
+            .await?;
+        self.print("resumed", &tournament)
+    }
+
     fn print(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {
         if self.json {
             say(serde_json::json!({"event": event, "tournament": tournament}))?;
         } else {
-            let (id, state) = (&tournament.tournament_id, state(tournament.state()));
+            let id = &tournament.tournament_id;
+            let state = match tournament.paused {
+                true => "paused",
+                false => state(tournament.state()),
+            };
             say(format_args!("tournament {id} is {state}"))?;
         }
         Ok(ExitCode::SUCCESS)

@@ -81,7 +81,7 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
     let name = clean(&settings.name, 64);
     heading(&mut text, &format!("{name}: {}", state(tournament.state())));
     let format = format_name(settings.format());
-    let participants = counted(tournament.participants.len() as u64, "participant");
+    let participants = counted(results.standings.len() as u64, "participant");
     let (over, games) = (tournament.games_over, tournament.games);
     let course = match tournament.state() {
         v1::TournamentState::Open => "not started".to_owned(),

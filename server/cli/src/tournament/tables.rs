@@ -51,6 +51,7 @@ impl<'t> Field<'t> {
     /// Kind of a participant, or its built-in agent.
     fn what(&self, participant: u32) -> String {
         match self.get(participant) {
+            Some(who) if who.withdrawn => "withdrawn".to_owned(),
             Some(who) if who.filler => "filler".to_owned(),
             Some(who) if !who.built_in_agent.is_empty() => clean(&who.built_in_agent, 15),
             Some(who) => kind_name(who.kind()).to_owned(),

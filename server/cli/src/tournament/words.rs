@@ -1,7 +1,11 @@
 //! Arguments and names for values of the protocol about tournaments.
 
 use chefshat_client::v1;
+use chefshat_server::clock::since_epoch_ms;
+use chrono::{DateTime, SecondsFormat};
 use clap::ValueEnum;
+
+use super::super::numbers::duration;
 
 /// Format: who plays whom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -68,6 +72,31 @@ impl StateArg {
             Self::Closed => v1::TournamentState::Closed,
         }
     }
+}
+
+/// Parses a point in time, or a duration from now, to milliseconds since the Unix epoch.
+pub(super) fn time(words: &str) -> Result<u64, String> {
+    if let Ok(duration) = duration(words) {
+        let later = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
+        return Ok(since_epoch_ms().saturating_add(later));
+    }
+    let time = DateTime::parse_from_rfc3339(words).ok();
+    let milliseconds = time.and_then(|time| u64::try_from(time.timestamp_millis()).ok());
+    milliseconds.ok_or_else(|| {
+        "give a time as 2026-05-01T18:00:00Z or 2026-05-01T20:00:00+02:00, or a duration from now as 30m"
+            .to_owned()
+    })
+}
+
+/// A point in time, in UTC.
+pub(super) fn time_in_words(milliseconds: u64) -> String {
+    let time = i64::try_from(milliseconds)
+        .ok()
+        .and_then(DateTime::from_timestamp_millis);
+    time.map_or_else(
+        || format!("{milliseconds} ms after 1970"),
+        |time| time.to_rfc3339_opts(SecondsFormat::Secs, true),
+    )
 }
 
 /// The name of a format.

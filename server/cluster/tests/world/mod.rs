@@ -6,8 +6,8 @@ mod property;
 use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_cluster::{
-    BeatAnswer, ClaimAnswer, Created, Epoch, Input, Kept, LeaseTimes, Node, NodeId, Output, Phase,
-    Step, Tables, Writer,
+    BeatAnswer, ClaimAnswer, Created, Epoch, Input, LeaseTimes, Node, NodeId, Output, Phase, Step,
+    Tables, Writer, Written,
 };
 use stateright::{Model, Property};
 
@@ -109,7 +109,7 @@ pub(crate) enum Answer {
     Claimed(Option<Epoch>),
     Done,
     Created(Created),
-    Kept(Kept),
+    Written(Written),
     /// The row at a position, and whether the writer is fenced.
     Read(Option<(Epoch, Entry)>, bool),
 }
@@ -131,7 +131,7 @@ pub(crate) struct Server {
     pub(crate) running: BTreeMap<u8, Running>,
     /// The epoch to release once all its writes are answered.
     releases: Option<Epoch>,
-    /// A room is being created. What is created is not given up, so that whoever resumes the unit finds it.
+    /// A room is being created. What is created is not given up, so that the server that resumes the unit finds it.
     creates: bool,
     /// Serving the unit at this epoch waits for that.
     serves_next: Option<Epoch>,
@@ -163,7 +163,7 @@ pub(crate) struct World {
 }
 
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub(crate) enum Happening {
+pub(crate) enum Transition {
     Tick,
     Wake(usize),
     Decide(usize, u8),
@@ -321,7 +321,7 @@ impl Cluster {
                     true => present(tables, item, epoch),
                     false => epoch,
                 };
-                Answer::Kept(tables.append(item, epoch, position, entry))
+                Answer::Written(tables.append(item, epoch, position, entry))
             }
             Request::Read(item, epoch, position) => {
                 let row = tables.journal(item).get(position as usize);
@@ -341,11 +341,11 @@ impl Cluster {
                     true => tables.journal(item).len() as u64,
                     false => rows,
                 };
-                let kept = tables.finish(item, checked, counted);
-                if kept == Kept::Kept {
+                let written = tables.finish(item, checked, counted);
+                if written == Written::Committed {
                     world.ended.entry(item).or_insert((epoch, rows));
                 }
-                Answer::Kept(kept)
+                Answer::Written(written)
             }
             Request::Leave => {
                 tables.leave(node);
@@ -362,13 +362,15 @@ impl Cluster {
         };
         let input = match (to, answer) {
             (Request::Append(item, epoch, ..), answer) => {
-                let kept = match answer {
-                    Some(Answer::Kept(kept)) => Some(kept),
-                    _ => self.has(Fault::UnknownIsCommitted).then_some(Kept::Kept),
+                let written = match answer {
+                    Some(Answer::Written(written)) => Some(written),
+                    _ => self
+                        .has(Fault::UnknownIsCommitted)
+                        .then_some(Written::Committed),
                 };
                 let running = it.running.get_mut(&item);
                 if let Some(running) = running.filter(|it| it.writer.epoch() == epoch) {
-                    let step = running.writer.appended(kept);
+                    let step = running.writer.appended(written);
                     self.go_on(world, server, item, step);
                 }
                 return;
@@ -389,14 +391,10 @@ impl Cluster {
                     return;
                 }
                 match answer {
-                    Some(Answer::Kept(Kept::Kept)) => {
+                    Some(Answer::Written(Written::Committed)) => {
+                        // The answer to a beat says when all of the unit is over.
                         it.running.remove(&item);
-                        if it.running.is_empty() {
-                            it.releases = None;
-                            Input::Ended(UNIT)
-                        } else {
-                            return self.release_if_quiet(world, server);
-                        }
+                        return self.release_if_quiet(world, server);
                     }
                     Some(_) => Input::Fenced(UNIT, epoch),
                     // Doing so again changes nothing.
@@ -412,7 +410,7 @@ impl Cluster {
                 }
                 match answer {
                     // It was stopped meanwhile.
-                    Some(_) if it.running.is_empty() => {
+                    Some(_) if it.node.owned().all(|owned| owned != (UNIT, epoch)) => {
                         return self.release_if_quiet(world, server);
                     }
                     // It is taken if this is a repetition.
@@ -433,7 +431,7 @@ impl Cluster {
                     false => sent_ms,
                 },
                 answer: match answer {
-                    Some(Answer::Beat(Some(owned))) => BeatAnswer::Kept(owned),
+                    Some(Answer::Beat(Some(owned))) => BeatAnswer::Renewed(owned),
                     Some(_) => BeatAnswer::Unknown,
                     None => BeatAnswer::None,
                 },
@@ -542,7 +540,7 @@ impl World {
 
 impl Model for Cluster {
     type State = World;
-    type Action = Happening;
+    type Action = Transition;
 
     fn init_states(&self) -> Vec<World> {
         let times = LeaseTimes::new(1, 2, 3).expect("these are in order");
@@ -582,57 +580,57 @@ impl Model for Cluster {
         }]
     }
 
-    fn actions(&self, world: &World, actions: &mut Vec<Happening>) {
+    fn actions(&self, world: &World, actions: &mut Vec<Transition>) {
         let bounds = &self.bounds;
         if world.now < bounds.until {
-            actions.push(Happening::Tick);
+            actions.push(Transition::Tick);
         }
         for (server, it) in world.servers.iter().enumerate() {
             let Some(it) = it.as_ref().filter(|it| !it.left) else {
                 continue;
             };
             if (it.node.wakes_at_ms()).is_some_and(|at| at <= world.now) {
-                actions.push(Happening::Wake(server));
+                actions.push(Transition::Wake(server));
             }
             if world.serves(server) {
                 let idle = it.running.iter().filter(|(_, running)| running.is_idle());
                 for (item, _) in idle {
                     if world.decisions < bounds.decisions {
-                        actions.push(Happening::Decide(server, *item));
+                        actions.push(Transition::Decide(server, *item));
                     }
                     if world.ends < bounds.ends {
-                        actions.push(Happening::End(server, *item));
+                        actions.push(Transition::End(server, *item));
                     }
                 }
                 let creates = it.creates || it.running.contains_key(&ROOM);
                 if world.creations < bounds.creations && !creates {
-                    actions.push(Happening::Create(server));
+                    actions.push(Transition::Create(server));
                 }
             }
             if world.crashes < bounds.crashes {
-                actions.push(Happening::Crash(server));
+                actions.push(Transition::Crash(server));
             }
             if world.drains < bounds.drains && it.node.phase() == Phase::Serving {
-                actions.push(Happening::Drain(server));
+                actions.push(Transition::Drain(server));
             }
         }
         for &(server, request, awaited) in &world.requests {
-            actions.push(Happening::Arrive(server, request, awaited));
+            actions.push(Transition::Arrive(server, request, awaited));
             if awaited && world.lost < bounds.lost {
-                actions.push(Happening::GivenUp(server, request));
+                actions.push(Transition::GivenUp(server, request));
             }
         }
         for (server, request, answer) in &world.answers {
-            actions.push(Happening::Answered(*server, *request, answer.clone()));
+            actions.push(Transition::Answered(*server, *request, answer.clone()));
             if world.lost < bounds.lost {
-                actions.push(Happening::AnswerLost(*server, *request, answer.clone()));
+                actions.push(Transition::AnswerLost(*server, *request, answer.clone()));
             }
         }
     }
 
-    fn next_state(&self, world: &World, happening: Happening) -> Option<World> {
+    fn next_state(&self, world: &World, transition: Transition) -> Option<World> {
         let mut next = world.clone();
-        self.happen(&mut next, happening);
+        self.apply(&mut next, transition);
         Some(next)
     }
 
@@ -642,16 +640,16 @@ impl Model for Cluster {
 }
 
 impl Cluster {
-    /// Something happens.
-    fn happen(&self, next: &mut World, happening: Happening) {
-        match happening {
-            Happening::Tick => next.now += 1,
-            Happening::Wake(server) => self.put_in(next, server, Input::Time),
-            Happening::Drain(server) => {
+    /// Changes the world.
+    fn apply(&self, next: &mut World, transition: Transition) {
+        match transition {
+            Transition::Tick => next.now += 1,
+            Transition::Wake(server) => self.put_in(next, server, Input::Time),
+            Transition::Drain(server) => {
                 next.drains += 1;
                 self.put_in(next, server, Input::Drain);
             }
-            Happening::Crash(server) => {
+            Transition::Crash(server) => {
                 next.crashes += 1;
                 next.servers[server] = None;
                 next.answers.retain(|(to, ..)| *to != server);
@@ -660,7 +658,7 @@ impl Cluster {
                     .map(|(from, request, awaited)| (from, request, awaited && from != server))
                     .collect();
             }
-            Happening::Decide(server, item) => {
+            Transition::Decide(server, item) => {
                 next.decisions += 1;
                 let entry = Entry {
                     server,
@@ -675,38 +673,38 @@ impl Cluster {
                 let append = Request::Append(item, epoch, position, entry);
                 self.send(next, server, append);
             }
-            Happening::End(server, item) => {
+            Transition::End(server, item) => {
                 next.ends += 1;
                 let running = next.running(server, item);
                 running.ends = true;
                 let (epoch, rows) = (running.writer.epoch(), running.writer.position());
                 self.send(next, server, Request::Finish(item, epoch, rows));
             }
-            Happening::Create(server) => {
+            Transition::Create(server) => {
                 next.creations += 1;
                 let epoch = next.running(server, UNIT).writer.epoch();
                 let it = next.servers[server].as_mut().expect("it lives");
                 it.creates = true;
                 self.send(next, server, Request::Create(epoch));
             }
-            Happening::Arrive(server, request, awaited) => {
+            Transition::Arrive(server, request, awaited) => {
                 next.requests.remove(&(server, request, awaited));
                 let answer = self.carry_out(next, server, request);
                 if awaited {
                     next.answers.insert((server, request, answer));
                 }
             }
-            Happening::GivenUp(server, request) => {
+            Transition::GivenUp(server, request) => {
                 next.lost += 1;
                 next.requests.remove(&(server, request, true));
                 next.requests.insert((server, request, false));
                 self.take_in(next, server, request, None);
             }
-            Happening::Answered(server, request, answer) => {
+            Transition::Answered(server, request, answer) => {
                 next.answers.remove(&(server, request, answer.clone()));
                 self.take_in(next, server, request, Some(answer));
             }
-            Happening::AnswerLost(server, request, answer) => {
+            Transition::AnswerLost(server, request, answer) => {
                 next.lost += 1;
                 next.answers.remove(&(server, request, answer));
                 self.take_in(next, server, request, None);

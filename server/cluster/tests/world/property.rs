@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use chefshat_cluster::Phase;
 use stateright::{Model as _, Property};
 
-use super::{Bounds, Cluster, Happening, ROOM, UNIT, World};
+use super::{Bounds, Cluster, ROOM, Transition, UNIT, World};
 
 /// Ticks within which a cluster without further trouble serves everything again: a lease expires, and another node, which may
 /// just have regained its own, claims the unit.
@@ -124,14 +124,14 @@ fn recovers(cluster: &Cluster, world: &World) -> bool {
         actions.clear();
         calm.actions(&world, &mut actions);
         // Time passes only when nothing else happens.
-        let next = (actions.iter().rposition(|it| *it != Happening::Tick))
-            .or_else(|| actions.iter().position(|it| *it == Happening::Tick));
-        let is_quiet = next.is_none_or(|next| actions[next] == Happening::Tick);
+        let next = (actions.iter().rposition(|it| *it != Transition::Tick))
+            .or_else(|| actions.iter().position(|it| *it == Transition::Tick));
+        let is_quiet = next.is_none_or(|next| actions[next] == Transition::Tick);
         if is_quiet && is_well(&world) {
             return true;
         }
         let Some(next) = next else { return false };
-        calm.happen(&mut world, actions.swap_remove(next));
+        calm.apply(&mut world, actions.swap_remove(next));
     }
     false
 }

@@ -310,6 +310,8 @@ impl Exam {
                 self.detached(stream, handle, detached.reason(), now);
             }
             Update::Entered(entered) => self.entered(stream, handle, entered),
+            // Nothing is asked of the agent.
+            Update::Awaited(_) => {}
         }
     }
 

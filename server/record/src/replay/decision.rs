@@ -20,6 +20,9 @@ pub(super) struct SeatClock {
     pub(super) decision_time_ms: u32,
     /// Time bank left, milliseconds.
     pub(super) bank_ms: u32,
+    /// How long the game waits for the seat while it is not connected, milliseconds. `None`: an
+    /// absence changes nothing.
+    pub(super) absence_ms: Option<u32>,
     /// Whether the seat is a built-in agent's.
     pub(super) built_in: bool,
     /// Whether its player sits at the physical table.
@@ -28,6 +31,12 @@ pub(super) struct SeatClock {
     pub(super) substituted: bool,
     /// Whether its participant is connected; `None` if the events do not tell.
     pub(super) connected: Option<bool>,
+    /// When its connection was lost, or the last decision was taken if that is later.
+    pub(super) lost_at_ms: u64,
+    /// How long it was not connected since the last decision, in absences that have ended.
+    pub(super) away_ms: u64,
+    /// Whether its last decision ended because it was away, so that it is substituted.
+    pub(super) absent: bool,
     /// Timeouts in a row, as far as they certainly count.
     pub(super) timeouts: u32,
     /// Timeouts in a row, if everything counts that may: servers differ in whether silent decisions
@@ -44,6 +53,8 @@ impl SeatClock {
         self.bank_ms = record.bank_left_ms;
         self.annotation_bytes += (record.annotations.as_ref()).map_or(0, Message::encoded_len);
         let silent = u32::from(kind == DecisionKind::SpecialAction);
+        let by_absence = record.source() == Source::Disconnected && self.absence_ms.is_some();
+        self.absent = by_absence && silent == 0;
         match record.source() {
             Source::Agent => {
                 self.timeouts = 0;
@@ -54,6 +65,35 @@ impl SeatClock {
                 self.timeouts_at_most += 1;
             }
             _ => {}
+        }
+    }
+}
+
+impl SeatClock {
+    /// The connection was lost.
+    pub(super) fn lose(&mut self, elapsed_ms: u64) {
+        if self.connected != Some(false) {
+            self.lost_at_ms = elapsed_ms;
+        }
+        self.connected = Some(false);
+    }
+
+    /// How long it was at most not connected since the last decision, until now. `None` if the events
+    /// do not tell.
+    pub(super) fn away_ms_at(&self, elapsed_ms: u64) -> Option<u64> {
+        match self.connected? {
+            true => Some(self.away_ms),
+            // Both ends are truncated.
+            false => Some(self.away_ms + elapsed_ms.saturating_sub(self.lost_at_ms) + 1),
+        }
+    }
+
+    /// How much of the time of a decision, taken now, the bank may not pay for because the seat was
+    /// away, milliseconds.
+    fn unbanked_ms_at(&self, elapsed_ms: u64) -> u64 {
+        match self.absence_ms {
+            Some(_) => self.away_ms_at(elapsed_ms).unwrap_or(u64::from(u32::MAX)),
+            None => 0,
         }
     }
 }
@@ -286,7 +326,8 @@ impl OpenDecision<'_> {
         }
         let beyond_us = time.saturating_sub(u64::from(self.clock.decision_time_ms) * 1000);
         let bank_us = u64::from(bank_ms) * 1000;
-        let left = bank_us.saturating_sub(beyond_us) / 1000;
+        let unbanked_us = self.clock.unbanked_ms_at(record.elapsed_ms) * 1000;
+        let left = bank_us.saturating_sub(beyond_us.saturating_sub(unbanked_us)) / 1000;
         // The time was truncated to microseconds after the bank was charged.
         let least = match self.setup.origin {
             // Decisions that a correction voided took their time too.
@@ -308,10 +349,13 @@ impl OpenDecision<'_> {
         let special = self.kind == DecisionKind::SpecialAction;
         let in_time = |ms: u64| record.decision_time_us < ms * 1000;
         let (own, bank) = (u64::from(clock.decision_time_ms), u64::from(clock.bank_ms));
+        let absence = (clock.absence_ms).filter(|_| record.source() == Source::Disconnected);
+        let unbanked = clock.unbanked_ms_at(record.elapsed_ms);
         // The longest time of any seat limits a special action, without the bank.
-        let (least, most) = match special {
-            true => (own, u64::from(self.longest_decision_ms).max(own + bank)),
-            false => (own + bank, own + bank),
+        let (least, most) = match (special, absence) {
+            (true, _) => (own, u64::from(self.longest_decision_ms).max(own + bank)),
+            (false, Some(absence)) => (absence.into(), own + bank),
+            (false, None) => (own + bank, own + bank + unbanked),
         };
         match record.source() {
             Source::Timeout | Source::Disconnected if in_time(least) => Err(format!(

@@ -50,7 +50,7 @@ pub(super) struct Replay<'a> {
     pub(super) game: Option<Game>,
     /// Events that must follow, with their rewards.
     expected: VecDeque<(Kind, Vec<v1::SeatReward>)>,
-    /// A seat that was late too often, until it is substituted.
+    /// A seat that was away or late too often, until it is substituted.
     lost: Option<u32>,
     pub(super) decisions: u64,
     pub(super) events: u64,
@@ -188,7 +188,7 @@ impl<'a> Replay<'a> {
         };
         let action = open_decision.check(record)?;
         clock.count(open.kind, record);
-        // A seat that was late too often is substituted at once. In a physical room a correction
+        // A seat that was away or late too often is substituted at once. In a physical room a correction
         // may have voided some of its timeouts.
         let limit = self
             .header
@@ -202,7 +202,7 @@ impl<'a> Replay<'a> {
         if is_late
             && open.kind != DecisionKind::SpecialAction
             && self.physical.is_none()
-            && limit.is_some_and(|limit| clock.timeouts >= limit)
+            && (clock.absent || limit.is_some_and(|limit| clock.timeouts >= limit))
         {
             self.lost = Some(seat_number(open.seat));
         }
@@ -220,6 +220,7 @@ impl<'a> Replay<'a> {
             game.reseed(seeds.after(self.decisions));
         }
         self.last_decision_ms = record.elapsed_ms;
+        self.seats.decided(record.elapsed_ms);
         let by = By {
             source: record.source(),
             decision_time_us: record.decision_time_us,
@@ -272,7 +273,7 @@ impl<'a> Replay<'a> {
                 self.game_aborted(aborted)?;
                 true
             }
-            kind => self.seats.take(kind, self.header)?,
+            kind => self.seats.take(kind, event.elapsed_ms, self.header)?,
         };
         if is_room_event {
             return match event.rewards.as_slice() {
@@ -410,5 +411,8 @@ impl<'a> Replay<'a> {
 }
 
 fn must_be_substituted(seat: u32) -> Fault {
-    format!("`substituted` must come here: seat {seat} has reached the limit of timeouts").into()
+    format!(
+        "`substituted` must come here: seat {seat} was away, or has reached the limit of timeouts"
+    )
+    .into()
 }

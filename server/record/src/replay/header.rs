@@ -166,6 +166,7 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
         let times = [
             (clock.decision_time_ms, 10..=DAY_MS),
             (clock.bank_ms, 0..=DAY_MS),
+            (clock.absence_time_ms, 0..=DAY_MS),
         ];
         let fits = (times.iter()).all(|(ms, range)| ms.is_none_or(|ms| range.contains(&ms)));
         let named = clock.kind() != v1::ParticipantKind::Unspecified;
@@ -174,6 +175,10 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
         }
     }
     let known = [
+        (
+            "absenceTimeMs",
+            policy.absence_time_ms.is_none_or(|ms| ms <= DAY_MS),
+        ),
         ("abort", v1::AbortPolicy::try_from(policy.abort).is_ok()),
         (
             "rewardScheme",

@@ -15,6 +15,8 @@ pub(super) struct Seats {
     /// Name and kind of the participant, if seated by an event.
     occupants: Vec<Option<(String, i32)>>,
     clocks: Vec<SeatClock>,
+    /// Whether its participant has left for good.
+    retired: Vec<bool>,
     begun: bool,
     /// Events of lost and new connections, by seat. A server publishes at most
     /// [`MAX_CONNECTION_EVENTS`].
@@ -34,24 +36,33 @@ impl Seats {
                     // Clocks by kind do not apply to built-in agents.
                     let own =
                         (policy.clocks.iter()).find(|clock| !built_in && clock.kind == seat.kind);
+                    let decision_time_ms = own
+                        .and_then(|clock| clock.decision_time_ms)
+                        .unwrap_or(policy.decision_time_ms());
                     SeatClock {
                         decisions: 0,
-                        decision_time_ms: own
-                            .and_then(|clock| clock.decision_time_ms)
-                            .unwrap_or(policy.decision_time_ms()),
+                        decision_time_ms,
                         bank_ms: own
                             .and_then(|clock| clock.bank_ms)
                             .unwrap_or(policy.bank_ms()),
+                        absence_ms: own
+                            .and_then(|clock| clock.absence_time_ms)
+                            .or(policy.absence_time_ms)
+                            .map(|absence_ms| absence_ms.min(decision_time_ms)),
                         built_in,
                         at_table: seat.at_table,
                         substituted: false,
                         connected: None,
+                        lost_at_ms: 0,
+                        away_ms: 0,
+                        absent: false,
                         timeouts: 0,
                         timeouts_at_most: 0,
                         annotation_bytes: 0,
                     }
                 })
                 .collect(),
+            retired: vec![false; header.seats.len()],
             begun: false,
             connection_events: vec![0; header.seats.len()],
         }
@@ -70,6 +81,14 @@ impl Seats {
         times.map(|clock| clock.decision_time_ms).max().unwrap_or(0)
     }
 
+    /// A decision was taken: what seats were away before it does not matter to the next one.
+    pub(super) fn decided(&mut self, elapsed_ms: u64) {
+        for clock in &mut self.clocks {
+            clock.away_ms = 0;
+            clock.lost_at_ms = clock.lost_at_ms.max(elapsed_ms);
+        }
+    }
+
     pub(super) fn clock(&mut self, seat: Seat) -> &mut SeatClock {
         &mut self.clocks[seat.index()]
     }
@@ -80,7 +99,12 @@ impl Seats {
     }
 
     /// Checks an event of the room; `false` if it is an event of the game.
-    pub(super) fn take(&mut self, kind: &Kind, header: &v1::RecordHeader) -> Result<bool, String> {
+    pub(super) fn take(
+        &mut self,
+        kind: &Kind,
+        elapsed_ms: u64,
+        header: &v1::RecordHeader,
+    ) -> Result<bool, String> {
         match kind {
             Kind::Seated(seated) => {
                 let seat = self.before_the_game("seated", seated.seat)?;
@@ -97,12 +121,18 @@ impl Seats {
             }
             Kind::Disconnected(lost) => {
                 let seat = self.of_an_agent("disconnected", lost.seat)?;
-                self.clocks[seat].connected = Some(false);
+                self.clocks[seat].lose(elapsed_ms);
                 self.connection_event(seat);
             }
             Kind::Returned(returned) => {
                 let seat = self.of_an_agent("returned", returned.seat)?;
+                if self.retired[seat] {
+                    return Err(format!(
+                        "seat {seat} returns, but its participant has left for good"
+                    ));
+                }
                 let clock = &mut self.clocks[seat];
+                clock.away_ms = clock.away_ms_at(elapsed_ms).unwrap_or(clock.away_ms);
                 // A seat can take its decisions back from a substitute without attaching.
                 let is_attached = !clock.substituted || clock.connected == Some(true);
                 clock.connected = is_attached.then_some(true);
@@ -113,7 +143,17 @@ impl Seats {
             Kind::Substituted(substituted) => {
                 let seat = self.of_an_agent("substituted", substituted.seat)?;
                 let policy = header.policy.as_ref().map(|policy| &policy.substitute);
-                if !self.begun || self.clocks[seat].substituted {
+                let for_good = substituted.for_good;
+                if for_good && header.tournament_id.is_empty() {
+                    return Err(format!(
+                        "seat {seat} is substituted for good, which only happens in a tournament"
+                    ));
+                }
+                let already = match for_good {
+                    true => self.retired[seat],
+                    false => self.clocks[seat].substituted,
+                };
+                if !self.begun || already {
                     return Err(format!(
                         "seat {seat} is substituted, but {}",
                         if self.begun {
@@ -139,17 +179,19 @@ impl Seats {
                 }
                 let late = self.clocks[seat].timeouts_at_most;
                 let limit = (header.policy.as_ref()).map_or(0, v1::RoomPolicy::max_timeouts);
+                let lost = late >= limit || self.clocks[seat].absent;
                 // In a physical room a correction may have voided its timeouts, or what ended them.
-                if late < limit && header.origin() != v1::GameOrigin::Physical {
+                if !lost && !for_good && header.origin() != v1::GameOrigin::Physical {
                     return Err(format!(
                         "seat {seat} is substituted, but was late {late} times in a row of {limit}"
                     ));
                 }
                 self.clocks[seat].substituted = true;
+                self.retired[seat] = for_good;
             }
             Kind::ServerRestarted(_) => {
                 for clock in &mut self.clocks {
-                    clock.connected = Some(false);
+                    clock.lose(elapsed_ms);
                 }
             }
             Kind::ExpressionShown(shown) => {

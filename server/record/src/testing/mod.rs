@@ -112,6 +112,7 @@ impl TestGame<'_> {
                     Kind::Substituted(v1::Substituted {
                         seat,
                         built_in_agent: "random".into(),
+                        for_good: false,
                     })
                 } else {
                     Kind::Returned(v1::Returned { seat })

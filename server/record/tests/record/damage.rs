@@ -120,7 +120,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("a missing seat", Set(2, "/event/seated/seat", json!(4)), 2, "seated.seat is 4 and must be in 0..=3"),
         ("a built-in agent's seat", Set(2, "/event/seated/seat", json!(1)), 2, "which is a built-in agent's"),
         ("another substitute", Set(51, "/event/substituted/builtInAgent", json!("greedy")), 51, "is \"greedy\" and must be \"random\""),
-        ("a missing substitution", Drop(51), 51, "`substituted` must come here: seat 2 has reached the limit of timeouts"),
+        ("a missing substitution", Drop(51), 51, "`substituted` must come here: seat 2 was away, or has reached the limit of timeouts"),
         // The deal.
         ("a hand", Set(5, "/event/shiftStarted/hands/1/cards/0", json!(2)), 5, "shiftStarted.hands[1].cards"),
         ("the Golden card", Set(5, "/event/shiftStarted/hands/1/golden", json!(true)), 5, "shiftStarted.hands[1].golden is true and must be false"),

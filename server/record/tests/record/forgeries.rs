@@ -31,7 +31,7 @@ type Forgery = (&'static str, Outcome, fn(&mut Lines));
 /// The forgeries. Numbers of lines are those of
 /// the fixture `committed.jsonl`, from 1.
 #[rustfmt::skip] // One row each.
-const FORGERIES: [Forgery; 43] = [
+const FORGERIES: [Forgery; 44] = [
     // The deal.
     ("a card of a hand", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[1].cards[0] = 4 }),
     ("the hands of two seats exchanged", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands.swap(0, 1) }),
@@ -65,7 +65,8 @@ const FORGERIES: [Forgery; 43] = [
     ("a time before an earlier one", Replay, |lines| decision(lines, 14).elapsed_ms = 3),
     // Seats and connections.
     ("a dropped substitution", Replay, |lines| without_event(lines, 51)),
-    ("a substitution added", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into() }))),
+    ("a substitution added", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: false }))),
+    ("a participant left for good, where none can", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: true }))),
     ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3 }))),
     ("another name everywhere", Signature, rename),
     ("another name at one place", Replay, |lines| header(lines).seats[3].name = "Rosa".into()),

@@ -162,6 +162,8 @@ pub fn policy() -> Policy {
         decision_time: ms(1_000),
         bank: ms(500),
         pace: Some(ms(0)),
+        // As in the recorded games of earlier servers.
+        absence_time: None,
         ..Policy::default()
     }
 }

@@ -11,6 +11,8 @@ fn quick() -> Policy {
     Policy {
         decision_time: ms(1000),
         bank: ms(500),
+        // Absences have their own tests.
+        absence_time: None,
         ..Policy::default()
     }
 }
@@ -355,6 +357,7 @@ fn kinds_of_participants_can_have_separate_clocks() {
             kind: ParticipantKind::Human,
             decision_time: Some(ms(5000)),
             bank: Some(ms(2000)),
+            absence_time: None,
         }],
         ..quick()
     };

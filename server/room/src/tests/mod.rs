@@ -1,5 +1,6 @@
 //! Tests of the core of a room under a simulated clock.
 
+mod absences;
 mod clocks;
 mod gateways;
 mod physical;

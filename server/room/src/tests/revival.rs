@@ -309,6 +309,24 @@ fn a_finished_game_stays_finished() {
 }
 
 #[test]
+fn a_takeover_is_one_restart() {
+    let mut table = Table::playing(policy());
+    table.play_one();
+    let restarts = |table: &Table| table.happened(|it| matches!(it, RoomEvent::ServerRestarted));
+    // The server that took the room over has said so before it read the journal.
+    table.journal.push(Entry {
+        at: table.now,
+        change: Change::ServerRestarted,
+    });
+    table.restart(ms(10));
+    assert_eq!(restarts(&table), 1);
+    table.assert_replays();
+    table.restart(ms(1_000));
+    assert_eq!(restarts(&table), 2);
+    table.assert_replays();
+}
+
+#[test]
 fn an_inconsistent_journal_is_refused() {
     let mut table = Table::playing(policy());
     for _ in 0..5 {

@@ -266,3 +266,53 @@ fn a_seat_cannot_be_taken_and_freed_without_limit() {
     let error = table.join(ParticipantKind::Agent).expect_err("too often");
     assert_eq!(error, JoinError::TooManySeatings);
 }
+
+#[test]
+fn a_seat_is_given_up_for_good_when_its_participant_leaves() {
+    let mut table = Table::playing(Policy::default());
+    let (seat, id) = table.open();
+    table.core.retire(table.now, seat);
+    table.commit();
+    assert!(table.core.standing(seat).substituted);
+    assert_eq!(
+        table.happened(|it| matches!(it, RoomEvent::Retired(own) if *own == seat)),
+        1
+    );
+    assert_eq!(table.answer(seat, id, 0).verdict, Verdict::Closed);
+    table.core.resume(table.now, seat);
+    table.commit();
+    assert!(table.core.standing(seat).substituted, "it never returns");
+    let journal = table.journal.len();
+    table.core.retire(table.now, seat);
+    table.commit();
+    assert_eq!(table.journal.len(), journal, "it has left already");
+    table.pass_time(ms(60_000));
+    assert!(table.core.decisions() > 0, "the substitute plays");
+    table.assert_replays();
+}
+
+#[test]
+fn the_ticket_of_a_participant_who_left_is_unknown() {
+    let mut table = Table::playing(Policy::default());
+    // In these tests everybody has the same ticket.
+    let known = |table: &Table| table.core.seat_of_ticket(b"ticket").map(Seat::index);
+    assert_eq!(known(&table), Some(0));
+    table.core.retire(table.now, Seat::new(0));
+    assert_eq!(known(&table), Some(1));
+    let journal = table.core.pending().clone();
+    assert_eq!(journal.len(), 1, "{journal:?}");
+}
+
+#[test]
+fn a_game_that_has_not_started_is_aborted_when_a_participant_leaves() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    for _ in 0..4 {
+        table.join(ParticipantKind::Agent).expect("a free seat");
+    }
+    table.core.retire(table.now, Seat::new(2));
+    table.commit();
+    assert_eq!(
+        table.core.state(),
+        State::Aborted(AbortReason::NeverStarted)
+    );
+}

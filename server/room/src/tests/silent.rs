@@ -92,6 +92,7 @@ fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
             kind: ParticipantKind::Human,
             decision_time: Some(ms(5000)),
             bank: None,
+            absence_time: None,
         }],
         ..policy()
     };
@@ -150,4 +151,22 @@ fn delayed_spectators_do_not_see_further_because_of_a_silent_decision() {
     let (seat, id) = table.open();
     table.answer(seat, id, decline.index().into());
     assert_eq!(table.core.visible_to_spectators(), visible);
+}
+
+#[test]
+fn leaving_does_not_tell_who_is_offered_a_special_action() {
+    for leaver in [1, 2] {
+        let mut table = offered(policy(), vec![OPEN; 4]);
+        table.fill();
+        let retired = |table: &Table| table.happened(|it| matches!(it, RoomEvent::Retired(_)));
+        let (events, offered_at) = (table.core.log().len(), table.now);
+        table.core.retire(table.now, Seat::new(leaver));
+        table.commit();
+        table.pass_time(ms(999));
+        assert_eq!(table.core.log().len(), events, "nothing shows");
+        table.pass_time(ms(1));
+        assert_eq!(table.now, offered_at + ms(1000));
+        assert_eq!(retired(&table), 1);
+        table.assert_replays();
+    }
 }

@@ -88,6 +88,7 @@ proptest! {
         inputs in proptest::collection::vec(input(), 1..400),
         built_in in proptest::option::of(0..4usize),
         begin in any::<bool>(),
+        absence in proptest::option::of(0..1500u64),
     ) {
         let mut fills = vec![OPEN; 4];
         if let Some(seat) = built_in {
@@ -99,6 +100,7 @@ proptest! {
             max_timeouts: 2,
             max_invalid_attempts: Some(3),
             pace: Some(ms(50)),
+            absence_time: absence.map(ms),
             ..Policy::default()
         };
         let mut table = Table::empty(policy, fills);

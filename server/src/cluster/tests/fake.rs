@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use chefshat_cluster::{Created, Kept, LeaseTimes, Tables};
+use chefshat_cluster::{Created, LeaseTimes, Tables, Written};
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
-use tokio::sync::watch;
+use tokio::sync::{Mutex as AsyncMutex, broadcast, watch};
 use tokio::time::{Instant, sleep};
 
 use crate::store::cluster::{
@@ -37,6 +37,8 @@ pub(super) struct Database {
     tournaments: Mutex<BTreeMap<Id, TournamentHeader>>,
     nodes: Mutex<BTreeMap<NodeId, NodeInfo>>,
     drain: Mutex<Option<NodeId>>,
+    /// Units that nodes have released, for all others: in a test, each of them is the next owner.
+    released: broadcast::Sender<(NodeId, Id, Epoch)>,
     finished: Arc<MemoryStore>,
 }
 
@@ -49,12 +51,30 @@ impl Database {
             tournaments: Mutex::default(),
             nodes: Mutex::default(),
             drain: Mutex::default(),
+            released: broadcast::Sender::new(64),
             finished: Arc::default(),
         })
     }
 
     fn now_ms(&self) -> u64 {
         u64::try_from(self.began.elapsed().as_millis()).expect("not that long")
+    }
+
+    fn orphans(&self) -> Vec<(Id, Epoch)> {
+        self.tables().orphans(self.now_ms(), usize::MAX)
+    }
+
+    fn is_ephemeral(&self, id: Id) -> bool {
+        let games = self.games.lock().expect("no test panics here");
+        let header = games.get(&id);
+        header.is_some_and(|it| it.policy.durability == Durability::Ephemeral)
+    }
+
+    /// Makes a room one of another version of the rules.
+    pub(super) fn make_foreign(&self, room: Id) {
+        let mut games = self.games.lock().expect("no test panics here");
+        let header = games.get_mut(&room).expect("it exists");
+        Arc::make_mut(header).rules_version += 1;
     }
 
     fn tables(&self) -> MutexGuard<'_, Tables<Id, Row>> {
@@ -120,6 +140,15 @@ pub(super) struct FakeStore {
     pub(super) loads: watch::Sender<u32>,
     /// Whether reading a unit takes until this is over.
     pub(super) loads_held: watch::Sender<bool>,
+    /// Whether the ends of games are written but no answer comes.
+    pub(super) ends_unanswered: watch::Sender<bool>,
+    /// How often the end of a game was read.
+    pub(super) ends_read: watch::Sender<u32>,
+    /// Whether reading the end of a game fails.
+    pub(super) ends_unreadable: watch::Sender<bool>,
+    /// The join codes of new rooms that are refused, until as many have been tried.
+    pub(super) codes_taken: Mutex<(usize, Vec<String>)>,
+    released: AsyncMutex<broadcast::Receiver<(NodeId, Id, Epoch)>>,
 }
 
 impl FakeStore {
@@ -133,6 +162,11 @@ impl FakeStore {
             beats_unanswered: watch::Sender::new(0),
             loads: watch::Sender::new(0),
             loads_held: watch::Sender::new(false),
+            ends_unanswered: watch::Sender::new(false),
+            ends_read: watch::Sender::new(0),
+            ends_unreadable: watch::Sender::new(false),
+            codes_taken: Mutex::default(),
+            released: AsyncMutex::new(database.released.subscribe()),
         })
     }
 
@@ -159,6 +193,7 @@ impl FakeStore {
             rows,
             entries,
             cut_off: self.cut_off.subscribe(),
+            unanswered: self.ends_unanswered.subscribe(),
         })
     }
 }
@@ -170,6 +205,7 @@ struct FakeJournal {
     rows: u64,
     entries: Vec<Entry>,
     cut_off: watch::Receiver<bool>,
+    unanswered: watch::Receiver<bool>,
 }
 
 impl FakeJournal {
@@ -179,10 +215,10 @@ impl FakeJournal {
         }
     }
 
-    fn written(&self, kept: Kept) -> Result<(), StoreError> {
-        match kept {
-            Kept::Kept => Ok(()),
-            Kept::Refused => Err(StoreError::Fenced(self.header.room_id)),
+    fn written(&self, written: Written) -> Result<(), StoreError> {
+        match written {
+            Written::Committed => Ok(()),
+            Written::Refused => Err(StoreError::Fenced(self.header.room_id)),
         }
     }
 }
@@ -196,8 +232,8 @@ impl Journal for FakeJournal {
             self.reached().await;
             let row = Row::Game(entries.clone());
             let room = self.header.room_id;
-            let kept = (self.database.tables()).append(room, self.epoch, self.rows, row);
-            self.written(kept)?;
+            let written = (self.database.tables()).append(room, self.epoch, self.rows, row);
+            self.written(written)?;
             self.rows += 1;
             self.entries.append(entries);
             Ok(())
@@ -217,11 +253,15 @@ impl Journal for FakeJournal {
         async move {
             self.reached().await;
             let room = self.header.room_id;
-            let kept = (self.database.tables()).finish(room, self.epoch, self.rows);
-            self.written(kept)?;
+            let written = (self.database.tables()).finish(room, self.epoch, self.rows);
+            self.written(written)?;
             let finished = &self.database.finished;
             let game = finished.create(Arc::clone(&self.header), self.entries.clone());
-            game.await?.finish(summary, signed).await
+            game.await?.finish(summary, signed).await?;
+            if self.unanswered.wait_for(|it| !it).await.is_err() {
+                pending().await
+            }
+            Ok(())
         }
         .boxed()
     }
@@ -248,6 +288,13 @@ impl Store for FakeStore {
         async move {
             self.reached().await;
             let room = header.room_id;
+            {
+                let mut taken = self.codes_taken.lock().expect("no test panics here");
+                if taken.1.len() < taken.0 {
+                    taken.1.push(header.join_code.clone());
+                    return Err(StoreError::Taken(header.game_id));
+                }
+            }
             let row = Row::Game(entries.clone());
             let epoch = match header.tournament {
                 None => {
@@ -343,13 +390,13 @@ impl Store for FakeStore {
             let epoch = *epochs.get(&tournament).ok_or(fenced.clone())?;
             let ends = entries.iter().any(TournamentEntry::is_end);
             let mut tables = self.database.tables();
-            let kept = tables.append(tournament, epoch, row, Row::Tournament(entries));
-            if kept == Kept::Kept && ends {
+            let written = tables.append(tournament, epoch, row, Row::Tournament(entries));
+            if written == Written::Committed && ends {
                 tables.finish(tournament, epoch, row + 1);
             }
-            match kept {
-                Kept::Kept => Ok(()),
-                Kept::Refused => Err(fenced),
+            match written {
+                Written::Committed => Ok(()),
+                Written::Refused => Err(fenced),
             }
         }
         .boxed()
@@ -372,6 +419,10 @@ impl Store for FakeStore {
 }
 
 impl ClusterStore for FakeStore {
+    fn lease(&self) -> LeaseTimes {
+        LeaseTimes::DEFAULT
+    }
+
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
         async move {
             self.reached().await;
@@ -416,24 +467,47 @@ impl ClusterStore for FakeStore {
     fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
         async move {
             self.reached().await;
-            let now_ms = self.database.now_ms();
-            let mut tables = self.database.tables();
-            let games = self.database.games.lock().expect("no test panics here");
-            let is_ephemeral = |id: &Id| {
-                (games.get(id)).is_some_and(|it| it.policy.durability == Durability::Ephemeral)
-            };
-            let mut orphans = tables.orphans(now_ms, usize::MAX);
-            for (id, epoch) in orphans.extract_if(.., |(id, _)| is_ephemeral(id)) {
-                let rows = tables.journal(id).len() as u64;
-                tables.finish(id, epoch, rows);
-            }
+            let mut orphans = self.database.orphans();
+            orphans.retain(|(id, _)| !self.database.is_ephemeral(*id));
             orphans.truncate(count);
             Ok(orphans)
         }
         .boxed()
     }
 
-    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)> {
+        async move {
+            let mut released = self.released.lock().await;
+            loop {
+                let (node, unit, epoch) =
+                    (released.recv().await).expect("a test releases few units");
+                if node != self.node() {
+                    return (unit, epoch);
+                }
+            }
+        }
+        .boxed()
+    }
+
+    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            self.reached().await;
+            let mut orphans = self.database.orphans();
+            orphans.retain(|(id, _)| self.database.is_ephemeral(*id));
+            let mut tables = self.database.tables();
+            for (id, epoch) in orphans {
+                let rows = tables.journal(id).len() as u64;
+                tables.finish(id, epoch, rows);
+            }
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn claim_all(
+        &self,
+        orphans: Vec<(Id, Epoch)>,
+    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
         async move {
             self.reached().await;
             let games = self.database.games.lock().expect("no test panics here");
@@ -446,7 +520,8 @@ impl ClusterStore for FakeStore {
             };
             let now_ms = self.database.now_ms();
             let mut tables = self.database.tables();
-            Ok(tables.claim(unit, seen, self.node(), now_ms, restarted))
+            let claim = |(unit, seen)| tables.claim(unit, seen, self.node(), now_ms, restarted);
+            Ok(orphans.into_iter().map(claim).collect())
         }
         .boxed()
     }
@@ -502,6 +577,8 @@ impl ClusterStore for FakeStore {
         async move {
             self.reached().await;
             self.database.tables().release(unit, epoch);
+            // Nobody may listen.
+            let _ = (self.database.released).send((self.node(), unit, epoch));
             Ok(())
         }
         .boxed()
@@ -539,16 +616,43 @@ impl ClusterStore for FakeStore {
         async { Ok(None) }.boxed()
     }
 
-    fn ended_room(&self, _: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+    fn locate_game(&self, _: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
         async { Ok(None) }.boxed()
+    }
+
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        async move {
+            self.reached().await;
+            self.ends_read.send_modify(|count| *count += 1);
+            // As a query takes its time.
+            sleep(Duration::from_millis(1)).await;
+            if *self.ends_unreadable.borrow() {
+                return Err(StoreError::Failed("as the test wants it".into()));
+            }
+            let tables = self.database.tables();
+            let games = self.database.games.lock().expect("no test panics here");
+            let Some(header) = games.get(&room) else {
+                return Ok(None);
+            };
+            let rows = tables.journal(room);
+            let entries = rows.iter().flat_map(|row| match &row.entries {
+                Row::Game(entries) => entries.clone(),
+                Row::Tournament(_) => Vec::new(),
+            });
+            let entries: Vec<_> = entries.collect();
+            let count = rows.len() as u64;
+            Ok(Some(ResumableGame {
+                header: GameHeader::clone(header),
+                journal: self.journal(header, Epoch::FIRST, count, entries.clone()),
+                entries,
+                concluded: true,
+            }))
+        }
+        .boxed()
     }
 
     fn tournament(&self, _: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
         async { Ok(None) }.boxed()
-    }
-
-    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>> {
-        async move { Ok(self.database.tables().journal(id).len() as u64) }.boxed()
     }
 
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {

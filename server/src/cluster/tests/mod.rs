@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_cluster::LeaseTimes;
 use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
@@ -18,14 +17,14 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::TaskTracker;
 
 use super::units::LOADS_AT_ONCE;
-use super::{ClusterNode, News, NodeLease, SingleServer};
+use super::{ClusterNode, News, NodeLease, StoreDirectory};
 use crate::config::ServerConfig;
 use crate::convert;
 use crate::limits::Key;
 use crate::room::{Handle, JoinRequest, RoomGone};
 use crate::rooms::{NewRoom, Rooms};
 use crate::store::Store;
-use crate::store::cluster::{ClusterStore as _, NodeInfo};
+use crate::store::cluster::{ClusterStore, Kind, NodeInfo};
 use crate::tournaments::{Entry, TournamentHandle, Tournaments};
 use fake::{Database, FakeStore};
 
@@ -44,11 +43,13 @@ impl TestNode {
     async fn start(database: &Arc<Database>) -> Self {
         let store = FakeStore::new(database);
         let tracker = TaskTracker::new();
-        let lease = Some(Arc::new(NodeLease::new()));
+        let lease = Arc::new(NodeLease::new());
         let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
-        let directory = Arc::new(SingleServer);
+        let shared: Arc<dyn ClusterStore> = Arc::clone(&store) as Arc<dyn ClusterStore>;
         let config = ServerConfig::default();
-        let rooms = Rooms::of_node(&config, stored, directory, lease, tracker.clone());
+        let directory = StoreDirectory::new(Arc::clone(&shared), Arc::clone(&lease), config.shares);
+        let directory = Arc::new(directory);
+        let rooms = Rooms::of_node(&config, stored, directory, Some(lease), tracker.clone());
         let rooms = rooms.expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker);
         let info = NodeInfo {
@@ -62,9 +63,8 @@ impl TestNode {
         let node = ClusterNode::start(
             id,
             info,
-            LeaseTimes::DEFAULT,
             Duration::ZERO,
-            Arc::clone(&store) as Arc<dyn crate::store::cluster::ClusterStore>,
+            shared,
             Arc::clone(&rooms),
             Arc::clone(&tournaments),
         );
@@ -405,9 +405,9 @@ async fn a_drained_node_hands_over_and_leaves() {
         soon(join(&room, "Ada")).await.expect("it runs");
         rooms.push(room);
     }
-    let began = Instant::now();
     database.ask_to_drain(first.store.node());
     soon(first.node.asked_to_drain()).await;
+    let began = Instant::now();
     first.rooms.refuse_new();
     soon(first.node.drain()).await;
 
@@ -418,12 +418,31 @@ async fn a_drained_node_hands_over_and_leaves() {
         assert_eq!(names(&new).await, ["Ada"]);
         soon(join(&new, "Bo")).await.expect("it runs");
     }
-    // No lease had to expire, as it would have after 8 s.
+    // Nobody had to search for them, let alone to wait for the end of a lease.
     assert!(
-        began.elapsed() < Duration::from_secs(6),
+        began.elapsed() < Duration::from_millis(400),
         "{:?}",
         began.elapsed()
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_room_that_a_node_cannot_resume_is_left_to_others() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    database.make_foreign(room);
+    drop(first);
+    let mut loads = second.store.loads.subscribe();
+    soon(loads.wait_for(|loads| *loads == 1))
+        .await
+        .expect("the store is here");
+    sleep(SOON).await;
+    assert_eq!(database.owner(room), None);
+    assert_eq!(*loads.borrow(), 1, "it does not try again");
+    let other = second.create_room().await;
+    soon(join(&other, "Ada")).await.expect("it runs");
 }
 
 #[tokio::test(start_paused = true)]
@@ -472,4 +491,72 @@ async fn a_tournament_changes_hands_with_its_rooms() {
     first.loses(room).await;
     assert!(first.tournaments.get(old.id()).is_none());
     assert_eq!(second.rooms.open_count(), 1, "no game is played twice");
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_end_of_a_game_is_shown_although_its_answer_comes_after_the_next_beats() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    first.store.ends_unanswered.send_replace(true);
+    room.close_without_token().await;
+    // Beats say that the node does not own it any more.
+    sleep(Duration::from_secs(10)).await;
+    assert_eq!(database.owner(room.id()), None);
+    first.store.ends_unanswered.send_replace(false);
+
+    let shown = soon(room.describe()).await.expect("it is shown");
+    assert_eq!(shown.state(), v1::RoomState::Aborted);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_end_of_a_game_is_read_once_for_all_who_ask_when_its_node_is_gone() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    room.close_without_token().await;
+    let over = async {
+        while first.rooms.is_over(room.id()) != Some(true) {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(over).await;
+    drop(first);
+
+    second.store.ends_unreadable.send_replace(true);
+    let asked = second.tournaments.show_ended(room.id(), Kind::Room);
+    soon(asked).await.expect_err("it cannot be read now");
+    second.store.ends_unreadable.send_replace(false);
+    second.store.ends_read.send_replace(0);
+    let asked = (0..10).map(|_| second.tournaments.show_ended(room.id(), Kind::Room));
+    for shown in soon(futures::future::join_all(asked)).await {
+        shown.expect("readable");
+    }
+    assert_eq!(*second.store.ends_read.borrow(), 1);
+    let shown = second.rooms.get(room.id()).expect("it is shown");
+    assert_eq!(names(&shown).await, ["Ada"]);
+    let shown = soon(shown.describe()).await.expect("it is shown");
+    assert_eq!(shown.state(), v1::RoomState::Aborted);
+    let listed = second.rooms.newest(None, None, 9);
+    assert!(listed.is_empty(), "others may list it");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_room_whose_join_code_is_taken_gets_another_one() {
+    let database = Database::new();
+    let node = TestNode::start(&database).await;
+    node.store.codes_taken.lock().expect("no panic").0 = 2;
+    let room = node.create_room().await;
+    let code = node
+        .rooms
+        .header(room.id())
+        .expect("a room")
+        .join_code
+        .clone();
+    let taken = node.store.codes_taken.lock().expect("no panic").1.clone();
+    assert_eq!(taken.len(), 2);
+    assert!(!taken.contains(&code) && taken[0] != taken[1]);
 }

@@ -1,13 +1,12 @@
-//! Reads the requests of one stream of `PlayService` and executes them: seats attach, act and
-//! leave. Participants of tournaments attach once and are then seated in each of their games.
+//! Reads the requests of one stream of `PlayService` and executes them: seats act and leave. How
+//! they attach is in `attaching`, and what participants of tournaments do in `participants`.
 
 use std::collections::BTreeMap;
 use std::future::{Future as _, poll_fn};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::task::Poll;
 
-use chefshat_engine::MAX_ENTROPY;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
 use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
@@ -16,32 +15,30 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
-use super::remote::{CALLED, FIRST_CALLED, NodeGone, RemoteSeats};
+use super::remote::{FIRST_CALLED, NodeGone, RemoteSeats};
 use crate::access::Caller;
-use crate::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_SEATS_PER_STREAM};
+use crate::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING};
 use crate::convert;
 use crate::grpc::forward::Gateway;
-use crate::grpc::reach::Reach;
 use crate::grpc::refusals::count;
-use crate::grpc::status::{field, is_elsewhere, refused, room_gone, status, ticket_unknown};
+use crate::grpc::status::{field, refused, room_gone, status};
 use crate::outbox::{HandStamp, Outbox, StreamEnd};
-use crate::room::subscriber::DeliveryOptions;
-use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
+use crate::room::{Handle, SeatAction};
 use crate::rooms::Rooms;
-use crate::tournaments::{Call, Connection, TournamentHandle, Tournaments};
+use crate::tournaments::{Call, TournamentHandle, Tournaments};
 use crate::wire::Updates;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::Token;
 use chefshat_room::{Answer, ConnectionId};
 
 /// A seat that is attached to a stream.
 pub(super) struct BoundSeat {
     pub(super) room: Handle,
-    seat: chefshat_engine::Seat,
-    connection: ConnectionId,
+    pub(super) seat: chefshat_engine::Seat,
+    pub(super) connection: ConnectionId,
     pub(super) stamp: Arc<HandStamp>,
     pub(super) secret: [u8; 32],
     /// Set when the seat has left the stream.
-    detached: Arc<AtomicBool>,
+    pub(super) detached: Arc<AtomicBool>,
 }
 
 impl BoundSeat {
@@ -66,29 +63,61 @@ impl BoundSeat {
     }
 }
 
+/// A participant of a tournament that is attached to a stream.
+pub(super) struct BoundParticipant {
+    pub(super) tournament: Arc<TournamentHandle>,
+    pub(super) participant: usize,
+    pub(super) connection: u64,
+    /// The request that attached it. Its options apply to its seats too.
+    pub(super) attach: v1::Attach,
+    /// The connection that keeps it until the gateway says that the client's stream is open.
+    pub(super) held_by: Option<u64>,
+}
+
+impl BoundParticipant {
+    pub(super) async fn leave(self) {
+        self.tournament
+            .left(self.participant, self.connection)
+            .await;
+    }
+}
+
+/// A seat that another stream keeps until the gateway says that the client's stream is open.
+pub(super) struct Contested {
+    pub(super) attach: v1::Attach,
+    /// Its ticket, if the server attaches it.
+    pub(super) assigned_ticket: Option<Token>,
+    /// The number of the connection that has it.
+    pub(super) holder: u64,
+    /// Its commands that have been read meanwhile.
+    pub(super) commands: Vec<(Option<Command>, Instant)>,
+}
+
 /// Reads the requests of one stream, and attaches seats that participants of tournaments are called
 /// to.
 pub(super) struct Reader {
-    rooms: Arc<Rooms>,
-    tournaments: Arc<Tournaments>,
-    caller: Caller,
+    pub(super) rooms: Arc<Rooms>,
+    pub(super) tournaments: Arc<Tournaments>,
+    pub(super) caller: Caller,
     pub(super) outbox: Arc<Outbox>,
     /// The attached seats, by handle.
     pub(super) seats: BTreeMap<u32, BoundSeat>,
+    /// The seats that other streams have, by handle.
+    pub(super) contested: BTreeMap<u32, Contested>,
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
-    next_handle: u32,
+    pub(super) next_handle: u32,
     /// The handles of seats that the server attaches start here.
     pub(super) first_called: u32,
     pub(super) next_called: u32,
     /// The seats that other nodes have. Boxed, because a single server has none.
-    remote: Option<Box<RemoteSeats>>,
+    pub(super) remote: Option<Box<RemoteSeats>>,
     /// Whether the stream comes from another node, at which its client is connected.
-    by_gateway: bool,
+    pub(super) by_gateway: bool,
     /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
     /// Whether unspecified delivery means with decisions (Play) or at once (Watch).
-    with_decisions: bool,
+    pub(super) with_decisions: bool,
 }
 
 /// The next input of a reader.
@@ -126,6 +155,7 @@ impl Reader {
             caller,
             outbox: Arc::clone(outbox),
             seats: BTreeMap::new(),
+            contested: BTreeMap::new(),
             participants: BTreeMap::new(),
             next_handle: 0,
             first_called: FIRST_CALLED,
@@ -296,134 +326,6 @@ impl Reader {
         }
     }
 
-    /// Attaches the next seat or participant of the client.
-    pub(super) async fn attach(&mut self, attach: v1::Attach) {
-        let handle = self.next_handle;
-        self.next_handle = self.next_handle.wrapping_add(1);
-        self.attach_as(handle, attach).await;
-    }
-
-    pub(super) async fn attach_as(&mut self, handle: u32, mut attach: v1::Attach) {
-        // The client may have attached on its next stream already, which this one would supersede.
-        if self.outbox.is_abandoned() {
-            return;
-        }
-        let request_id = attach.request_id;
-        if attach.delivery() == v1::EventDelivery::Unspecified {
-            attach.set_delivery(match self.with_decisions {
-                true => v1::EventDelivery::WithDecisions,
-                false => v1::EventDelivery::AtOnce,
-            });
-        }
-        if !self.has_space() {
-            return self.refuse(handle, request_id, &too_many_seats());
-        }
-        if attach.entropy.len() > MAX_ENTROPY {
-            let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
-            return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
-        }
-        if let Some(token) = Token::parse(&attach.ticket) {
-            let mut tournament = self.tournaments.get(token.room);
-            let reach = Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments));
-            let mut in_scope = Ok(());
-            if tournament.is_none() {
-                let room = reach.room_of_ticket(&self.caller, token.room, ticket_unknown);
-                in_scope = room.await.map(drop);
-                // This node may have taken it over meanwhile.
-                tournament = self.tournaments.get(token.room);
-            }
-            if let Some(handle) = &tournament {
-                in_scope = reach.check_ticket_of(&self.caller, handle, ticket_unknown);
-            }
-            if let Err(status) = in_scope {
-                return match (is_elsewhere(&status), &mut self.remote) {
-                    (Some(elsewhere), Some(remote)) => {
-                        if let Err(NodeGone) = remote.attach(elsewhere, handle, attach).await {
-                            self.outbox.end(StreamEnd::RoomGone);
-                        }
-                    }
-                    // Another node is about to take over.
-                    _ if status.code() == Code::Unavailable => {
-                        self.outbox.end(StreamEnd::RoomGone);
-                    }
-                    _ => self.refuse(handle, request_id, &status),
-                };
-            }
-            if let Some(tournament) = tournament {
-                return self.enter(tournament, token, attach, handle).await;
-            }
-        }
-        match self.bind(attach, handle, None).await {
-            Ok(Some(bound)) => {
-                self.seats.insert(handle, bound);
-            }
-            Ok(None) => self.refuse(handle, request_id, &ticket_unknown()),
-            // An agent gives up a refused seat, but reopens a stream that ends with this error.
-            Err(RoomGone) => self.outbox.end(StreamEnd::RoomGone),
-        }
-    }
-
-    /// Whether a seat or participant is attached to the stream.
-    pub(super) fn has_attached(&self) -> bool {
-        let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
-        !(self.seats.is_empty() && self.participants.is_empty()) || remote > 0
-    }
-
-    /// Whether the stream can take one more seat.
-    pub(super) fn has_space(&mut self) -> bool {
-        let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
-        let full = |reader: &Self| {
-            reader.seats.len() + reader.participants.len() + remote >= MAX_SEATS_PER_STREAM
-        };
-        if full(self) {
-            self.seats.retain(|_, bound| !bound.is_detached());
-        }
-        !full(self)
-    }
-
-    /// Attaches a seat; `None` if the ticket is unknown.
-    pub(super) async fn bind(
-        &self,
-        attach: v1::Attach,
-        handle: u32,
-        assigned_ticket: Option<Token>,
-    ) -> Result<Option<BoundSeat>, RoomGone> {
-        let Some(token) = Token::parse(&attach.ticket) else {
-            return Ok(None);
-        };
-        let Some(room) = self.rooms.get(token.room) else {
-            return Ok(None);
-        };
-        let detached = Arc::new(AtomicBool::new(false));
-        let from = attach.from_sequence.saturating_sub(1);
-        let request = AttachRequest {
-            secret: token.secret,
-            request_id: attach.request_id,
-            outbox: Arc::clone(&self.outbox),
-            handle,
-            options: DeliveryOptions {
-                at_once: attach.delivery() == v1::EventDelivery::AtOnce,
-                no_mask: attach.no_mask,
-                snapshot: attach.snapshot,
-                from: usize::try_from(from).unwrap_or(usize::MAX),
-            },
-            by_gateway: self.by_gateway,
-            entropy: attach.entropy,
-            arrived: Instant::now(),
-            detached: Arc::clone(&detached),
-            assigned_ticket,
-        };
-        let attached = room.attach(request).await?;
-        Ok(attached.map(|attached| BoundSeat {
-            room,
-            seat: attached.seat,
-            connection: attached.connection,
-            stamp: attached.stamp,
-            secret: token.secret,
-            detached,
-        }))
-    }
-
     async fn detach(&mut self, handle: u32) {
         if let Some(bound) = self.seats.remove(&handle) {
             bound
@@ -457,7 +359,7 @@ impl Reader {
     /// Tells the participants of tournaments that the server stops. Rooms tell their seats.
     pub(super) fn announce_stop(&self) {
         for handle in self.participants.keys() {
-            self.detach_participant(*handle, v1::DetachReason::ServerStopping);
+            self.detached(*handle, v1::DetachReason::ServerStopping);
         }
         // The seats of other nodes stay where they are, and their client connects to one of these.
         if self
@@ -469,7 +371,13 @@ impl Reader {
         }
     }
 
-    fn refuse_field(&self, handle: u32, request_id: u32, reason: &str, problem: &FieldProblem) {
+    pub(super) fn refuse_field(
+        &self,
+        handle: u32,
+        request_id: u32,
+        reason: &str,
+        problem: &FieldProblem,
+    ) {
         self.refuse(handle, request_id, &field(reason, problem));
     }
 
@@ -478,143 +386,20 @@ impl Reader {
         self.send_update(handle, Update::Refused(refused(request_id, refusal)));
     }
 
-    /// Sends an update; `false` if the client does not read its stream.
-    pub(super) fn send_update(&self, handle: u32, update: Update) -> bool {
-        let mut updates = Updates::default();
-        updates.add(handle, update);
-        self.outbox.push(&mut updates, None, None)
-    }
-}
-
-pub(super) fn too_many_seats() -> Status {
-    status(
-        Code::ResourceExhausted,
-        "TOO_MANY_SEATS",
-        format!(
-            "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach seats of ended games, or open another stream"
-        ),
-        [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
-    )
-}
-
-/// Ids of connections of participants.
-static CONNECTIONS: AtomicU64 = AtomicU64::new(1);
-
-/// A participant of a tournament that is attached to a stream.
-pub(super) struct BoundParticipant {
-    tournament: Arc<TournamentHandle>,
-    participant: usize,
-    connection: u64,
-    /// The request that attached it. Its options apply to its seats too.
-    attach: v1::Attach,
-}
-
-impl BoundParticipant {
-    pub(super) async fn leave(self) {
-        self.tournament
-            .left(self.participant, self.connection)
-            .await;
-    }
-}
-
-impl Reader {
-    /// Attaches a participant of a tournament, which then calls it to its games.
-    pub(super) async fn enter(
-        &mut self,
-        tournament: Arc<TournamentHandle>,
-        token: Token,
-        attach: v1::Attach,
-        handle: u32,
-    ) {
-        let request_id = attach.request_id;
-        let Some(participant) = tournament.participant_of(&token.secret) else {
-            return self.refuse(handle, request_id, &ticket_unknown());
-        };
-        let entered = Update::Entered(v1::Entered {
-            request_id,
-            tournament_id: tournament.id().to_string(),
-            participant: convert::number(participant),
-        });
-        if !self.send_update(handle, entered) {
-            // A client that does not read its stream is not attached.
-            return;
-        }
-        let connection = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
-        let bound = BoundParticipant {
-            tournament: Arc::clone(&tournament),
-            participant,
-            connection,
-            attach,
-        };
-        self.participants.insert(handle, bound);
-        let stream = Connection {
-            handle,
-            calls: self.calls.clone(),
-            outbox: Arc::clone(&self.outbox),
-        };
-        tournament.enter(participant, connection, stream).await;
-    }
-
-    /// Executes a call of a tournament.
-    pub(super) async fn follow_call(&mut self, handle: u32, call: Call) {
-        match call {
-            Call::Seat(room) => self.take_seat(handle, room).await,
-            Call::Superseded => self.dismiss(handle, v1::DetachReason::Superseded),
-            Call::Over => self.dismiss(handle, v1::DetachReason::TournamentOver),
-        }
-    }
-
-    /// Attaches a participant to its seat in the room of one of its games.
-    async fn take_seat(&mut self, participant: u32, room: Id) {
-        let Some(bound) = self.participants.get(&participant) else {
-            return;
-        };
-        let Some(token) = Token::parse(&bound.attach.ticket) else {
-            return;
-        };
-        let ticket = Token { room, ..token };
-        let attach = v1::Attach {
-            ticket: ticket.to_text(),
-            request_id: 0,
-            ..bound.attach.clone()
-        };
-        // A seat that the client attached with the same ticket stays attached.
-        let is_there = (self.seats.values()).any(|seat| {
-            seat.secret == ticket.secret && seat.room.id() == room && !seat.is_detached()
-        });
-        let is_newest = (bound.tournament).is_newest(bound.participant, bound.connection);
-        if is_there || !is_newest {
-            return;
-        }
-        if !self.has_space() {
-            self.refuse(participant, 0, &too_many_seats());
-            if let Some(bound) = self.participants.remove(&participant) {
-                bound.leave().await;
-            }
-            return;
-        }
-        let handle = self.next_called;
-        let next = (self.next_called - self.first_called + 1) % CALLED;
-        self.next_called = self.first_called + next;
-        // Otherwise the game ended before its seat was attached: there is nothing left to play.
-        if let Ok(Some(bound)) = self.bind(attach, handle, Some(ticket)).await {
-            self.seats.insert(handle, bound);
-        }
-    }
-
-    /// Detaches a participant from this stream. Its seats stay attached.
-    fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
-        if self.participants.remove(&handle).is_some() {
-            self.detach_participant(handle, reason);
-        }
-    }
-
-    fn detach_participant(&self, handle: u32, reason: v1::DetachReason) {
+    /// Tells a participant that it is detached.
+    pub(super) fn detached(&self, handle: u32, reason: v1::DetachReason) {
         let reason = reason.into();
         let mut last = Updates::default();
         last.add(handle, Update::Detached(v1::Detached { reason }));
         // At most one for each participant: even a full outbox has space for it.
         self.outbox.push_last(&mut last);
+    }
+
+    /// Sends an update; `false` if the client does not read its stream.
+    pub(super) fn send_update(&self, handle: u32, update: Update) -> bool {
+        let mut updates = Updates::default();
+        updates.add(handle, update);
+        self.outbox.push(&mut updates, None, None)
     }
 }
 
@@ -644,13 +429,9 @@ pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, 
 mod tests {
     use tokio_util::task::TaskTracker;
 
-    use chefshat_room::journal::ParticipantKind;
-
     use super::*;
     use crate::config::ServerConfig;
-    use crate::limits::Key;
     use crate::store::MemoryStore;
-    use crate::tournaments::Entry;
 
     #[tokio::test]
     async fn a_flood_of_commands_yields_to_other_tasks() {
@@ -676,47 +457,5 @@ mod tests {
         tokio::task::yield_now().await;
         assert!(!flood.is_finished());
         flood.abort();
-    }
-
-    #[tokio::test]
-    async fn a_stream_whose_client_has_gone_attaches_nothing() {
-        let store = Arc::new(MemoryStore::default());
-        let rooms =
-            Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
-        let settings = v1::TournamentSettings {
-            format: v1::TournamentFormat::Swiss.into(),
-            ..v1::TournamentSettings::default()
-        };
-        let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-        let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-        let (tournament, _owner) = created.expect("a tournament");
-        let entry = Entry {
-            name: "Ada".into(),
-            kind: ParticipantKind::Agent,
-            max_games: 1,
-            stateless: true,
-            at_table: false,
-            request_id: None,
-        };
-        let joined = tournament.join(entry).await.expect("it runs");
-        let (_participant, ticket) = joined.expect("it is open");
-        let attach = v1::Attach {
-            ticket: ticket.to_text(),
-            ..v1::Attach::default()
-        };
-        let (outbox, _updates) = Outbox::new();
-        let mut newer = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
-        newer.attach(attach.clone()).await;
-        assert_eq!(newer.participants.len(), 1);
-        // The messages of a lost connection may be read after those of the next.
-        let (outbox, updates) = Outbox::new();
-        let mut older = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
-        drop(updates);
-        older.attach(attach).await;
-        assert!(
-            older.participants.is_empty(),
-            "it would supersede the newer"
-        );
     }
 }

@@ -21,6 +21,7 @@ use tracing::debug;
 use crate::cluster::{Directory, Elsewhere, FoundBy};
 use crate::config::MAX_PEER_MESSAGE_BYTES;
 use crate::grpc::forward::Gateway;
+use crate::grpc::takeover::awaited;
 use crate::outbox::{OnHandover, OnSpace, Outbox, StreamEnd};
 use crate::wire::peer::peer_service_client::PeerServiceClient;
 use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
@@ -67,6 +68,10 @@ struct Shared {
 impl Shared {
     fn seats(&self) -> MutexGuard<'_, BTreeMap<u32, RemoteSeat>> {
         (self.seats.lock()).expect("nothing panics under this lock")
+    }
+
+    fn ids(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+        (self.ids.lock()).expect("nothing panics under this lock")
     }
 }
 
@@ -146,8 +151,7 @@ impl RemoteSeats {
         };
         let stream = &self.streams[number];
         if let FoundBy::Id(id) = elsewhere.found_by {
-            let mut ids = (stream.shared.ids.lock()).expect("nothing panics under this lock");
-            ids.insert(id);
+            stream.shared.ids().insert(id);
         }
         stream.shared.seats().insert(handle, RemoteSeat::default());
         self.attached.insert(handle, number);
@@ -220,14 +224,19 @@ impl RemoteSeats {
             first_assigned_handle: std::mem::take(&mut first_assigned_handle),
         });
         let request = self.gateway.request(requests);
-        let channel = self.gateway.peers().channel(&elsewhere.peer);
+        let peer = elsewhere.peer.clone();
+        let channel = self.gateway.peers().channel(&peer);
         let directory = Arc::clone(self.gateway.directory());
         PeerStream {
             endpoint: Arc::clone(&elsewhere.peer.endpoint),
             inputs: Some(inputs),
             shared,
             receiving: AbortOnDropHandle::new(tokio::spawn(async move {
-                let ended = receiver.receive(channel, request).await;
+                let ended = receiver.receive(channel.clone(), request).await;
+                if receiver.inputs.upgrade().is_some() {
+                    let ids = receiver.shared.ids().clone();
+                    awaited(&*directory, &peer, channel, ids).await;
+                }
                 receiver.ended(ended, &*directory);
             })),
         }
@@ -295,9 +304,16 @@ impl Receiver {
 
     /// Queues updates, once the outbox has space for them: until then nothing more is received.
     async fn queue(&self, mut updates: Updates) {
-        let mut handovers = Vec::new();
+        let (mut handovers, mut contested) = (Vec::new(), Vec::new());
         for (handle, update) in updates.received() {
-            handovers.extend(self.follow(handle, update));
+            match update {
+                Received::Contested => contested.push(handle),
+                update => handovers.extend(self.follow(handle, update)),
+            }
+        }
+        if !contested.is_empty() {
+            updates = updates.without_contested();
+            self.confirm(contested).await;
         }
         let on_space: Arc<dyn OnSpace> = Arc::clone(&self.space) as _;
         loop {
@@ -306,6 +322,21 @@ impl Receiver {
                 return;
             }
             self.space.0.notified().await;
+        }
+    }
+
+    /// Lets the owner attach seats that other streams have, unless the client has left this one.
+    async fn confirm(&self, contested: Vec<u32>) {
+        let Some(inputs) = self.inputs.upgrade().filter(|_| self.outbox.is_open()) else {
+            return;
+        };
+        for handle in contested {
+            let still_open = PlayInput {
+                input: Some(Input::StillOpen(handle)),
+                elapsed_us: None,
+            };
+            // If the stream has ended, so does the client's.
+            let _ = inputs.send(still_open).await;
         }
     }
 
@@ -332,7 +363,7 @@ impl Receiver {
                 seat.decision = Some(Arc::clone(&handover));
                 return Some(handover);
             }
-            Received::Other => {}
+            Received::Contested | Received::Other => {}
         }
         None
     }
@@ -343,8 +374,7 @@ impl Receiver {
             return;
         }
         debug!(?ended, "a stream to another node has ended");
-        let ids = (self.shared.ids.lock()).expect("nothing panics under this lock");
-        for id in ids.iter() {
+        for id in self.shared.ids().iter() {
             directory.forget(&FoundBy::Id(*id));
         }
         self.outbox.end(StreamEnd::RoomGone);

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use tonic::{Code, Status};
 
 use super::reader::{Reader, Requests};
-use crate::config::MAX_COMMANDS_PER_MESSAGE;
+use crate::config::{MAX_COMMANDS_CONTESTED, MAX_COMMANDS_PER_MESSAGE};
 use crate::convert;
 use crate::grpc::status::status;
 use crate::room::SeatAction;
@@ -41,9 +41,21 @@ impl Requests for PlayRequest {
             reader.next_called = self.first_assigned_handle;
         }
         let in_place = self.inputs.len() == 1;
-        for PlayInput { input, elapsed_us } in self.inputs {
+        for PlayInput {
+            mut input,
+            elapsed_us,
+        } in self.inputs
+        {
             tokio::task::consume_budget().await;
+            if let Some(Input::Command(command)) = &mut input
+                && let Some(contested) = reader.contested.get_mut(&command.handle)
+                && contested.commands.len() < MAX_COMMANDS_CONTESTED
+            {
+                contested.commands.push((command.command.take(), arrived));
+                continue;
+            }
             match input {
+                Some(Input::StillOpen(handle)) => Box::pin(reader.still_open(handle)).await,
                 Some(Input::Command(mut command)) => match command.command.take() {
                     Some(Command::Attach(attach)) => {
                         Box::pin(reader.attach_as(command.handle, attach)).await;

@@ -14,6 +14,9 @@ use chefshat_room::journal::{
     AbortReason, Change, Decided, Entry, ParticipantKind, SeatedParticipant, Source,
 };
 
+/// Typical size of an encoded entry.
+const TYPICAL_BYTES: usize = 32;
+
 #[derive(Clone, PartialEq, Message)]
 struct EntryForm {
     /// Microseconds since the room was created.
@@ -21,7 +24,7 @@ struct EntryForm {
     at_us: u64,
     #[prost(
         oneof = "ChangeForm",
-        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14"
+        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15"
     )]
     change: Option<ChangeForm>,
 }
@@ -54,6 +57,8 @@ enum ChangeForm {
     Reported(ReportedForm),
     #[prost(uint32, tag = "14")]
     Hinted(u32),
+    #[prost(uint32, tag = "15")]
+    Retired(u32),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -156,6 +161,20 @@ pub(super) fn value_of<T: Copy>(
         .ok_or_else(|| Unreadable::new(format!("{number} is not a known {what}")))
 }
 
+/// Encodes entries, and leaves `entries` empty.
+pub(in crate::store) fn entries_to_bytes(entries: &mut Vec<Entry>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(entries.len() * TYPICAL_BYTES);
+    put_entries(entries, &mut bytes);
+    bytes
+}
+
+/// Adds entries to a blob of entries, and leaves `entries` empty.
+pub(in crate::store) fn put_entries(entries: &mut Vec<Entry>, out: &mut Vec<u8>) {
+    for entry in entries.drain(..) {
+        put_entry(&entry, out);
+    }
+}
+
 /// Adds an entry to a blob of entries.
 pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
     let change = match &entry.change {
@@ -172,6 +191,7 @@ pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         Change::Disconnected(seat) => ChangeForm::Disconnected(seat_number(*seat)),
         Change::Returned(seat) => ChangeForm::Returned(seat_number(*seat)),
         Change::Substituted(seat) => ChangeForm::Substituted(seat_number(*seat)),
+        Change::Retired(seat) => ChangeForm::Retired(seat_number(*seat)),
         Change::Hinted(seat) => ChangeForm::Hinted(seat_number(*seat)),
         Change::Attempted { seat, action } => ChangeForm::Attempted(AttemptedForm {
             seat: seat_number(*seat),
@@ -247,6 +267,7 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
         ChangeForm::Disconnected(number) => Change::Disconnected(seat(number)?),
         ChangeForm::Returned(number) => Change::Returned(seat(number)?),
         ChangeForm::Substituted(number) => Change::Substituted(seat(number)?),
+        ChangeForm::Retired(number) => Change::Retired(seat(number)?),
         ChangeForm::Hinted(number) => Change::Hinted(seat(number)?),
         ChangeForm::Attempted(form) => Change::Attempted {
             seat: seat(form.seat)?,

@@ -89,6 +89,14 @@ pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
     .encode_to_vec()
 }
 
+/// Decodes the header of a hosted game.
+///
+/// # Errors
+/// It is missing, or has an invalid field.
+pub(in crate::store) fn stored_header(bytes: Option<&[u8]>) -> Result<GameHeader, Unreadable> {
+    header_from_bytes(bytes.ok_or_else(|| Unreadable::new("its header is missing"))?)
+}
+
 /// Decodes a header.
 ///
 /// # Errors

@@ -12,16 +12,18 @@ use chefshat_engine::ActionId;
 use chefshat_proto::v1;
 use prost::Message as _;
 
-pub(super) use entry::{put_entry, read_entries};
-pub(super) use header::{header_from_bytes, header_to_bytes};
+pub(super) use entry::{entries_to_bytes, put_entries, put_entry, read_entries};
+pub(super) use header::{header_from_bytes, header_to_bytes, stored_header};
 pub(super) use signed::{signed_from_bytes, signed_to_bytes};
 pub(super) use tournament::{
-    tournament_entries_from_bytes, tournament_entries_to_bytes, tournament_from_bytes,
-    tournament_to_bytes,
+    stored_tournament, tournament_entries_from_bytes, tournament_entries_to_bytes,
+    tournament_from_bytes, tournament_to_bytes,
 };
 
 /// Version of the encoding.
 pub(super) const FORM: i64 = 1;
+/// The oldest version that this one reads.
+const OLDEST_FORM: i64 = 1;
 
 /// Why stored data cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +39,20 @@ impl Unreadable {
 impl From<prost::DecodeError> for Unreadable {
     fn from(error: prost::DecodeError) -> Self {
         Self(error.to_string())
+    }
+}
+
+/// Checks that this version reads an encoding.
+///
+/// # Errors
+/// It does not.
+pub(super) fn check_form(form: i64) -> Result<(), Unreadable> {
+    if (OLDEST_FORM..=FORM).contains(&form) {
+        Ok(())
+    } else {
+        let problem =
+            format!("it has encoding {form}; this version reads encodings {OLDEST_FORM} to {FORM}");
+        Err(Unreadable(problem))
     }
 }
 

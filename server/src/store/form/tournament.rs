@@ -5,8 +5,8 @@ use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistic
 use prost::Message;
 
 use super::entry::{KINDS, number_of, value_of};
-use super::{Unreadable, array};
-use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use super::{Unreadable, array, check_form};
+use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
@@ -27,7 +27,10 @@ struct HeaderForm {
 
 #[derive(Clone, PartialEq, Message)]
 struct EntryForm {
-    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11")]
+    #[prost(
+        oneof = "KindForm",
+        tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16"
+    )]
     kind: Option<KindForm>,
 }
 
@@ -55,6 +58,34 @@ enum KindForm {
     Finished(bool),
     #[prost(bool, tag = "11")]
     Closed(bool),
+    #[prost(message, tag = "12")]
+    Withdrawn(WithdrawnForm),
+    #[prost(message, tag = "13")]
+    Replaced(ReplacedForm),
+    /// Paused, or resumed.
+    #[prost(bool, tag = "14")]
+    Paused(bool),
+    /// A game, and the participant who postponed it, if one did.
+    #[prost(message, tag = "15")]
+    Postponed(GameForm),
+    #[prost(uint64, tag = "16")]
+    Recalled(u64),
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct WithdrawnForm {
+    #[prost(uint64, tag = "1")]
+    participant: u64,
+    #[prost(bool, tag = "2")]
+    removed: bool,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct ReplacedForm {
+    #[prost(uint64, tag = "1")]
+    participant: u64,
+    #[prost(message, optional, tag = "2")]
+    by: Option<EntrantForm>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -210,6 +241,27 @@ pub(in crate::store) fn tournament_entries_from_bytes(
     Ok(entries)
 }
 
+/// Decodes a tournament: the version of its encoding, its header, and the rows of its journal.
+///
+/// # Errors
+/// An encoding that this version does not read, or an invalid field or entry.
+pub(in crate::store) fn stored_tournament(
+    form: i64,
+    header: &[u8],
+    rows: &[Vec<u8>],
+) -> Result<StoredTournament, Unreadable> {
+    check_form(form)?;
+    let mut entries = Vec::new();
+    for row in rows {
+        entries.extend(tournament_entries_from_bytes(row)?);
+    }
+    Ok(StoredTournament {
+        header: tournament_from_bytes(header)?,
+        entries,
+        rows: u64::try_from(rows.len()).unwrap_or(u64::MAX),
+    })
+}
+
 fn kind_of(entry: &TournamentEntry) -> KindForm {
     match entry {
         TournamentEntry::Ticket {
@@ -252,6 +304,23 @@ fn kind_of(entry: &TournamentEntry) -> KindForm {
             Change::Voided { game } => KindForm::Voided(wide(*game)),
             Change::Finished => KindForm::Finished(true),
             Change::Closed => KindForm::Closed(true),
+            Change::Withdrawn {
+                participant,
+                removed,
+            } => KindForm::Withdrawn(WithdrawnForm {
+                participant: wide(*participant),
+                removed: *removed,
+            }),
+            Change::Replaced { participant, by } => KindForm::Replaced(ReplacedForm {
+                participant: wide(*participant),
+                by: Some(entrant_to_form(by)),
+            }),
+            Change::Paused => KindForm::Paused(true),
+            Change::Resumed => KindForm::Paused(false),
+            Change::Postponed { game, by } => {
+                KindForm::Postponed(game_form(*game, &Vec::from_iter(*by)))
+            }
+            Change::Recalled { game } => KindForm::Recalled(wide(*game)),
         },
     }
 }
@@ -302,6 +371,27 @@ fn entry_of(kind: KindForm) -> Result<TournamentEntry, Unreadable> {
         },
         KindForm::Finished(_) => Change::Finished,
         KindForm::Closed(_) => Change::Closed,
+        KindForm::Withdrawn(form) => Change::Withdrawn {
+            participant: narrow(form.participant)?,
+            removed: form.removed,
+        },
+        KindForm::Replaced(form) => Change::Replaced {
+            participant: narrow(form.participant)?,
+            by: entrant_from_form(
+                (form.by).ok_or_else(|| Unreadable::new("nobody takes a place"))?,
+            )?,
+        },
+        KindForm::Paused(true) => Change::Paused,
+        KindForm::Paused(false) => Change::Resumed,
+        KindForm::Postponed(form) => Change::Postponed {
+            game: narrow(form.game)?,
+            by: (form.participants.first())
+                .map(|participant| narrow(*participant))
+                .transpose()?,
+        },
+        KindForm::Recalled(game) => Change::Recalled {
+            game: narrow(game)?,
+        },
     }))
 }
 

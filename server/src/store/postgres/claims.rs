@@ -1,104 +1,133 @@
-//! Taking over a unit, in one transaction.
+//! Taking units over, in one transaction.
 
 use std::time::Duration;
 
+use chefshat_engine::RULES_VERSION;
 use sqlx::Row as _;
 use sqlx::postgres::PgConnection;
 use tracing::error;
 
-use super::journals::encode;
+use super::values::integer;
 use crate::clock::since_epoch_ms;
 use crate::store::cluster::Epoch;
-use crate::store::form;
+use crate::store::form::{self, FORM};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry};
 
-/// What became of a claim.
-pub(super) enum Claim {
-    /// It has the new epoch.
-    Won(Epoch),
-    /// It is no orphan, or not at this epoch.
-    Lost,
-    /// The last owner wrote something at the same time.
+/// What became of claims.
+pub(super) enum Claims {
+    /// The new epoch of each unit; `None` if it is not claimed.
+    Made(Vec<Option<Epoch>>),
+    /// Nothing: the last owner of one of them wrote something at the same time.
     Busy,
 }
 
-/// Claims a unit for a node, if it still has the epoch that was seen.
+/// Claims units for a node, if they still have the epochs that were seen. What somebody else is
+/// just claiming or ending is not claimed.
 pub(super) async fn claim(
     connection: &mut PgConnection,
     node: i64,
     expire_after: i64,
-    unit: Id,
-    seen: i64,
-) -> sqlx::Result<Claim> {
-    let unit = unit.0.as_slice();
-    // Whoever has locked the rows claims the unit, or ends one of them.
-    let rows: Vec<(Option<i64>, bool)> = sqlx::query_as(
-        "SELECT node, durable FROM owned
-         WHERE unit = $1 AND epoch = $2 AND NOT over AND EXISTS (SELECT FROM nodes WHERE node = $3)
-         ORDER BY id FOR UPDATE",
+    orphans: &[(Id, Epoch)],
+) -> sqlx::Result<Claims> {
+    let seen: Vec<i64> = orphans.iter().map(|(_, seen)| integer(seen.0)).collect();
+    let units: Vec<&[u8]> = orphans.iter().map(|(unit, _)| unit.0.as_slice()).collect();
+    let locked: Vec<(Vec<u8>, Option<i64>, bool)> = sqlx::query_as(
+        "WITH locked AS (
+             SELECT unit, node, durable, form, rules_version FROM owned
+             WHERE (unit, epoch) IN (SELECT * FROM unnest($1::bytea[], $2::bigint[]))
+               AND NOT over AND EXISTS (SELECT FROM nodes WHERE node = $3)
+             ORDER BY id FOR UPDATE SKIP LOCKED
+         )
+         SELECT unit, min(node),
+                bool_or(durable) AND bool_and(form <= $4 AND coalesce(rules_version, $5) = $5)
+                AND count(*) = (SELECT count(*) FROM owned WHERE owned.unit = locked.unit AND NOT over)
+         FROM locked GROUP BY unit",
     )
-    .bind(unit)
+    .bind(units)
     .bind(seen)
     .bind(node)
+    .bind(FORM)
+    .bind(i64::from(RULES_VERSION))
     .fetch_all(&mut *connection)
     .await?;
-    if !rows.iter().any(|(_, durable)| *durable) {
-        return Ok(Claim::Lost);
-    }
-    // All of them have the same owner.
-    let (owner, _) = rows[0];
-    if let Some(owner) = owner {
-        // A beat waits for the lock, so its answer comes before or after the whole claim.
-        let alive: Option<bool> = sqlx::query_scalar(
-            "SELECT beat_ms + $2 > clock_ms() FROM nodes WHERE node = $1 FOR SHARE",
-        )
-        .bind(owner)
-        .bind(expire_after)
-        .fetch_optional(&mut *connection)
-        .await?;
-        if alive == Some(true) {
-            return Ok(Claim::Lost);
+    // All rows of a unit have the same owner. A beat waits for the lock, so its answer comes before
+    // or after all claims.
+    let owners: Vec<i64> = locked.iter().filter_map(|(_, owner, _)| *owner).collect();
+    let owners: Vec<(i64, bool)> = match owners.is_empty() {
+        true => Vec::new(),
+        false => {
+            sqlx::query_as(
+                "SELECT node, beat_ms + $2 > clock_ms() FROM nodes
+                 WHERE node = ANY ($1) ORDER BY node FOR SHARE",
+            )
+            .bind(owners)
+            .bind(expire_after)
+            .fetch_all(&mut *connection)
+            .await?
+        }
+    };
+    let is_alive = |owner: &i64| owners.contains(&(*owner, true));
+    let claimed: Vec<Vec<u8>> = (locked.into_iter())
+        .filter(|(_, owner, claimable)| *claimable && !owner.as_ref().is_some_and(is_alive))
+        .map(|(unit, ..)| unit)
+        .collect();
+    if !claimed.is_empty() {
+        take(connection, node, &claimed).await?;
+        if !restart(connection, &claimed).await? {
+            return Ok(Claims::Busy);
         }
     }
-    sqlx::query("DELETE FROM owned WHERE unit = $1 AND NOT durable AND NOT over")
-        .bind(unit)
-        .execute(&mut *connection)
-        .await?;
-    let epoch = seen + 1;
-    // The rooms that are over can be shown by the new owner.
-    sqlx::query(
-        "UPDATE owned SET node = $2, epoch = CASE WHEN over THEN epoch ELSE $3 END WHERE unit = $1",
-    )
-    .bind(unit)
-    .bind(node)
-    .bind(epoch)
-    .execute(&mut *connection)
-    .await?;
-    match restart(connection, unit, epoch).await? {
-        true => Ok(Claim::Won(Epoch(epoch.cast_unsigned()))),
-        false => Ok(Claim::Busy),
-    }
+    let epoch = |(unit, seen): &(Id, Epoch)| {
+        let is_claimed = claimed.iter().any(|claimed| *claimed == unit.0);
+        is_claimed.then(|| seen.next())
+    };
+    Ok(Claims::Made(orphans.iter().map(epoch).collect()))
 }
 
-/// Adds "the server was restarted" to the journals of a unit's rooms that are not over. Returns
-/// `false` if the last owner has just written at the same position.
-async fn restart(connection: &mut PgConnection, unit: &[u8], epoch: i64) -> sqlx::Result<bool> {
+/// Makes units a node's and raises their epochs. Their ephemeral rooms have died with the last one.
+async fn take(connection: &mut PgConnection, node: i64, units: &[Vec<u8>]) -> sqlx::Result<()> {
+    sqlx::query(
+        // The rooms that are over can be shown by the new owner. What it writes, versions that do
+        // not know its form cannot read.
+        "WITH died AS (
+             DELETE FROM owned WHERE unit = ANY ($1) AND NOT durable AND NOT over
+         ), form AS (
+             UPDATE games SET form = $3 FROM owned
+             WHERE unit = ANY ($1) AND NOT over AND games.game_id = owned.game_id AND games.form < $3
+         )
+         UPDATE owned SET node = $2,
+                          epoch = CASE WHEN over THEN epoch ELSE epoch + 1 END,
+                          form = CASE WHEN over THEN form ELSE greatest(form, $3) END
+         WHERE unit = ANY ($1) AND (durable OR over)",
+    )
+    .bind(units)
+    .bind(node)
+    .bind(FORM)
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+/// Adds "the server was restarted" to the journals of the rooms of units that are not over. Returns
+/// `false` if a last owner has just written at the same position.
+async fn restart(connection: &mut PgConnection, units: &[Vec<u8>]) -> sqlx::Result<bool> {
     let games = sqlx::query(
-        "SELECT number, created_at_ms, position, entries
+        "SELECT number, created_at_ms, owned.epoch, position, entries
          FROM owned JOIN games USING (game_id)
               LEFT JOIN LATERAL (SELECT position, entries FROM journal WHERE game = number
                                  ORDER BY position DESC LIMIT 1) last ON true
-         WHERE unit = $1 AND NOT over",
+         WHERE unit = ANY ($1) AND NOT over",
     )
-    .bind(unit)
+    .bind(units)
     .fetch_all(&mut *connection)
     .await?;
-    let (mut numbers, mut positions, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut numbers, mut epochs) = (Vec::new(), Vec::<i64>::new());
+    let (mut positions, mut rows) = (Vec::new(), Vec::new());
     for game in &games {
         let number: i64 = game.get(0);
         let mut last = Vec::new();
-        let entries: Option<&[u8]> = game.get(3);
+        let entries: Option<&[u8]> = game.get(4);
         if let Err(problem) = form::read_entries(entries.unwrap_or_default(), &mut last) {
             error!(number, %problem, "a game cannot be read; it is left unchanged");
             continue;
@@ -112,17 +141,18 @@ async fn restart(connection: &mut PgConnection, unit: &[u8], epoch: i64) -> sqlx
             change: Change::ServerRestarted,
         };
         numbers.push(number);
-        positions.push(game.get::<Option<i64>, _>(2).map_or(0, |last| last + 1));
-        rows.push(encode(&mut vec![entry]));
+        epochs.push(game.get(2));
+        positions.push(game.get::<Option<i64>, _>(3).map_or(0, |last| last + 1));
+        rows.push(form::entries_to_bytes(&mut vec![entry]));
     }
     let written = sqlx::query(
         "INSERT INTO journal (game, position, epoch, entries)
-         SELECT game, position, $3, entries FROM unnest($1, $2, $4) AS new (game, position, entries)
+         SELECT * FROM unnest($1::bigint[], $2::bigint[], $3::bigint[], $4::bytea[])
          ON CONFLICT DO NOTHING",
     )
     .bind(&numbers)
     .bind(&positions)
-    .bind(epoch)
+    .bind(&epochs)
     .bind(&rows)
     .execute(connection)
     .await?;

@@ -3,14 +3,17 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use chefshat_cluster::LeaseTimes;
 use chefshat_engine::RULES_VERSION;
 use futures::FutureExt as _;
-use futures::future::BoxFuture;
+use futures::future::{BoxFuture, pending};
 use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection as _, Row as _};
 
-use super::claims::{Claim, claim};
+use super::claims::{Claims, claim};
+use super::handover::{Handed, release};
 use super::owned::rooms;
+use super::reader::Reader;
 use super::values::{integer, millis, text};
 use super::{PostgresStore, lock};
 use crate::store::cluster::{
@@ -36,24 +39,52 @@ macro_rules! locations {
 }
 
 impl PostgresStore {
-    /// One attempt to claim a unit.
-    async fn try_claim(&self, unit: Id, seen: Epoch) -> Result<Claim, StoreError> {
-        let node = self.node()?;
-        let expire_after = millis(self.options.expire_after);
-        let claim = self.control.read(move |connection| {
+    /// One attempt to claim units.
+    async fn try_claim(&self, orphans: &[(Id, Epoch)]) -> Result<Claims, StoreError> {
+        let (node, expire_after) = (self.node()?, self.expire_after());
+        let orphans = orphans.to_vec();
+        let claims = self.control.read(move |connection| {
             async move {
                 let mut transaction = connection.begin().await?;
-                let seen = integer(seen.0);
-                let claim = claim(&mut transaction, node, expire_after, unit, seen).await?;
-                match claim {
-                    Claim::Won(_) => transaction.commit().await?,
-                    Claim::Lost | Claim::Busy => transaction.rollback().await?,
+                let claims = claim(&mut transaction, node, expire_after, &orphans).await?;
+                match claims {
+                    Claims::Made(_) => transaction.commit().await?,
+                    Claims::Busy => transaction.rollback().await?,
                 }
-                Ok(claim)
+                Ok(claims)
             }
             .boxed()
         });
-        claim.await
+        claims.await
+    }
+
+    async fn claim_one(&self, orphan: (Id, Epoch)) -> Result<Option<Epoch>, StoreError> {
+        for _ in 0..CLAIM_ATTEMPTS {
+            if let Claims::Made(mut claimed) = self.try_claim(&[orphan]).await? {
+                return Ok(claimed.pop().flatten());
+            }
+        }
+        Ok(None)
+    }
+
+    /// When leases expire, milliseconds after a beat.
+    fn expire_after(&self) -> i64 {
+        integer(self.options.lease.expire_after_ms())
+    }
+
+    /// A tournament, read over these connections.
+    async fn tournament_over(
+        &self,
+        reader: &Reader,
+        id: Id,
+    ) -> Result<Option<StoredTournament>, StoreError> {
+        let rows = reader.read(move |connection| {
+            sqlx::query("SELECT number, form, header FROM tournaments WHERE tournament_id = $1")
+                .bind(id.0.to_vec())
+                .fetch_all(connection)
+                .boxed()
+        });
+        Ok(reader.read_tournaments(rows.await?).await?.pop())
     }
 
     async fn locate_where(
@@ -80,6 +111,10 @@ enum LocatedBy {
 }
 
 impl ClusterStore for PostgresStore {
+    fn lease(&self) -> LeaseTimes {
+        self.options.lease
+    }
+
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
         async move {
             let node: i64 = (self.control.read(|connection| {
@@ -110,7 +145,7 @@ impl ClusterStore for PostgresStore {
     fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             let node = self.node()?;
-            let beat = self.control.read(move |connection| {
+            let beat = self.beats.read(move |connection| {
                 async move {
                     let mut transaction = connection.begin().await?;
                     let drain: Option<bool> = sqlx::query_scalar(
@@ -143,31 +178,31 @@ impl ClusterStore for PostgresStore {
 
     fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
         async move {
-            let expire_after = millis(self.options.expire_after);
-            let retention = millis(self.options.retention);
+            let expire_after = self.expire_after();
             let node = self.node()?;
             let units = self.control.read(move |connection| {
-                async move {
-                    tidy(connection, expire_after, retention).await?;
-                    sqlx::query(
-                        "SELECT unit, epoch FROM owned
-                         WHERE NOT over AND durable
-                           AND (node IS NULL OR node IN (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
-                           AND NOT EXISTS (
-                               SELECT FROM owned other
-                               WHERE other.unit = owned.unit AND NOT over
-                                 AND (form > $2 OR coalesce(rules_version, $3) <> $3))
-                         GROUP BY unit, epoch
-                         ORDER BY hashtextextended(encode(unit, 'hex'), $5), unit LIMIT $4",
-                    )
-                    .bind(expire_after)
-                    .bind(FORM)
-                    .bind(i64::from(RULES_VERSION))
-                    .bind(integer(count as u64))
-                    .bind(node)
-                    .fetch_all(connection)
-                    .await
-                }
+                sqlx::query(
+                    // Each part has an index: usually there are none. All rows of a unit have the
+                    // same node.
+                    "WITH free AS (
+                         SELECT unit, epoch, durable, form, rules_version FROM owned
+                         WHERE NOT over AND node IS NULL
+                         UNION ALL
+                         SELECT unit, epoch, durable, form, rules_version FROM owned
+                         WHERE NOT over
+                           AND node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
+                     )
+                     SELECT unit, epoch FROM free GROUP BY unit, epoch
+                     HAVING bool_or(durable)
+                        AND bool_and(form <= $2 AND coalesce(rules_version, $3) = $3)
+                     ORDER BY hashtextextended(encode(unit, 'hex'), $5), unit LIMIT $4",
+                )
+                .bind(expire_after)
+                .bind(FORM)
+                .bind(i64::from(RULES_VERSION))
+                .bind(integer(count as u64))
+                .bind(node)
+                .fetch_all(connection)
                 .boxed()
             });
             Ok(units.await?.iter().filter_map(unit_at).collect())
@@ -175,16 +210,48 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)> {
         async move {
-            for _ in 0..CLAIM_ATTEMPTS {
-                match self.try_claim(unit, seen).await? {
-                    Claim::Won(epoch) => return Ok(Some(epoch)),
-                    Claim::Lost => return Ok(None),
-                    Claim::Busy => {}
+            let mut handed = self.handed.lock().await;
+            let listen = || Handed::listen(self.sessions.clone(), self.closing.clone());
+            let handed = handed.get_or_insert_with(listen);
+            while let Some((node, unit, epoch)) = handed.next().await {
+                if self.node() == Ok(node) {
+                    return (unit, epoch);
                 }
             }
-            Ok(None)
+            pending().await
+        }
+        .boxed()
+    }
+
+    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let expire_after = self.expire_after();
+            let retention = millis(self.options.retention);
+            let tidied = self
+                .control
+                .read(move |connection| tidy(connection, expire_after, retention).boxed());
+            tidied.await
+        }
+        .boxed()
+    }
+
+    fn claim_all(
+        &self,
+        orphans: Vec<(Id, Epoch)>,
+    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
+        async move {
+            if orphans.len() > 1
+                && let Claims::Made(claimed) = self.try_claim(&orphans).await?
+            {
+                return Ok(claimed);
+            }
+            let mut claimed = Vec::with_capacity(orphans.len());
+            for orphan in orphans {
+                claimed.push(self.claim_one(orphan).await?);
+            }
+            Ok(claimed)
         }
         .boxed()
     }
@@ -193,33 +260,34 @@ impl ClusterStore for PostgresStore {
         async move {
             let node = self.node()?;
             let at = integer(epoch.0);
-            let is_owned: bool = (self.control.read(move |connection| {
-                sqlx::query_scalar(
-                    "SELECT EXISTS (SELECT FROM owned
-                                    WHERE unit = $1 AND epoch = $2 AND node = $3 AND NOT over)",
+            let retention = millis(self.options.retention);
+            let items = self.control.read(move |connection| {
+                sqlx::query(
+                    "SELECT number, games.form, header, over,
+                            kind, node = $2 AND epoch = $3 AND NOT over AS is_owned
+                     FROM owned LEFT JOIN games USING (game_id)
+                     WHERE unit = $1 AND (kind = 1 OR durable AND number IS NOT NULL
+                                                 AND (NOT over OR ended_ms >= clock_ms() - $4))
+                     ORDER BY number",
                 )
                 .bind(unit.0.to_vec())
-                .bind(at)
                 .bind(node)
-                .fetch_one(connection)
-                .boxed()
-            }))
-            .await?;
-            if !is_owned {
-                return Ok(None);
-            }
-            let tournament = self.tournament(unit).await?;
-            let retention = millis(self.options.retention);
-            let games = self.reader.read(move |connection| {
-                sqlx::query(rooms!(
-                    "unit = $1 AND (NOT over OR ended_ms >= clock_ms() - $2) ORDER BY number"
-                ))
-                .bind(unit.0.to_vec())
+                .bind(at)
                 .bind(retention)
                 .fetch_all(connection)
                 .boxed()
             });
-            let rooms = self.reader.rooms(games.await?).await?;
+            let items = items.await?;
+            if !(items.iter()).any(|item| item.get::<Option<bool>, _>(5) == Some(true)) {
+                return Ok(None);
+            }
+            let (rooms, tournaments): (Vec<_>, Vec<_>) =
+                (items.into_iter()).partition(|item| item.get::<i16, _>(4) == 0);
+            let tournament = match tournaments.is_empty() {
+                true => None,
+                false => self.tournament_over(&self.control, unit).await?,
+            };
+            let rooms = self.control.rooms(rooms).await?;
             if tournament.is_some() {
                 lock(&self.tournaments).insert(unit, at);
             }
@@ -236,32 +304,11 @@ impl ClusterStore for PostgresStore {
 
     fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
-            let node = self.node()?;
-            let released = self.control.read(move |connection| {
-                async move {
-                    let mut transaction = connection.begin().await?;
-                    sqlx::query(
-                        "DELETE FROM owned
-                         WHERE unit = $1 AND epoch = $2 AND node = $3 AND NOT durable AND NOT over",
-                    )
-                    .bind(unit.0.to_vec())
-                    .bind(integer(epoch.0))
-                    .bind(node)
-                    .execute(&mut *transaction)
-                    .await?;
-                    sqlx::query(
-                        "UPDATE owned SET node = NULL
-                         WHERE unit = $1 AND node = $3 AND (epoch = $2 OR over)",
-                    )
-                    .bind(unit.0.to_vec())
-                    .bind(integer(epoch.0))
-                    .bind(node)
-                    .execute(&mut *transaction)
-                    .await?;
-                    transaction.commit().await
-                }
-                .boxed()
-            });
+            let (node, expire_after) = (self.node()?, self.expire_after());
+            let unit = (unit, integer(epoch.0));
+            let released = self
+                .control
+                .read(move |connection| release(connection, unit, node, expire_after).boxed());
             released.await
         }
         .boxed()
@@ -301,6 +348,14 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
+    fn locate_game(&self, game: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+        self.locate_where(
+            locations!("WHERE game_id = $1 AND NOT over"),
+            LocatedBy::Id(game),
+        )
+        .boxed()
+    }
+
     fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         async move {
             let rows = self.reader.read(move |connection| {
@@ -315,38 +370,12 @@ impl ClusterStore for PostgresStore {
     }
 
     fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
-        async move {
-            let rows = self.reader.read(move |connection| {
-                sqlx::query("SELECT number, form, header FROM tournaments WHERE tournament_id = $1")
-                    .bind(id.0.to_vec())
-                    .fetch_all(connection)
-                    .boxed()
-            });
-            Ok(self.reader.read_tournaments(rows.await?).await?.pop())
-        }
-        .boxed()
-    }
-
-    fn tournament_rows(&self, id: Id) -> BoxFuture<'_, Result<u64, StoreError>> {
-        async move {
-            let rows: i64 = (self.reader.read(move |connection| {
-                sqlx::query_scalar(
-                    "SELECT coalesce(max(position) + 1, 0) FROM tournament_entries
-                     WHERE tournament = (SELECT number FROM tournaments WHERE tournament_id = $1)",
-                )
-                .bind(id.0.to_vec())
-                .fetch_one(connection)
-                .boxed()
-            }))
-            .await?;
-            Ok(rows.cast_unsigned())
-        }
-        .boxed()
+        self.tournament_over(&self.reader, id).boxed()
     }
 
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
         async move {
-            let expire_after = millis(self.options.expire_after);
+            let expire_after = self.expire_after();
             let nodes = self.reader.read(move |connection| {
                 sqlx::query(
                     "SELECT node, name, peer_endpoint, client_endpoint, build, capacity
@@ -363,7 +392,7 @@ impl ClusterStore for PostgresStore {
 
     fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
         async move {
-            let expire_after = millis(self.options.expire_after);
+            let expire_after = self.expire_after();
             let nodes = self.reader.read(move |connection| {
                 sqlx::query(
                     "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
@@ -415,8 +444,11 @@ async fn tidy(
     retention: i64,
 ) -> sqlx::Result<()> {
     sqlx::query(
-        "DELETE FROM owned WHERE NOT durable AND NOT over AND unit = id
-           AND (node IS NULL OR node IN (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))",
+        "DELETE FROM owned WHERE id IN (
+             SELECT id FROM owned WHERE NOT durable AND NOT over AND unit = id AND node IS NULL
+             UNION ALL
+             SELECT id FROM owned WHERE NOT durable AND NOT over AND unit = id
+               AND node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms())))",
     )
     .bind(expire_after)
     .execute(&mut *connection)

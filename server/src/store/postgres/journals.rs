@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
-use tracing::error;
+use futures::future::BoxFuture;
 
 use super::appends::Row;
 use super::commands::Command;
@@ -13,6 +12,7 @@ use super::ends::{End, WholeGame};
 use super::reader::Reader;
 use super::values::Owned;
 use super::writer::Queue;
+use crate::store::ephemeral::StoreWhole;
 use crate::store::form;
 use crate::store::{Journal, Signed, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -57,7 +57,7 @@ impl Journal for DurableJournal {
                 epoch: self.owned.epoch,
                 game: self.number,
                 position: self.position,
-                entries: encode(entries),
+                entries: form::entries_to_bytes(entries),
             }));
             self.settle().await
         }
@@ -83,7 +83,7 @@ impl Journal for DurableJournal {
                 owned: self.owned,
                 number: self.number,
                 rows: self.position,
-                end: end(summary, signed),
+                end: end(summary, signed.as_ref().map(form::signed_to_bytes)),
             };
             self.commands.commit(Arc::new(finish)).await.map(drop)
         }
@@ -91,82 +91,34 @@ impl Journal for DurableJournal {
     }
 }
 
-/// The journal of a game that is stored when it ends. Until then its entries are in memory,
-/// encoded, which takes a small part of the space.
-pub(super) struct EphemeralJournal {
+/// Where a game is stored when it ends.
+pub(super) struct Whole {
     pub(super) owned: Owned,
-    pub(super) header: Arc<GameHeader>,
-    pub(super) encoded: Vec<u8>,
     pub(super) commands: Queue<Command>,
 }
 
-impl Journal for EphemeralJournal {
-    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
-        put_all(entries, &mut self.encoded);
-        true
-    }
-
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.append_now(entries);
-        ready(Ok(())).boxed()
-    }
-
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        let mut entries = Vec::new();
-        let read = form::read_entries(&self.encoded, &mut entries);
-        let failed = |problem: form::Unreadable| StoreError::Failed(problem.to_string());
-        ready(read.map(|()| entries).map_err(failed)).boxed()
-    }
-
-    fn finish(
-        &mut self,
+impl StoreWhole for Whole {
+    fn store_whole<'a>(
+        &'a self,
+        header: &'a GameHeader,
+        entries: Vec<u8>,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let entries = std::mem::take(&mut self.encoded);
-        async move {
-            let game = end(summary, signed).map(|end| {
-                Box::new(WholeGame {
-                    game_id: self.header.game_id,
-                    header: form::header_to_bytes(&self.header),
-                    entries,
-                    end,
-                })
-            });
-            let owned = self.owned;
-            let whole = Command::Whole { owned, game };
-            match self.commands.commit(Arc::new(whole)).await {
-                // The game was played anyway; the record that was stored first stays.
-                Err(StoreError::Taken(game)) => {
-                    error!(%game, "another record has the id of this game; the game is not stored");
-                    Ok(())
-                }
-                stored => stored.map(drop),
-            }
-        }
-        .boxed()
+        signature: Option<Vec<u8>>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        let game = end(summary, signature).map(|end| {
+            Box::new(WholeGame {
+                game_id: header.game_id,
+                header: form::header_to_bytes(header),
+                entries,
+                end,
+            })
+        });
+        let owned = self.owned;
+        let whole = Command::Whole { owned, game };
+        async move { self.commands.commit(Arc::new(whole)).await.map(drop) }.boxed()
     }
 }
 
-fn end(summary: Option<Box<v1::RecordSummary>>, signed: Option<Signed>) -> Option<End> {
-    summary.map(|summary| End {
-        summary,
-        signature: signed.as_ref().map(form::signed_to_bytes),
-    })
-}
-
-/// Encodes entries, and leaves `entries` empty.
-pub(super) fn encode(entries: &mut Vec<Entry>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(entries.len() * 32);
-    put_all(entries, &mut bytes);
-    bytes
-}
-
-fn put_all(entries: &mut Vec<Entry>, bytes: &mut Vec<u8>) {
-    for entry in entries.drain(..) {
-        form::put_entry(&entry, bytes);
-    }
+fn end(summary: Option<Box<v1::RecordSummary>>, signature: Option<Vec<u8>>) -> Option<End> {
+    summary.map(|summary| End { summary, signature })
 }

@@ -1,7 +1,7 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
-//! reads, `journals`, `appends`, `commands` and `ends` write through `writer`, `cluster`, `claims`
-//! and `owned` are about nodes and what they own, `transfer` moves an SQLite database here, `form`
-//! (beside this folder) encodes; this file joins them into a store.
+//! reads, `journals`, `appends`, `commands` and `ends` write through `writer`, `cluster`, `claims`,
+//! `handover` and `owned` are about nodes and what they own, `transfer` moves an SQLite database
+//! here, `form` (beside this folder) encodes; this file joins them into a store.
 
 mod appends;
 mod claims;
@@ -9,6 +9,7 @@ mod cluster;
 mod commands;
 mod ends;
 mod errors;
+mod handover;
 mod journals;
 mod open;
 mod owned;
@@ -24,10 +25,12 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
-use sqlx::postgres::PgPoolOptions;
+use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
+use tokio::sync::Mutex as AsyncMutex;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 use tracing::error;
@@ -36,6 +39,7 @@ pub use open::{DatabaseError, migrate};
 pub use transfer::{TransferError, Transferred, transfer};
 
 use super::codec::Codec;
+use super::ephemeral::EphemeralJournal;
 use super::form;
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame};
@@ -45,7 +49,8 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use commands::Command;
-use journals::{DurableJournal, EphemeralJournal, encode};
+use handover::Handed;
+use journals::{DurableJournal, Whole};
 use reader::{Reader, StoredRoom};
 use values::{FIRST_EPOCH, Owned, integer};
 use writer::{Queue, Shared};
@@ -56,16 +61,18 @@ const APPENDERS: usize = 2;
 const COMMANDERS: usize = 2;
 /// Connections for reading.
 const READERS: u32 = 6;
-/// Connections for leases and ownership, which must not wait for readers.
+/// Connections for ownership, which must not wait for readers.
 const CONTROLLERS: u32 = 2;
+/// Connections for beats, which wait for nothing else. One is enough, unless it hangs.
+const BEATERS: u32 = 2;
 /// How long a read waits for a connection.
 const ACQUIRE_LIMIT: Duration = Duration::from_secs(5);
 
 /// How a node uses the database.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PostgresOptions {
-    /// When the lease of a node that does not beat expires; the same for all nodes.
-    pub expire_after: Duration,
+    /// The times of leases; the same for all nodes.
+    pub lease: LeaseTimes,
     /// How long work is tried again while the database does not answer.
     pub retry_for: Duration,
     /// How long it is known where a room was after it is over.
@@ -78,7 +85,7 @@ pub struct PostgresOptions {
 impl Default for PostgresOptions {
     fn default() -> Self {
         Self {
-            expire_after: Duration::from_secs(8),
+            lease: LeaseTimes::DEFAULT,
             retry_for: Duration::from_secs(300),
             retention: Duration::from_secs(600),
             record_files: true,
@@ -93,6 +100,11 @@ pub struct PostgresStore {
     reader: Reader,
     /// Over its own connections.
     control: Reader,
+    /// Over its own connections.
+    beats: Reader,
+    sessions: PgConnectOptions,
+    /// Listens from when it is first asked.
+    handed: AsyncMutex<Option<Handed>>,
     codec: Codec,
     rows: Queue<Row>,
     commands: Queue<Command>,
@@ -122,7 +134,7 @@ impl PostgresStore {
                 .connect_lazy_with(sessions.clone()),
             codec: codec.clone(),
         };
-        let (readers, control) = (reader(READERS), reader(CONTROLLERS));
+        let [readers, control, beats] = [READERS, CONTROLLERS, BEATERS].map(reader);
         let metrics = StoreMetrics::default();
         let closing = CancellationToken::new();
         let shared = Shared {
@@ -136,6 +148,9 @@ impl PostgresStore {
             options,
             reader: readers,
             control,
+            beats,
+            sessions,
+            handed: AsyncMutex::default(),
             codec,
             rows: writer::start(&shared, APPENDERS, &mut writing),
             commands: writer::start(&shared, COMMANDERS, &mut writing),
@@ -205,7 +220,7 @@ impl PostgresStore {
     ) -> Result<Box<dyn Journal>, StoreError> {
         let (owned, node) = (self.place(&header)?, self.node()?);
         let durable = header.policy.durability != Durability::Ephemeral;
-        let encoded = (!entries.is_empty()).then(|| encode(&mut entries));
+        let encoded = (!entries.is_empty()).then(|| form::entries_to_bytes(&mut entries));
         let rows = i64::from(encoded.is_some());
         let (first, encoded) = match durable {
             true => (encoded, None),
@@ -231,12 +246,15 @@ impl PostgresStore {
                 commands: self.commands.clone(),
                 reader: self.reader.clone(),
             }),
-            false => Box::new(EphemeralJournal {
-                owned,
-                header,
-                encoded: encoded.unwrap_or_default(),
-                commands: self.commands.clone(),
-            }),
+            false => {
+                let commands = self.commands.clone();
+                let first = encoded.unwrap_or_default();
+                Box::new(EphemeralJournal::new(
+                    header,
+                    first,
+                    Whole { owned, commands },
+                ))
+            }
         })
     }
 }
@@ -410,6 +428,7 @@ impl Store for PostgresStore {
             }
             self.reader.pool.close().await;
             self.control.pool.close().await;
+            self.beats.pool.close().await;
         }
         .boxed()
     }

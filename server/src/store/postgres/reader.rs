@@ -17,7 +17,7 @@ use tracing::error;
 use super::errors::failure;
 use super::values::{integer, text};
 use crate::store::codec::Codec;
-use crate::store::form::{self, FORM, Unreadable};
+use crate::store::form::{self, Unreadable, check_form, stored_header};
 use crate::store::tournaments::StoredTournament;
 use crate::store::{Keep, Part, StoreError, StoredGame};
 use chefshat_room::ids::Id;
@@ -167,7 +167,7 @@ impl Reader {
         let mut rooms = Vec::with_capacity(games.len());
         for row in games {
             let number: i64 = row.get(0);
-            let header = check_form(row.get(1)).and_then(|()| header_of(&row));
+            let header = check_form(row.get(1)).and_then(|()| stored_header(row.get(2)));
             let journal = self.decode(journals.remove(&number).unwrap_or_default());
             let journal = journal.await?;
             match header.and_then(|header| Ok((header, journal?))) {
@@ -213,7 +213,7 @@ impl Reader {
             let lines = decoding.await?.map_err(unreadable)?;
             return Ok(Some(StoredGame::Imported(lines.into())));
         }
-        let header = header_of(&row).map_err(unreadable)?;
+        let header = stored_header(row.get(2)).map_err(unreadable)?;
         let (entries, _) = self.journal(row.get(0)).await?.map_err(unreadable)?;
         let signature: Option<&[u8]> = row.get(4);
         let signed = signature.map(form::signed_from_bytes).transpose();
@@ -241,7 +241,7 @@ impl Reader {
                 .boxed()
             }))
             .await?;
-            match tournament(&row, &parts) {
+            match form::stored_tournament(row.get(1), row.get(2), &parts) {
                 Ok(tournament) => stored.push(tournament),
                 Err(problem) => {
                     error!(number, %problem, "a tournament cannot be read; it is left unchanged");
@@ -342,34 +342,5 @@ impl Reader {
         .await?;
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
-    }
-}
-
-/// A tournament from its row and those of its journal.
-fn tournament(row: &PgRow, parts: &[Vec<u8>]) -> Result<StoredTournament, Unreadable> {
-    check_form(row.get(1))?;
-    let mut entries = Vec::new();
-    for part in parts {
-        entries.extend(form::tournament_entries_from_bytes(part)?);
-    }
-    Ok(StoredTournament {
-        header: form::tournament_from_bytes(row.get(2))?,
-        entries,
-        rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),
-    })
-}
-
-/// The header in the third column.
-fn header_of(row: &PgRow) -> Result<GameHeader, Unreadable> {
-    let bytes: Option<&[u8]> = row.get(2);
-    form::header_from_bytes(bytes.ok_or_else(|| Unreadable("its header is missing".into()))?)
-}
-
-fn check_form(form: i64) -> Result<(), Unreadable> {
-    if form == FORM {
-        Ok(())
-    } else {
-        let problem = format!("it has encoding {form}; this version reads encoding {FORM}");
-        Err(Unreadable(problem))
     }
 }

@@ -1,6 +1,7 @@
 //! What several nodes do to one PostgreSQL database. Behavior that all stores share is tested
 //! beside this folder; `model` compares ownership with its specification.
 
+mod claims;
 mod fencing;
 mod model;
 mod opening;
@@ -176,6 +177,12 @@ fn numbers(entries: &[Entry]) -> Vec<u64> {
 
 async fn append(journal: &mut Box<dyn Journal>, number: u64) -> Result<(), StoreError> {
     journal.append(&mut vec![entry(number)]).await
+}
+
+/// Number of rows of a tournament's journal.
+async fn tournament_rows(store: &PostgresStore, tournament: u8) -> u64 {
+    let tournament = store.tournament(Id([tournament; 16])).await;
+    tournament.expect("readable").expect("it exists").rows
 }
 
 /// The only game of a unit.

@@ -3,6 +3,8 @@
 //! again on a new connection, until its outcome is certain. So work must be *idempotent*: what it
 //! finds done by itself counts as done.
 
+use std::collections::VecDeque;
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,6 +24,8 @@ use crate::store::StoreError;
 const QUEUE: usize = 1_024;
 /// How long a transaction may take; then the connection is dropped.
 const COMMIT_LIMIT: Duration = Duration::from_secs(5);
+/// How often a batch is sent before it goes on in halves.
+const ATTEMPTS_TOGETHER: u32 = 2;
 /// Pauses before a transaction is tried again.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
@@ -152,56 +156,55 @@ impl Writer {
             }
             let began = Instant::now();
             let pieces = batch.len();
-            self.commit(std::mem::take(&mut batch), false).await;
+            self.commit(std::mem::take(&mut batch)).await;
             self.shared.metrics.committed(pieces, began.elapsed());
         }
     }
 
-    /// Commits a batch, which may have been committed before if it is tried `again`, and answers
-    /// its senders.
-    async fn commit<W: Work>(&mut self, mut batch: Vec<Pending<W>>, mut again: bool) {
+    /// Commits work and answers its senders. What gets no answer twice goes on in halves, so that
+    /// one piece that cannot proceed does not hold up the others for long.
+    async fn commit<W: Work>(&mut self, pieces: Vec<Pending<W>>) {
         let mut pause = FIRST_PAUSE;
-        while !batch.is_empty() {
-            let work: Vec<_> = batch.iter().map(|it| Arc::clone(&it.work)).collect();
-            let cause = match self.attempt(&work, again).await {
+        let mut batches = VecDeque::from([Batch::new(pieces, false)]);
+        while let Some(mut batch) = batches.pop_front() {
+            let cause = match self.attempt(&mut batch).await {
                 Ok(answers) => {
-                    if again {
+                    if batch.again {
                         info!("the database answers again");
                     }
-                    for (pending, answer) in batch.into_iter().zip(answers) {
-                        // The sender may be gone.
-                        let _ = pending.reply.send(answer);
-                    }
-                    return;
+                    batch.answer(answers);
+                    pause = FIRST_PAUSE;
+                    continue;
                 }
                 Err(cause) => cause,
             };
             let failed = failure(&cause);
             if !is_temporary(&cause) {
-                error!(error = %failed, pieces = batch.len(), "a commit was refused");
+                let pieces = batch.pieces.len();
+                error!(error = %failed, pieces, "a commit was refused");
                 // One piece must not make the others fail.
-                if batch.len() == 1 {
-                    let _ = batch.remove(0).reply.send(Err(failed));
-                    return;
+                match pieces {
+                    1 => batch.answer(vec![Err(failed)]),
+                    _ => batches.extend(batch.split(1)),
                 }
-                for pending in batch {
-                    Box::pin(self.commit(vec![pending], again)).await;
-                }
-                return;
+                continue;
             }
-            if !again {
+            if !batch.again {
                 warn!(error = %failed, "a commit has no answer; it is tried again");
             }
-            again = true;
+            batch.again = true;
             let limit = match self.shared.closing.is_cancelled() {
                 true => CLOSING_LIMIT.min(self.shared.retry_for),
                 false => self.shared.retry_for,
             };
-            let (late, rest) = (batch.into_iter()).partition(|it| it.since.elapsed() >= limit);
-            batch = rest;
-            let late: Vec<Pending<W>> = late;
-            for pending in late {
-                let _ = pending.reply.send(Err(failed.clone()));
+            batch.fail_late(limit, &failed);
+            if batch.pieces.is_empty() {
+                continue;
+            }
+            let half = batch.pieces.len().div_ceil(2);
+            match batch.unanswered {
+                0..ATTEMPTS_TOGETHER => batches.push_back(batch),
+                _ => batches.extend(batch.split(half)),
             }
             sleep(pause).await;
             pause = LONGEST_PAUSE.min(pause * 2);
@@ -209,18 +212,69 @@ impl Writer {
     }
 
     /// Tries once. After an error the connection is gone.
-    async fn attempt<W: Work>(&mut self, work: &[Arc<W>], again: bool) -> sqlx::Result<Answers<W>> {
+    async fn attempt<W: Work>(&mut self, batch: &mut Batch<W>) -> sqlx::Result<Answers<W>> {
+        let work: Vec<_> = (batch.pieces.iter())
+            .map(|piece| Arc::clone(&piece.work))
+            .collect();
         let mut connection = match self.connection.take() {
             Some(connection) => connection,
             None => connect(&self.shared.options).await?,
         };
-        match timeout(COMMIT_LIMIT, W::commit(&mut connection, work, again)).await {
-            Ok(Ok(answers)) => {
+        let committing = W::commit(&mut connection, &work, batch.again);
+        let committed = timeout(COMMIT_LIMIT, committing).await;
+        match committed.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into())) {
+            Ok(answers) => {
                 self.connection = Some(connection);
                 Ok(answers)
             }
-            Ok(Err(error)) => Err(error),
-            Err(_) => Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into())),
+            Err(cause) => {
+                batch.unanswered += 1;
+                Err(cause)
+            }
         }
+    }
+}
+
+/// Work that is committed in one transaction.
+struct Batch<W: Work> {
+    pieces: Vec<Pending<W>>,
+    /// Whether it may have been committed before.
+    again: bool,
+    /// How often it was sent to the database and not answered.
+    unanswered: u32,
+}
+
+impl<W: Work> Batch<W> {
+    fn new(pieces: Vec<Pending<W>>, again: bool) -> Self {
+        Self {
+            pieces,
+            again,
+            unanswered: 0,
+        }
+    }
+
+    /// Answers the senders, which may be gone.
+    fn answer(self, answers: Answers<W>) {
+        for (piece, answer) in self.pieces.into_iter().zip(answers) {
+            let _ = piece.reply.send(answer);
+        }
+    }
+
+    /// Answers and removes what has waited for too long.
+    fn fail_late(&mut self, limit: Duration, failed: &StoreError) {
+        let is_late = |piece: &mut Pending<W>| piece.since.elapsed() >= limit;
+        for piece in self.pieces.extract_if(.., is_late) {
+            let _ = piece.reply.send(Err(failed.clone()));
+        }
+    }
+
+    /// Batches of at most this size.
+    fn split(self, size: usize) -> impl Iterator<Item = Self> {
+        let (mut pieces, again) = (self.pieces, self.again);
+        std::iter::from_fn(move || {
+            let rest = pieces.split_off(size.min(pieces.len()));
+            let first = std::mem::replace(&mut pieces, rest);
+            (!first.is_empty()).then(|| Self::new(first, again))
+        })
     }
 }

@@ -8,7 +8,7 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
-use super::errors::explain;
+use super::errors::failure;
 use super::open::{self, OpenError, Opened};
 use super::rows::with_own_rows;
 use crate::store::StoreError;
@@ -185,8 +185,4 @@ fn journal_row(row: SqliteRow) -> JournalRow {
         position: row.get(1),
         entries: row.get(2),
     }
-}
-
-fn failure(error: sqlx::Error) -> StoreError {
-    StoreError::Failed(explain(&error))
 }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::store::StoreError;
+
 /// The file of the database in a data directory. Beside it lie files whose names begin with it.
 pub const FILE: &str = "games.sqlite3";
 /// How long to wait for a database that another program has locked.
@@ -26,6 +28,11 @@ fn primary_code(error: &sqlx::Error) -> Option<i32> {
 /// Whether an error has this primary result code.
 pub(super) fn has_code(error: &sqlx::Error, code: i32) -> bool {
     primary_code(error) == Some(code)
+}
+
+/// The error of the store for an error of the database.
+pub(super) fn failure(error: sqlx::Error) -> StoreError {
+    StoreError::Failed(explain(&error))
 }
 
 /// Explains an error, with advice.

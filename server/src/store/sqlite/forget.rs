@@ -373,9 +373,10 @@ async fn forget_tournament(
         let mut changed = false;
         for entry in &mut entries {
             match entry {
-                TournamentEntry::Change(TournamentChange::Joined(entrant))
-                    if entrant.built_in.is_none() && entrant.name == who.name =>
-                {
+                TournamentEntry::Change(
+                    TournamentChange::Joined(entrant)
+                    | TournamentChange::Replaced { by: entrant, .. },
+                ) if entrant.built_in.is_none() && entrant.name == who.name => {
                     entrant.name.clone_from(&who.pseudonym);
                     changed = true;
                 }

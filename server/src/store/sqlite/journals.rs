@@ -8,11 +8,11 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
-use tracing::error;
 
 use super::rows;
 use super::writer::{Pending, Row, WriteCommand};
 use crate::store::codec::Codec;
+use crate::store::ephemeral::StoreWhole;
 use crate::store::form;
 use crate::store::{Journal, Signed, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -89,7 +89,7 @@ impl DurableJournal {
             game: self.number,
             position: self.position,
             previous: self.last_row,
-            entries: encode(entries),
+            entries: form::entries_to_bytes(entries),
         };
         self.position += 1;
         self.last_row = Some(number);
@@ -138,94 +138,32 @@ impl Journal for DurableJournal {
     }
 }
 
-/// The journal of a game that is stored when it ends. Until then its entries are in memory,
-/// encoded, which takes a small part of the space.
-pub(super) struct EphemeralJournal {
-    number: i64,
-    header: Arc<GameHeader>,
-    encoded: Vec<u8>,
-    queue: WriteQueue,
+/// Where a game is stored when it ends.
+pub(super) struct Whole {
+    pub(super) number: i64,
+    pub(super) queue: WriteQueue,
 }
 
-impl EphemeralJournal {
-    /// A journal that begins with these entries.
-    pub(super) fn new(
-        number: i64,
-        header: Arc<GameHeader>,
-        mut entries: Vec<Entry>,
-        queue: WriteQueue,
-    ) -> Self {
-        Self {
-            number,
-            header,
-            encoded: encode(&mut entries),
-            queue,
-        }
-    }
-}
-
-impl Journal for EphemeralJournal {
-    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
-        put_all(entries, &mut self.encoded);
-        true
-    }
-
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.append_now(entries);
-        ready(Ok(())).boxed()
-    }
-
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        let mut entries = Vec::new();
-        let read = form::read_entries(&self.encoded, &mut entries);
-        let failed = |problem: form::Unreadable| StoreError::Failed(problem.to_string());
-        ready(read.map(|()| entries).map_err(failed)).boxed()
-    }
-
-    fn finish(
-        &mut self,
+impl StoreWhole for Whole {
+    fn store_whole<'a>(
+        &'a self,
+        header: &'a GameHeader,
+        entries: Vec<u8>,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        signature: Option<Vec<u8>>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
         let Some(summary) = summary else {
             return ready(Ok(())).boxed();
         };
-        let entries = std::mem::take(&mut self.encoded);
-        async move {
-            let game_id = self.header.game_id;
-            let game = WriteCommand::Whole {
-                number: self.number,
-                game_id,
-                header: form::header_to_bytes(&self.header),
-                row: self.queue.new_row(),
-                entries,
-                summary,
-                signature: signed.as_ref().map(form::signed_to_bytes),
-            };
-            match self.queue.send(game).await {
-                // The game was played anyway; the record that was stored first stays.
-                Err(StoreError::Taken(_)) => {
-                    error!(game = %game_id, "another record has the id of this game; the game is not stored");
-                    Ok(())
-                }
-                stored => stored,
-            }
-        }
-        .boxed()
-    }
-}
-
-fn encode(entries: &mut Vec<Entry>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(entries.len() * 32);
-    put_all(entries, &mut bytes);
-    bytes
-}
-
-fn put_all(entries: &mut Vec<Entry>, bytes: &mut Vec<u8>) {
-    for entry in entries.drain(..) {
-        form::put_entry(&entry, bytes);
+        let game = WriteCommand::Whole {
+            number: self.number,
+            game_id: header.game_id,
+            header: form::header_to_bytes(header),
+            row: self.queue.new_row(),
+            entries,
+            summary,
+            signature,
+        };
+        self.queue.send(game).boxed()
     }
 }

@@ -32,6 +32,7 @@ pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::{LOCK_FILE, OpenError};
 
 use super::codec::Codec;
+use super::ephemeral::EphemeralJournal;
 use super::form;
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{DiskUsage, Journal, Part, ResumableGame, Store, StoreError, StoredGame};
@@ -41,7 +42,7 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use errors::explain;
-use journals::{DurableJournal, EphemeralJournal, WriteQueue};
+use journals::{DurableJournal, Whole, WriteQueue};
 use reader::Reader;
 use writer::WriteCommand;
 
@@ -145,7 +146,9 @@ impl Store for SqliteStore {
         let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
         let codec = self.codec.clone();
         if header.policy.durability == Durability::Ephemeral {
-            let journal = EphemeralJournal::new(number, header, entries, commands);
+            let queue = commands;
+            let first = form::entries_to_bytes(&mut entries);
+            let journal = EphemeralJournal::new(header, first, Whole { number, queue });
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
         }
         async move {

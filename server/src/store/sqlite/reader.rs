@@ -7,19 +7,18 @@ use chefshat_proto::v1;
 use futures::TryStreamExt as _;
 use prost::Message as _;
 use sqlx::Row as _;
-use sqlx::sqlite::{SqlitePool, SqliteRow};
+use sqlx::sqlite::SqlitePool;
 use tracing::error;
 
-use super::errors::explain;
+use super::errors::failure;
 use super::journals::{DurableJournal, WriteQueue};
 use super::rows::{self, Read};
 use crate::store::Keep;
 use crate::store::codec::Codec;
-use crate::store::form::{self, FORM, Unreadable};
-use crate::store::tournaments::{StoredTournament, TournamentEntry};
+use crate::store::form::{self, Unreadable, check_form, stored_header};
+use crate::store::tournaments::StoredTournament;
 use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::GameHeader;
 
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
 /// older ones.
@@ -76,7 +75,7 @@ impl Reader {
         for row in games {
             let number: i64 = row.get(0);
             let concluded = row.get::<i64, _>(3) != 0;
-            let header = check_form(row.get(1)).and_then(|()| header_of(&row));
+            let header = check_form(row.get(1)).and_then(|()| stored_header(row.get(2)));
             let read = match concluded {
                 true => self.journal(number, row.get(4)).await?,
                 false => running_journals
@@ -129,7 +128,7 @@ impl Reader {
             let lines = decoding.await?.map_err(unreadable)?;
             return Ok(Some(StoredGame::Imported(lines.into())));
         }
-        let header = header_of(&row).map_err(unreadable)?;
+        let header = stored_header(row.get(2)).map_err(unreadable)?;
         let journal = self.journal(row.get(0), row.get(4)).await?;
         let journal = journal.map_err(unreadable)?;
         let signature: Option<&[u8]> = row.get(5);
@@ -169,23 +168,8 @@ impl Reader {
             .fetch_all(&self.pool)
             .await
             .map_err(failure)?;
-            let header = check_form(row.get(1)).and_then(|()| {
-                let header: Vec<u8> = row.get(2);
-                form::tournament_from_bytes(&header)
-            });
-            let mut entries: Result<Vec<TournamentEntry>, Unreadable> = Ok(Vec::new());
-            for part in &parts {
-                entries = entries.and_then(|mut all| {
-                    all.extend(form::tournament_entries_from_bytes(part)?);
-                    Ok(all)
-                });
-            }
-            match header.and_then(|header| Ok((header, entries?))) {
-                Ok((header, entries)) => stored.push(StoredTournament {
-                    header,
-                    entries,
-                    rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),
-                }),
+            match form::stored_tournament(row.get(1), row.get(2), &parts) {
+                Ok(tournament) => stored.push(tournament),
                 Err(problem) => {
                     error!(number, %problem, "a tournament cannot be read; it is left unchanged");
                 }
@@ -308,24 +292,5 @@ impl Reader {
         .map_err(failure)?;
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
-    }
-}
-
-/// The header in the third column.
-fn header_of(row: &SqliteRow) -> Result<GameHeader, Unreadable> {
-    let bytes: Option<&[u8]> = row.get(2);
-    form::header_from_bytes(bytes.ok_or_else(|| Unreadable("its header is missing".into()))?)
-}
-
-fn failure(error: sqlx::Error) -> StoreError {
-    StoreError::Failed(explain(&error))
-}
-
-fn check_form(form: i64) -> Result<(), Unreadable> {
-    if form == FORM {
-        Ok(())
-    } else {
-        let problem = format!("it has encoding {form}; this version reads encoding {FORM}");
-        Err(Unreadable(problem))
     }
 }

@@ -42,6 +42,8 @@ fn header(game: u8, durability: Durability) -> GameHeader {
             bank: Duration::from_millis(1_234),
             pace: Some(Duration::ZERO),
             clocks: Vec::new(),
+            // Games of earlier servers have none.
+            absence_time: None,
             ..Policy::default()
         },
         fills: vec![
@@ -124,6 +126,8 @@ fn entries() -> Vec<Entry> {
         },
         Change::ServerRestarted,
         Change::Aborted(AbortReason::TooLong),
+        // Newer than the changes above.
+        Change::Retired(Seat::new(3)),
     ];
     (1..)
         .zip(changes)

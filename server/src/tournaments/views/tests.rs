@@ -6,7 +6,8 @@ use std::sync::Mutex;
 use chefshat_agents::AgentKind;
 use chefshat_engine::MAX_SEATS;
 use chefshat_tournament::{
-    Change, Ended, Entrant, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, ParticipantKind, SeatStatistics,
+    Change, Ended, Entrant, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, MAX_REPLACEMENTS,
+    ParticipantKind, SeatStatistics,
 };
 use prost::Message as _;
 use tokio::sync::{mpsc, watch};
@@ -258,6 +259,19 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         };
     }
     assert_eq!(results.standings.len(), MAX_PARTICIPANTS);
+    let replaced = |mut tournament: v1::Tournament| {
+        for participant in &mut tournament.participants {
+            let former = v1::FormerParticipant {
+                name: participant.name.clone(),
+                kind: participant.kind,
+                built_in_agent: participant.built_in_agent.clone(),
+                games: u32::MAX,
+            };
+            participant.former = vec![former; MAX_REPLACEMENTS];
+        }
+        tournament
+    };
+    results.tournament = results.tournament.map(replaced);
     // Once a game has counted, there is one for each two neighbours.
     let pair = v1::OrderConfidence {
         upper: u32::MAX,
@@ -283,6 +297,7 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         decision_time_us: u64::MAX,
         timed_decisions: u64::MAX,
         performance_score: 1.0,
+        left: true,
     };
     let game = v1::TournamentGame {
         game: u32::MAX,
@@ -298,11 +313,12 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         rated: true,
         shifts: u32::MAX,
         physical: true,
+        postponed: u32::MAX,
     };
     let follower_update = v1::FollowTournamentResponse {
         games: vec![game; MAX_GAMES_FOLLOWED],
         standings: results.standings,
-        ..handle.compute_update()
+        tournament: results.tournament,
     };
     let size = follower_update.encoded_len();
     assert!(size < DEFAULT_MESSAGE_LIMIT, "{size} bytes for a follower");

@@ -69,6 +69,7 @@ fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
 #[derive(Default)]
 struct Scan {
     waits: BTreeMap<usize, u64>,
+    full: bool,
 }
 
 impl Scan {
@@ -85,9 +86,13 @@ impl Scan {
         if state.is_round_over() {
             return Some(Change::Finished);
         }
-        if state.playing.len() >= settings.max_parallel {
-            self.waits.clear();
+        let was_full = self.full;
+        self.full = state.paused || state.playing.len() >= settings.max_parallel;
+        if self.full {
             return None;
+        }
+        if was_full {
+            (self.waits.values_mut()).for_each(|since| *since = (*since).max(now_ms));
         }
         for &(_, index) in &state.due {
             let game = &state.games[index];
@@ -95,8 +100,9 @@ impl Scan {
                 Readiness::Busy(_) | Readiness::NoTable => drop(self.waits.remove(&index)),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
-                    let since = *self.waits.entry(index).or_insert(now_ms);
-                    if now_ms - since < settings.no_show_ms {
+                    let patience = scheduler.patience(state, game, now_ms);
+                    let since = *self.waits.entry(index).or_insert(now_ms + patience);
+                    if now_ms.saturating_sub(since) < settings.no_show_ms {
                         continue;
                     }
                     let game = index;
@@ -111,19 +117,60 @@ impl Scan {
         None
     }
 
-    fn fold(&mut self, change: &Change) {
+    /// After the state has folded the change.
+    fn fold(&mut self, state: &TournamentState, change: &Change) {
         match change {
             Change::Called { game, .. }
             | Change::Rescheduled { game, .. }
+            | Change::Postponed { game, .. }
+            | Change::Recalled { game }
             | Change::Voided { game } => drop(self.waits.remove(game)),
+            Change::Withdrawn { participant, .. } | Change::Replaced { participant, .. } => {
+                (self.waits).retain(|&game, _| !state.games[game].seats.contains(participant));
+            }
             _ => {}
         }
+        // Something else than absence blocks these now.
+        self.waits.retain(|&game, _| {
+            let game = &state.games[game];
+            let has_table = !game.physical || state.has_free_table();
+            let may_play = |&who: &usize| state.forfeits(game, who) || state.has_capacity(who);
+            has_table && game.seats.iter().all(may_play)
+        });
     }
 
     fn wake_at(&self, state: &TournamentState) -> Option<u64> {
+        if self.full {
+            return None;
+        }
         let since = self.waits.values().min()?;
         Some(since + state.settings.no_show_ms)
     }
+}
+
+/// A change by hand, now and then.
+fn by_hand(tournament: &Tournament, chance: &mut Chance) -> Option<(&'static str, Change)> {
+    let who = chance.below(tournament.participants().len());
+    let game = chance.below(tournament.games().len());
+    let (what, change) = match chance.below(if tournament.is_paused() { 8 } else { 60 }) {
+        0 => (
+            "paused or resumed",
+            tournament.set_paused(!tournament.is_paused()).ok()?,
+        ),
+        1 => ("withdrawn", tournament.withdraw(who, false).ok()?),
+        2 | 3 => {
+            let by = Entrant {
+                built_in: (chance.below(3) == 0).then_some(AgentKind::Random.into()),
+                max_games: 1 + chance.below(2),
+                ..testing::entrant(&format!("other {}", chance.below(1 << 30)))
+            };
+            ("replaced", tournament.replace(who, by).ok())
+        }
+        4 => ("postponed", tournament.postpone(game, None).ok()),
+        5 | 6 => ("recalled", tournament.recall(game).ok()),
+        _ => return None,
+    };
+    Some((what, change?))
 }
 
 /// Plays a random tournament. Returns the number of changes requested, and how often each happened.
@@ -171,7 +218,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
             };
             *happened.entry(what).or_default() += 1;
             tournament.fold(&change);
-            scan.fold(&change);
+            scan.fold(&tournament.state, &change);
         }
         let wake_at = tournament.wake_at();
         assert_eq!(wake_at, scan.wake_at(&tournament.state), "seed {seed}");
@@ -186,6 +233,11 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
             } = &tournament;
             let is_there = |who: &usize| scheduler.is_present(state, *who);
             (scan.waits).retain(|&game, _| !state.games[game].seats.iter().all(is_there));
+        }
+        if let Some((what, change)) = by_hand(&tournament, &mut chance) {
+            *happened.entry(what).or_default() += 1;
+            tournament.fold(&change);
+            scan.fold(&tournament.state, &change);
         }
         let playing: Vec<usize> = tournament.playing().collect();
         for game in playing {
@@ -213,7 +265,18 @@ fn changes_equal_those_of_checking_every_game() {
             *happened.entry(what).or_default() += times;
         }
     }
-    for what in ["called", "forfeited", "at a table", "rescheduled", "voided"] {
+    for what in [
+        "called",
+        "forfeited",
+        "at a table",
+        "rescheduled",
+        "voided",
+        "paused or resumed",
+        "withdrawn",
+        "replaced",
+        "postponed",
+        "recalled",
+    ] {
         assert!(happened[what] > 50, "{happened:?}");
     }
 }

@@ -10,7 +10,7 @@ use chefshat_tournament::{
 };
 use proptest::prelude::*;
 
-use super::support::{played, settings};
+use super::support::{entrant, played, settings};
 
 /// The participants of a run and their behaviour.
 #[derive(Debug, Clone)]
@@ -19,6 +19,8 @@ struct Plan {
     entrants: Vec<Entrant>,
     /// Random choices, repeated cyclically.
     dice: Vec<u8>,
+    /// Maximum number of changes by hand.
+    by_hand: usize,
 }
 
 fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
@@ -51,11 +53,17 @@ fn plans() -> impl Strategy<Value = Plan> {
         1..=3u32,
         1..=5u32,
     );
-    let how = (1..=3u32, 1..=8usize, 0..=3usize, any::<[u8; 32]>());
+    let how = (
+        1..=3u32,
+        1..=8usize,
+        0..=3usize,
+        any::<[u8; 32]>(),
+        prop::sample::select(vec![0, 5, 50]),
+    );
     let dice = prop::collection::vec(any::<u8>(), 16..200);
     (what, how, entrants(), dice).prop_map(|(what, how, mut entrants, dice)| {
         let (format, mut deals, players, games_per_pairing, rounds) = what;
-        let (max_calls, max_parallel, physical_tables, draw_seed) = how;
+        let (max_calls, max_parallel, physical_tables, draw_seed, by_hand) = how;
         if physical_tables == 0 {
             entrants.iter_mut().for_each(|it| it.at_table = false);
         } else {
@@ -79,6 +87,7 @@ fn plans() -> impl Strategy<Value = Plan> {
             settings,
             entrants,
             dice,
+            by_hand,
         }
     })
 }
@@ -91,6 +100,9 @@ struct Run {
     dice: Vec<u8>,
     rolls: usize,
     now_ms: u64,
+    by_hand: usize,
+    /// By void game, how often it was called again.
+    revived: BTreeMap<usize, usize>,
 }
 
 impl Run {
@@ -121,7 +133,7 @@ impl Run {
         let mut sits = vec![0; self.tournament.participants().len()];
         for game in self.tournament.playing() {
             for &who in &games[game].seats {
-                sits[who] += usize::from(!games[game].forfeited.contains(&who));
+                sits[who] += usize::from(games[game].is_played_by(who));
             }
         }
         for (entrant, tables) in self.tournament.participants().iter().zip(sits) {
@@ -129,7 +141,9 @@ impl Run {
         }
         let at_tables = self.tournament.playing().filter(|game| {
             let mut seats = games[*game].seats.iter();
-            seats.any(|who| self.tournament.participants()[*who].at_table)
+            seats.any(|who| {
+                self.tournament.participants()[*who].at_table && games[*game].is_played_by(*who)
+            })
         });
         assert!(at_tables.count() <= self.tournament.settings().physical_tables);
         let parallel = self.tournament.playing().count();
@@ -149,6 +163,41 @@ impl Run {
         let is_present = self.die(3) > 0;
         self.present.insert(who, is_present);
         self.tournament.set_present(who, is_present);
+    }
+
+    /// A participant or the organiser changes something by hand, if it can.
+    fn change_by_hand(&mut self) {
+        let participants = self.tournament.participants().len();
+        let games = self.tournament.games().len();
+        let who = (usize::from(self.die(255)) * 7 + usize::from(self.die(255))) % participants;
+        let game = (usize::from(self.die(255)) * 7 + usize::from(self.die(255))) % games;
+        let (built_in, max_games) = (self.die(2) == 0, usize::from(self.die(3)) + 1);
+        let change = match self.die(10) {
+            0..3 => self.tournament.withdraw(who, built_in).ok().flatten(),
+            3..5 => {
+                let name = format!("other {}", self.rolls);
+                let by = Entrant {
+                    built_in: built_in.then_some(AgentKind::Random.into()),
+                    max_games,
+                    ..entrant(&name)
+                };
+                self.tournament.replace(who, by).ok()
+            }
+            5 => self.tournament.set_paused(true).ok().flatten(),
+            6 => self.tournament.set_paused(false).ok().flatten(),
+            7 => self.tournament.postpone(game, None).ok(),
+            8 => self.tournament.postpone(game, Some(who)).ok(),
+            _ => self.tournament.recall(game).ok(),
+        };
+        if let Some(change) = change {
+            self.by_hand += 1;
+            if let Change::Recalled { game } = &change
+                && self.tournament.games()[*game].is_over()
+            {
+                *self.revived.entry(*game).or_default() += 1;
+            }
+            self.fold(change);
+        }
     }
 
     /// A game ends, one way or another.
@@ -198,6 +247,7 @@ impl Run {
 }
 
 fn run(plan: Plan) -> Run {
+    let plan_by_hand = plan.by_hand;
     let mut run = Run {
         tournament: Tournament::new(plan.settings).unwrap(),
         changes: Vec::new(),
@@ -205,6 +255,8 @@ fn run(plan: Plan) -> Run {
         dice: plan.dice,
         rolls: 0,
         now_ms: 0,
+        by_hand: 0,
+        revived: BTreeMap::new(),
     };
     for (number, entrant) in plan.entrants.into_iter().enumerate() {
         let change = run.tournament.join(entrant).unwrap();
@@ -223,6 +275,8 @@ fn run(plan: Plan) -> Run {
     let players = run.tournament.settings().players;
     let most = 40 * (run.games_left() + 1) * (calls + players);
     for step in 0.. {
+        // Each change by hand may prolong a few games.
+        let most = most + 40 * run.by_hand * (calls + players);
         assert!(step < most, "no end after {step} steps");
         run.follow();
         if run.tournament.state() != State::Playing {
@@ -231,6 +285,11 @@ fn run(plan: Plan) -> Run {
         match run.die(16) {
             0 | 1 => run.wander(),
             2 if run.die(8) == 0 => run.restart(),
+            3 if run.by_hand < plan_by_hand => run.change_by_hand(),
+            _ if run.tournament.is_paused() && run.tournament.playing().next().is_none() => {
+                let resumed = run.tournament.set_paused(false).unwrap().unwrap();
+                run.fold(resumed);
+            }
             _ if run.tournament.playing().next().is_some() => run.end_one(),
             _ => match run.tournament.wake_at() {
                 Some(at_ms) => run.now_ms = run.now_ms.max(at_ms),
@@ -253,14 +312,24 @@ proptest! {
         prop_assert_eq!(tournament.games().len(), tournament.games_expected());
         prop_assert!(tournament.games().iter().all(|game| game.is_over()));
 
-        // Every game was counted or voided once.
+        // Every game was counted once, or voided once more than it was called again.
         let mut over = vec![0; tournament.games().len()];
         for change in &run.changes {
             if let Change::Counted { game, .. } | Change::Voided { game } = change {
                 over[*game] += 1;
             }
         }
-        prop_assert!(over.iter().all(|&times| times == 1));
+        for (game, times) in over.into_iter().enumerate() {
+            let revived = run.revived.get(&game).copied().unwrap_or(0);
+            prop_assert_eq!(times, 1 + revived, "game {}", game);
+        }
+        let mut counted = vec![0; tournament.games().len()];
+        for change in &run.changes {
+            if let Change::Counted { game, .. } = change {
+                counted[*game] += 1;
+            }
+        }
+        prop_assert!(counted.iter().all(|&times| times <= 1));
 
         // The standings agree with the games.
         let standings = tournament.standings();
@@ -271,6 +340,7 @@ proptest! {
         };
         prop_assert_eq!(places, expected);
         for line in &standings {
+            prop_assert!(line.forfeited <= line.games);
             let seats: Vec<_> = tournament
                 .games()
                 .iter()
@@ -312,6 +382,7 @@ fn it_resumes_after_any_interruption() {
                 })
                 .collect(),
             dice: vec![3, 9, 5],
+            by_hand: 0,
         };
         let whole = run(plan);
         let standings = whole.tournament.standings();

@@ -5,6 +5,7 @@
     reason = "a test fails by it, in its helpers as well"
 )]
 
+mod by_hand;
 mod calls;
 mod deals;
 mod entry;

@@ -345,6 +345,82 @@ class AsyncCalls(ABC):
         request = pb.CloseTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
         return (await awaited(self._tournaments.CloseTournament, request)).tournament
 
+    async def pause_tournament(self, tournament_id: str, owner_token: str) -> pb.Tournament:
+        """Pauses a tournament: no game is called until it is resumed. Games in progress continue."""
+        request = pb.PauseTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
+        return (await awaited(self._tournaments.PauseTournament, request)).tournament
+
+    async def resume_tournament(self, tournament_id: str, owner_token: str) -> pb.Tournament:
+        """Resumes a paused tournament."""
+        request = pb.ResumeTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
+        return (await awaited(self._tournaments.ResumeTournament, request)).tournament
+
+    async def withdraw_participant(
+        self, tournament_id: str, *, ticket: str = "", owner_token: str = "", participant: int = 0
+    ) -> pb.Tournament:
+        """Withdraws a participant: the one with `ticket`, or with `owner_token` the one with this number.
+
+        Before the start its place is free again. After that a substitute plays its games in progress, and it forfeits the others.
+        """
+        request = pb.WithdrawParticipantRequest(
+            tournament_id=tournament_id, ticket=ticket, owner_token=owner_token, participant=participant
+        )
+        return (await awaited(self._tournaments.WithdrawParticipant, request)).tournament
+
+    async def remove_participant(self, tournament_id: str, owner_token: str, participant: int) -> pb.Tournament:
+        """Removes a participant: it is withdrawn, and its ticket ends."""
+        request = pb.RemoveParticipantRequest(tournament_id=tournament_id, owner_token=owner_token, participant=participant)
+        return (await awaited(self._tournaments.RemoveParticipant, request)).tournament
+
+    async def replace_participant(
+        self,
+        tournament_id: str,
+        owner_token: str,
+        participant: int,
+        *,
+        built_in_agent: str = "",
+        name: str = "",
+        kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_UNSPECIFIED,
+        max_games: int = 1,
+        stateless: bool = False,
+    ) -> pb.ReplaceParticipantResponse:
+        """Gives the place of a participant, with its results, to a built-in agent or to somebody else.
+
+        Args:
+            tournament_id: a tournament that is not over.
+            owner_token: its creator's token.
+            participant: number of the participant.
+            built_in_agent: the agent that takes the place; empty: somebody else does.
+            name: display name of the new participant; a built-in agent needs none.
+            kind: kind of the new participant; by default that of the former one.
+            max_games: number of games that it can play at a time.
+            stateless: whether it remembers nothing between games.
+
+        Returns:
+            The tournament, and the ticket of somebody else, to be passed on.
+        """
+        request = pb.ReplaceParticipantRequest(
+            tournament_id=tournament_id,
+            owner_token=owner_token,
+            participant=participant,
+            built_in_agent=built_in_agent,
+            name=name,
+            kind=kind,
+            max_games=max_games,
+            stateless=stateless,
+        )
+        return await awaited(self._tournaments.ReplaceParticipant, request)
+
+    async def postpone_game(self, tournament_id: str, game: int, *, ticket: str = "", owner_token: str = "") -> pb.TournamentGame:
+        """Moves a game that is not in progress to the end of the queue, with a ticket of it or the owner token."""
+        request = pb.PostponeGameRequest(tournament_id=tournament_id, ticket=ticket, owner_token=owner_token, game=game)
+        return (await awaited(self._tournaments.PostponeGame, request)).game
+
+    async def call_game(self, tournament_id: str, owner_token: str, game: int) -> pb.TournamentGame:
+        """Calls a due or void game before all others, with as many calls as at first."""
+        request = pb.CallGameRequest(tournament_id=tournament_id, owner_token=owner_token, game=game)
+        return (await awaited(self._tournaments.CallGame, request)).game
+
     async def get_tournament(self, tournament_id: str) -> pb.Tournament:
         """Returns the public view of a tournament."""
         request = pb.GetTournamentRequest(tournament_id=tournament_id)

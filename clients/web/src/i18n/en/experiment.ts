@@ -9,7 +9,7 @@ export const experiment = {
   join: {
     title: "You are invited to a study",
     as: (name: string) => `You are taking part as ${name}.`,
-    atSeat: (seat: number) => `Your seat is number ${seat}.`,
+    atSeat: (seat: number) => `Your seat is number ${seat + 1}.`,
     consent: "Before you begin",
     fromHost: "This text comes from the person who invited you, not from the makers of this page.",
     agree: "I have read this and agree",

@@ -8,11 +8,25 @@ import { lobby } from "./lobby";
 import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
+import { rules } from "./rules";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
 
-export const en = { attend, common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };
+export const en = {
+  attend,
+  common,
+  experiment,
+  faults,
+  lobby,
+  organise,
+  people,
+  replay,
+  rules,
+  table,
+  tournaments,
+  tutorial,
+};
 
 /** The form of a language's texts. */
 export type Texts = typeof en;

@@ -15,6 +15,7 @@ export const lobby = {
     roomOf: (name: string) => `${name}’s table`,
     start: "Play now",
     again: "Play again",
+    againTogether: "Invite to a rematch",
     learn: "New here? Learn it in three minutes",
   },
   join: {
@@ -97,6 +98,11 @@ export const lobby = {
         one: "after one timeout",
         other: "after # timeouts in a row",
       })}, the game ends without a result.`,
+    awaySubstituted: (seconds: number, substitute: string) =>
+      `The game continues without you. After ${seconds} s at your next decision, the agent “${substitute}” plays for you.`,
+    awayGivenUp: (seconds: number) =>
+      `The game continues without you. After ${seconds} s at your next decision, it ends without a result.`,
+    awayAlone: "The game waits for you until the time for your decision runs out. Then it ends without a result.",
     back: "You can come back at any time: on this device, the lobby shows the way to your seat.",
     backUntilThen: "Until then you can come back: on this device, the lobby shows the way to your seat.",
     closeWaiting: "You created this room. If you close it, nobody can play in it.",
@@ -117,7 +123,7 @@ export const lobby = {
     real: "Real cards on a table",
     realHint:
       "Somebody attends to the table: a camera, a robot or a person at a screen reports what happens. The server deals nothing and checks the rules.",
-    nameOf: (seat: number) => `Name, seat ${seat}`,
+    nameOf: (seat: number) => `Name, seat ${seat + 1}`,
     nameMissing: "Enter the name of each player at the table.",
     realOpening: "With real cards, the holder of the Golden card opens.",
     players: "Players",
@@ -191,6 +197,9 @@ export const lobby = {
       invalidHint: "After this many, the default decision is taken; 0 for unlimited.",
       timeouts: "Timeouts",
       timeoutsHint: "After this many in a row, a substitute plays.",
+      absence: "Absence, seconds",
+      absenceHint:
+        "At each decision, the game waits this long for a seat that is not connected. Then a substitute plays until it returns.",
       substitute: "Substitute",
       abort: "The game is aborted when",
       aborts: { allLost: "all participants are gone", anyLost: "one participant is gone", never: "never" },

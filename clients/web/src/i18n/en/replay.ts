@@ -15,6 +15,7 @@ export const replay = {
   speed: "Speed",
   perspective: "Cards shown",
   allHands: "all hands",
+  noHands: "played cards (no hand is known)",
   as: (name: string) => `as ${name}`,
   asSpectator: "as a spectator",
   possible: "Possible actions",

@@ -10,7 +10,7 @@ export const experiment: Texts["experiment"] = {
   join: {
     title: "Ti invitiamo a partecipare a uno studio",
     as: (name) => `Partecipi come ${name}.`,
-    atSeat: (seat) => `Il tuo posto è il numero ${seat}.`,
+    atSeat: (seat) => `Il tuo posto è il numero ${seat + 1}.`,
     consent: "Prima di cominciare",
     fromHost: "Questo testo è di chi ti ha invitato, non di chi ha realizzato questa pagina.",
     agree: "Ho letto e acconsento",

@@ -9,6 +9,7 @@ import { lobby } from "./lobby";
 import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
+import { rules } from "./rules";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
@@ -22,6 +23,7 @@ export const it: Texts = {
   organise,
   people,
   replay,
+  rules,
   table,
   tournaments,
   tutorial,

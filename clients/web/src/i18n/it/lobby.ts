@@ -16,6 +16,7 @@ export const lobby: Texts["lobby"] = {
     roomOf: (name) => `Il tavolo di ${name}`,
     start: "Gioca subito",
     again: "Gioca ancora",
+    againTogether: "Invita alla rivincita",
     learn: "Prima volta? Impara in tre minuti",
   },
   join: {
@@ -98,6 +99,11 @@ export const lobby: Texts["lobby"] = {
         one: "dopo una decisione scaduta",
         other: "dopo # decisioni scadute di seguito",
       })} la partita finisce senza risultato.`,
+    awaySubstituted: (seconds, substitute) =>
+      `La partita continua. Alla tua prossima decisione, dopo ${seconds} s gioca per te l’agente «${substitute}».`,
+    awayGivenUp: (seconds) =>
+      `La partita continua. Alla tua prossima decisione, dopo ${seconds} s finisce senza risultato.`,
+    awayAlone: "La partita ti aspetta finché scade il tempo della tua decisione. Poi finisce senza risultato.",
     back: "Puoi tornare in qualsiasi momento: su questo dispositivo, la sala ti riporta al tuo posto.",
     backUntilThen: "Fino ad allora puoi tornare: su questo dispositivo, la sala ti riporta al tuo posto.",
     closeWaiting: "Hai creato tu questa stanza. Se la chiudi, nessuno potrà giocarci.",
@@ -118,7 +124,7 @@ export const lobby: Texts["lobby"] = {
     real: "Carte vere su un tavolo",
     realHint:
       "Qualcuno assiste al tavolo: una telecamera, un robot o una persona a uno schermo segnala che cosa succede. Il server non distribuisce carte e controlla le regole.",
-    nameOf: (seat) => `Nome, posto ${seat}`,
+    nameOf: (seat) => `Nome, posto ${seat + 1}`,
     nameMissing: "Scrivi il nome di ogni giocatore al tavolo.",
     realOpening: "Con carte vere apre chi ha la carta d’oro.",
     players: "Giocatori",
@@ -192,6 +198,9 @@ export const lobby: Texts["lobby"] = {
       invalidHint: "Dopo questo numero si prende la decisione predefinita; 0 per nessun limite.",
       timeouts: "Decisioni scadute",
       timeoutsHint: "Dopo questo numero di seguito gioca un sostituto.",
+      absence: "Assenza, secondi",
+      absenceHint:
+        "A ogni decisione la partita aspetta per questo tempo un posto non connesso. Poi gioca un sostituto finché torna.",
       substitute: "Sostituto",
       abort: "La partita è interrotta quando",
       aborts: {

@@ -17,6 +17,7 @@ export const replay: Texts["replay"] = {
   speed: "Velocità",
   perspective: "Carte visibili",
   allHands: "tutte le mani",
+  noHands: "carte giocate (nessuna mano è nota)",
   as: (name) => `come ${name}`,
   asSpectator: "come spettatore",
   possible: "Giocate possibili",

@@ -12,6 +12,7 @@ import type { GameEvent } from "../../gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate } from "../../gen/chefshat/v1/play_service_pb";
 import type { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { legalActions } from "./actions";
+import { type AwaitedSeat, awaitedSeat } from "./awaited";
 import { type Card, cardsFromCounts } from "./cards";
 import { applyEvent } from "./reduce";
 import type { Requirement } from "./requirement";
@@ -57,13 +58,15 @@ export interface LiveState {
   /** The seat; undefined before the first attachment. */
   readonly own: number | undefined;
   readonly decision: OpenDecision | undefined;
+  /** Whom of the others the game waits for. */
+  readonly awaited: AwaitedSeat | undefined;
   readonly attachment: Attachment;
   /** Whether a built-in agent plays for the seat. */
   readonly substituted: boolean;
 }
 
 export function startLive(table: TableState, own?: number): LiveState {
-  return { table, own, decision: undefined, attachment: { kind: "none" }, substituted: false };
+  return { table, own, decision: undefined, awaited: undefined, attachment: { kind: "none" }, substituted: false };
 }
 
 /** The state after an update; `nowMs` is the page's clock. */
@@ -74,13 +77,15 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
       const own = payload.value.seat;
       const table = { ...live.table, roomId: payload.value.roomId, gameId: payload.value.gameId };
       // The open decision may have been closed while the stream was down; if not, the server sends
-      // it again.
-      return { ...live, own, table, decision: undefined, attachment: { kind: "attached" } };
+      // it again, and whom it waits for.
+      return { ...live, own, table, decision: undefined, awaited: undefined, attachment: { kind: "attached" } };
     }
     case "events":
       return payload.value.events.reduce(withEvent, live);
     case "snapshot":
       return withSnapshot(live, applySnapshot(live.table, payload.value, live.own));
+    case "awaited":
+      return { ...live, awaited: awaitedSeat(payload.value, nowMs) };
     case "decision":
       return withDecision(live, payload.value, nowMs);
     case "result": {

@@ -120,18 +120,82 @@ export function toggle(
 function smallest(hand: readonly Card[], index: number, moves: readonly Move[]): Picked {
   const card = hand[index];
   if (!card || (card.kind === "joker" && !moves.some((move) => isExactly(move, [card])))) return new Set([index]);
-  const size = (needs: Needs) => (needs.quantity + needs.jokers) * 10 + needs.jokers;
   const [best] = moves
     .filter((move) => includes(move, [card]))
     .flatMap((move) => needsOf(move) ?? [])
-    .sort((left, right) => size(left) - size(right));
+    .sort(bySize);
   return best ? pickFor(hand, best, [index]) : new Set([index]);
 }
 
 /** Indices of the cards that a move takes. */
-export function picksOf(hand: readonly Card[], move: Move): Picked {
+export function picksOf(hand: readonly Card[], move: Move, goldenFirst = false): Picked {
   const needs = needsOf(move);
-  return needs ? pickFor(hand, needs, []) : new Set();
+  return needs ? inOrder(hand, pickFor(hand, needs, []), goldenFirst) : new Set();
+}
+
+/**
+ * The picked cards after the key of a face, or of the jokers alone (undefined): its smallest legal
+ * move; pressed again, one more card of the face, and after the last one the smallest move again.
+ * Undefined if no legal move has such cards.
+ */
+export function pressFace(
+  hand: readonly Card[],
+  picked: Picked,
+  face: number | undefined,
+  moves: readonly Move[],
+  goldenFirst = false,
+): Picked | undefined {
+  const { face: before, quantity, jokers } = partsOf(cardsAt(hand, picked));
+  const options = moves.flatMap((move) => needsOf(move) ?? []).filter((needs) => needs.face === face);
+  const more = options
+    .filter((needs) => before === face && needs.quantity > quantity && needs.jokers === jokers)
+    .sort((left, right) => left.quantity - right.quantity);
+  const needs = (quantity > 0 ? more[0] : undefined) ?? options.sort(bySize)[0];
+  return needs && inOrder(hand, pickFor(hand, needs, []), goldenFirst);
+}
+
+/**
+ * The picked cards after the key that adds a joker to them, or takes the jokers away after the last
+ * one; a joker alone if nothing is picked. Undefined if no legal move is made that way.
+ */
+export function pressJoker(
+  hand: readonly Card[],
+  picked: Picked,
+  moves: readonly Move[],
+  goldenFirst = false,
+): Picked | undefined {
+  const { face, quantity, jokers } = partsOf(cardsAt(hand, picked));
+  if (quantity === 0) return pressFace(hand, picked, undefined, moves);
+  const options = moves
+    .flatMap((move) => needsOf(move) ?? [])
+    .filter((needs) => needs.face === face && needs.quantity === quantity)
+    .sort(bySize);
+  const needs = options.find((other) => other.jokers > jokers) ?? options[0];
+  if (!needs || needs.jokers === jokers) return undefined;
+  return inOrder(hand, pickFor(hand, needs, []), goldenFirst);
+}
+
+/** Every play that a hand holds the cards of. */
+export function heldPlays(hand: readonly Card[]): Move[] {
+  const jokers = countOf(hand, undefined);
+  const faces = [...new Set(hand.flatMap((card) => faceOf(card) ?? []))];
+  const plays = faces.flatMap((face) =>
+    Array.from({ length: countOf(hand, face) }, (_, less) =>
+      Array.from({ length: jokers + 1 }, (_, j): Move => ({ kind: "play", face, quantity: less + 1, jokers: j })),
+    ).flat(),
+  );
+  return jokers > 0 ? [...plays, { kind: "loneJoker" }] : plays;
+}
+
+/** The face, the number of its cards and the jokers among picked cards. */
+function partsOf(cards: readonly Card[]): Needs {
+  const jokers = countOf(cards, undefined);
+  return { face: cards.map(faceOf).find((face) => face !== undefined), quantity: cards.length - jokers, jokers };
+}
+
+/** Fewer cards first, then fewer jokers. */
+function bySize(left: Needs, right: Needs): number {
+  return left.quantity + left.jokers - right.quantity - right.jokers || left.jokers - right.jokers;
 }
 
 function pickFor(hand: readonly Card[], needs: Needs, first: readonly number[]): Picked {

@@ -9,13 +9,14 @@ import { decimal, t } from "../../i18n";
 import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
 import type { GivenHint } from "../acting";
-import { actionOf, type Move, moveOf } from "../model/actions";
+import { type Move, moveOf } from "../model/actions";
 import type { OpenDecision } from "../model/live";
-import { missing, type Picked } from "../model/picking";
+import { missing } from "../model/picking";
 import { isOpening } from "../model/requirement";
 import type { TableState } from "../model/state";
 import { cardWord, moveWords } from "../words";
 import css from "./ActionBar.module.css";
+import type { Deciding } from "./deciding";
 import { giftWords } from "./Now";
 
 /** Actions that a hint names. */
@@ -25,29 +26,27 @@ interface ActionBarProps {
   table: TableState;
   own: number | undefined;
   decision: OpenDecision | undefined;
-  moves: readonly Move[];
-  picked: Picked;
-  /** The legal move formed by the picked cards. */
-  move: Move | undefined;
+  /** The picks, and what can be done with them. */
+  deciding: Deciding;
   /** An answer is being sent. */
   sending: boolean;
   /** A reason or error shown in place of the hint. */
   remark: string;
   /** Whether a lesson allows less than the rules do. */
   taught: boolean;
+  /** Whether the page is about to pass by itself. */
+  autoPassing: boolean;
   /** Milliseconds of a full decision; 0 for no clock. */
   wholeMs: number;
   /** The hint for this decision, if the reader asked for one. */
   given?: GivenHint | undefined;
   onHint?: (() => void) | undefined;
-  onAnswer: (action: number) => void;
-  onPutBack: () => void;
 }
 
 export function ActionBar(props: ActionBarProps) {
-  const { table, decision, moves, move, remark, sending, given } = props;
+  const { table, decision, deciding, remark, sending, given } = props;
+  const { moves, move, answer, play, plan } = deciding;
   const words = t().table.actions;
-  const answer = (chosen: Move) => props.onAnswer(actionOf(chosen, table.faces));
   const kind = decision?.kind;
   const special = kind === DecisionKind.SPECIAL_ACTION;
   const mayPass = moves.some((legal) => legal.kind === "pass");
@@ -74,15 +73,24 @@ export function ActionBar(props: ActionBarProps) {
         {special ? (
           <SpecialActions special={decision?.special} busy={sending} onAnswer={answer} />
         ) : kind === DecisionKind.EXCHANGE ? (
-          <Act main ready={move !== undefined && !sending} onClick={() => move && answer(move)} id="give">
+          <Act main ready={move !== undefined && !sending} onClick={play} id="give">
             {move ? words.giveCard(giftWord(props, move)) : words.give}
           </Act>
-        ) : (
+        ) : deciding.planning && !plan ? (
           <>
-            <Act main ready={move !== undefined && !sending} onClick={() => move && answer(move)} id="play">
+            <Act ready={move !== undefined} onClick={play} id="plan-play">
+              {words.plan(move ? moveWords(move) : "")}
+            </Act>
+            <Act ready onClick={deciding.pass} id="plan-pass">
+              {words.planPass}
+            </Act>
+          </>
+        ) : deciding.planning ? null : (
+          <>
+            <Act main ready={move !== undefined && !sending} onClick={play} id="play">
               {move ? words.playCards(moveWords(move)) : words.play}
             </Act>
-            <Act ready={mayPass && !sending} onClick={() => answer({ kind: "pass" })} id="pass">
+            <Act ready={mayPass && !sending} onClick={deciding.pass} id="pass">
               {words.pass}
             </Act>
           </>
@@ -92,10 +100,16 @@ export function ActionBar(props: ActionBarProps) {
             {words.hint}
           </Act>
         )}
-        {props.picked.size > 0 && (
-          <Act ready quiet onClick={props.onPutBack} id="put-back">
-            {words.putBack}
+        {plan ? (
+          <Act ready quiet onClick={deciding.unplan} id="unplan">
+            {words.unplan}
           </Act>
+        ) : (
+          deciding.picked.size > 0 && (
+            <Act ready quiet onClick={deciding.putBack} id="put-back">
+              {words.putBack}
+            </Act>
+          )
         )}
       </div>
     </section>
@@ -121,15 +135,21 @@ function hintWords({ action, actions }: Hint, faces: number): string {
 }
 
 /** The card that will be given. */
-function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
-  const [index] = picked;
+function giftWord({ decision, deciding }: ActionBarProps, move: Move): string {
+  const [index] = deciding.picked;
   const card = index === undefined ? undefined : decision?.hand[index];
   return card ? cardWord(card) : moveWords(move);
 }
 
-function hint({ table, decision, moves, picked, move, sending, taught }: ActionBarProps): string {
+function hint({ table, decision, deciding, sending, taught, autoPassing }: ActionBarProps): string {
+  const { moves, picked, move, plan, planning, hand } = deciding;
   const words = t().table.actions;
   if (sending) return words.sending;
+  if (plan) return words.planned(moveWords(plan));
+  if (planning) {
+    const more = missing(hand, picked, moves);
+    return picked.size > 0 && more ? words.more(more) : words.planHint;
+  }
   if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
   if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
   if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, decision);
@@ -139,7 +159,7 @@ function hint({ table, decision, moves, picked, move, sending, taught }: ActionB
     const more = missing(decision.hand, picked, moves);
     return more === undefined || more === 0 ? words.pick : words.more(more);
   }
-  if (moves.every((legal) => legal.kind === "pass")) return words.onlyPass;
+  if (moves.every((legal) => legal.kind === "pass")) return autoPassing ? words.autoPassing : words.onlyPass;
   if (!mayPass && decision.requirement && isOpening(decision.requirement)) return words.noPass;
   if (!mayPass) return table.board.length === 0 && !taught ? words.mustPlay : words.pickMust;
   return words.pick;

@@ -7,6 +7,7 @@ import { useState } from "preact/hooks";
 import { t } from "../../i18n";
 import { announce } from "../../parts/Announcer";
 import { Card } from "../../parts/Card";
+import { keyOf } from "../keys";
 import { type Card as CardValue, countOf, faceOf, stacks } from "../model/cards";
 import type { Picked } from "../model/picking";
 import { cardWord } from "../words";
@@ -30,6 +31,8 @@ interface HandProps {
   /** A card was refused for a reason to be shown. */
   onRefused: (reason: string) => void;
   label: string;
+  /** Whether cards have keys: those that are not the number on the card are shown. */
+  keys?: boolean;
   /** Shown in place of cards if there are none. */
   empty: string;
 }
@@ -121,12 +124,13 @@ export function Hand(props: HandProps) {
       onKeyDown={onKeyDown}
     >
       <p id="hand-help" class="visually-hidden">
-        {t().table.hand.help}
+        {t().table.hand.help} {props.keys && t().table.hand.keysHelp}
       </p>
       {cards.length === 0 && <p class="soft">{props.empty}</p>}
       {runs.map((stack) => {
         const face = stack[0] && faceOf(stack[0]);
         const fresh = countOf(received, face);
+        const key = props.keys ? keyOf(face) : undefined;
         return (
           <div class={css.stack} data-part="hand-stack" key={face ?? "J"}>
             {stack.map((card, inStack) => {
@@ -146,6 +150,7 @@ export function Hand(props: HandProps) {
                   tabIndex={at === current ? 0 : -1}
                   onFocus={() => setFocus(at)}
                   onClick={() => choose(at)}
+                  aria-keyshortcuts={key}
                   data-card={card.kind === "joker" ? "J" : card.face}
                 >
                   <Card card={card} />
@@ -158,6 +163,7 @@ export function Hand(props: HandProps) {
                 </button>
               );
             })}
+            {key !== undefined && key !== String(face) && <kbd class={css.key}>{key}</kbd>}
             {stack.length > 1 && (
               <span class={`${css.count} number`} aria-hidden="true">
                 ×{stack.length}

@@ -5,10 +5,12 @@ import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
+import type { AwaitedSeat } from "../model/awaited";
 import type { OpenDecision } from "../model/live";
 import { isOpening, publicRequirement, type Requirement } from "../model/requirement";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
+import { AwaitedLine } from "./AwaitedLine";
 import css from "./Now.module.css";
 
 interface NowProps {
@@ -17,6 +19,8 @@ interface NowProps {
   own: number | undefined;
   /** The reader's own open decision. */
   decision: Pick<OpenDecision, "kind" | "requirement" | "gift" | "special"> | undefined;
+  /** Whom of the others the game waits for, if the server has said so. */
+  awaited?: AwaitedSeat | undefined;
   /** The seat whose decision is open, if the reader may know. */
   next: number | undefined;
   /** The kind of that decision; undefined for a turn. */
@@ -25,6 +29,8 @@ interface NowProps {
   mayPass?: boolean;
   /** Whether the reader's real cards are not known to the server yet. */
   handAwaited?: boolean;
+  /** Explains what the reader can do. */
+  onHelp?: (() => void) | undefined;
 }
 
 export function Now(props: NowProps) {
@@ -39,6 +45,19 @@ export function Now(props: NowProps) {
         {next !== undefined && next !== own && <SeatNumber seat={next} />}
         {nowHeading(props)}
       </h2>
+      {props.onHelp && (
+        <button
+          type="button"
+          class={css.help}
+          data-part="help"
+          aria-label={t().rules.help.title}
+          title={t().rules.help.title}
+          onClick={props.onHelp}
+        >
+          ?
+        </button>
+      )}
+      {props.awaited && !decision && !isOver(table) && <AwaitedLine table={table} awaited={props.awaited} />}
       {turn && (
         <Demands requirement={decision?.requirement ?? publicRequirement(table)} mayPass={props.mayPass ?? false} />
       )}
@@ -49,6 +68,10 @@ export function Now(props: NowProps) {
       {!turn && next === undefined && <OwnState table={table} own={own} />}
     </section>
   );
+}
+
+function isOver({ phase }: TableState): boolean {
+  return phase === "gameOver" || phase === "aborted";
 }
 
 /** Who decides, in a few words. */
@@ -105,7 +128,7 @@ export function Demands({ requirement, mayPass }: { requirement: Requirement; ma
         <Tile sign="≤" number={highestFace} text={words.face} />
         <Tile sign="≥" number={fewestCards} text={words.cards(fewestCards)} />
       </div>
-      <p>{words.beat}</p>
+      <p>{words.beat(highestFace, fewestCards)}</p>
     </>
   );
 }

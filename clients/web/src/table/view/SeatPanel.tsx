@@ -8,7 +8,7 @@ import { Card } from "../../parts/Card";
 import { Drawing } from "../../parts/Drawing";
 import { KindBadge, kindWord } from "../../parts/KindBadge";
 import { SeatNumber } from "../../parts/SeatNumber";
-import { isLabel } from "../expressions";
+import { isLabel, phraseOf } from "../expressions";
 import { stacks } from "../model/cards";
 import { isTaken, type SeatState, type TableState } from "../model/state";
 import { cardWord, expressionWord, nameOf, playWords, presenceWords, roleWord } from "../words";
@@ -59,7 +59,8 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
           ? "passed"
           : "";
   const presence = presenceWords(seat);
-  const role = roleWord(seat.role);
+  // After the game its places stand there: the roles were those of the last Shift.
+  const role = table.standings.length > 0 ? "" : roleWord(seat.role);
   return (
     <article class={`${css.seat} ${css[state] ?? ""}`} data-part="seat" data-seat={seat.seat}>
       <SeatNumber seat={seat.seat} />
@@ -162,10 +163,10 @@ function Cards({ seat }: { seat: SeatState }) {
   );
 }
 
-/** An expression, shown for a few seconds. */
+/** An expression or a phrase, shown for a few seconds. */
 function Bubble({ label }: { label: string }) {
   return (
-    <p class={css.bubble} data-part="bubble">
+    <p class={`${css.bubble} ${phraseOf(label) ? css.phrase : ""}`} data-part="bubble">
       {isLabel(label) && <Face label={label} />}
       <span>{expressionWord(label)}</span>
     </p>

@@ -3,28 +3,32 @@
 // reports actions.
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
+import { hidden } from "../../experiment/hiding";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import { clockOfPeople } from "../../lobby/rooms";
 import { Notice } from "../../parts/Notice";
-import type { GivenHint } from "../acting";
-import type { Label } from "../expressions";
-import { actionOf, moveOf } from "../model/actions";
-import type { Card } from "../model/cards";
+import { isOn } from "../../preferences";
+import type { Automatic, GivenHint } from "../acting";
+import type { Gesture } from "../expressions";
+import type { AwaitedSeat } from "../model/awaited";
 import type { OpenDecision } from "../model/live";
-import { canPick, legalMoves, type Picked, pickedMove, picksOf, reasonAgainst, toggle } from "../model/picking";
 import { awaitsHand, type TableState } from "../model/state";
-import { headingWords, nameOf, reasonWords, violationWords } from "../words";
+import { headingWords, nameOf, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
 import { Board } from "./Board";
+import { useDeciding } from "./deciding";
 import { Hand } from "./Hand";
+import { Help } from "./Help";
 import { useKeptFocus } from "./kept-focus";
 import { Log } from "./Log";
+import { Moment } from "./Moment";
 import { Now } from "./Now";
 import { Played } from "./Played";
 import { Result } from "./Result";
 import { SeatPanel } from "./SeatPanel";
+import { useShortcuts } from "./shortcuts";
 import css from "./TableView.module.css";
 import { Expressions, type ShownTurn, Tools } from "./Tools";
 
@@ -34,6 +38,8 @@ interface TableViewProps {
   own: number | undefined;
   /** The reader's open decision. */
   decision?: OpenDecision | undefined;
+  /** Whom of the others the game waits for. */
+  awaited?: AwaitedSeat | undefined;
   /** The seat whose decision is open, where the table cannot tell: in a replay. */
   next?: number | undefined;
   /** The kind of that decision. */
@@ -61,11 +67,15 @@ interface TableViewProps {
   hint?: GivenHint | undefined;
   /** Asks for a hint; undefined if the room gives none. */
   onHint?: (() => void) | undefined;
-  onAnswer?: (action: number) => void;
-  onExpress?: (label: Label) => void;
+  /** Whether a play can be chosen before the turn. */
+  plans?: boolean;
+  /** Whether the page is about to pass by itself. */
+  autoPassing?: boolean;
+  onAnswer?: (action: number, automatic?: Automatic) => void;
+  onExpress?: (gesture: Gesture) => void;
+  /** Whether there are quick phrases beside the expressions. */
+  phrases?: boolean;
 }
-
-const NOTHING: Picked = new Set();
 
 /** The heading wraps only between its parts, not before a number or dot. */
 const INSIDE = / (?=[\d·])/g;
@@ -73,56 +83,45 @@ const NO_BREAK = "\u00a0";
 
 export function TableView(props: TableViewProps) {
   const { table, own, decision, sending = false } = props;
-  // Picks belong to one decision: the next one starts without picks.
-  const [choice, setChoice] = useState<{ id: bigint | undefined; picked: Picked }>({ id: undefined, picked: NOTHING });
-  const picked = decision && choice.id === decision.id ? choice.picked : NOTHING;
-  const setPicked = (picked: Picked) => setChoice({ id: decision?.id, picked });
-  const [remark, setRemark] = useState("");
   const lastTurn = useRef<ShownTurn | undefined>(undefined);
-  useEffect(() => setRemark(""), [decision?.id]);
-  const given = decision && props.hint?.decision === decision.id ? props.hint : undefined;
-  // The suggested cards are picked, so that one click plays them.
-  useEffect(() => {
-    const suggested = given?.hint && moveOf(given.hint.action, table.faces);
-    if (decision && suggested) setPicked(picksOf(decision.hand, suggested));
-  }, [given?.hint]);
   if (decision?.requirement) lastTurn.current = { table, decision: { ...decision, requirement: decision.requirement } };
   const row = useRef<HTMLDivElement>(null);
   const keepFocus = useKeptFocus(row);
+  const given = decision && props.hint?.decision === decision.id ? props.hint : undefined;
+  const deciding = useDeciding({
+    table,
+    own,
+    decision,
+    sending,
+    given,
+    refusal: props.refusal,
+    plans: props.plans ?? false,
+    onAnswer: props.onAnswer,
+  });
+  const { hand, moves } = deciding;
+  const [helped, setHelped] = useState(false);
+  // A study that hides what is possible hides its explanation too.
+  const help = props.replayed || hidden.value.includes("lookup") ? undefined : () => setHelped(true);
+  useShortcuts((key) => {
+    if (key === "?") {
+      help?.();
+      return help !== undefined;
+    }
+    if (key === "e") {
+      const [first] = document.querySelectorAll<HTMLElement>('[data-part~="expressions"] button');
+      first?.focus();
+      return first !== undefined;
+    }
+    if (!deciding.press(key)) return false;
+    // Enter then plays, whatever had the focus before.
+    if (!row.current?.contains(document.activeElement)) row.current?.focus({ preventScroll: true });
+    return true;
+  });
 
   const mine = own === undefined ? undefined : table.seats[own];
-  // A given card has left the hand, although the table's hand keeps it until the exchange is
-  // complete.
-  const gave = useRef<{ of: unknown; hand: readonly Card[] } | undefined>(undefined);
-  const left = gave.current && gave.current.of === mine?.hand ? gave.current.hand : mine?.hand;
-  const hand = decision?.hand ?? left ?? [];
-  const moves = decision ? legalMoves(decision.legal, table.faces) : [];
-  const move = pickedMove(hand, picked, moves);
   const next = props.next ?? (decision ? own : table.next);
   const kind = decision?.kind ?? props.nextKind;
-
   const special = decision?.kind === DecisionKind.SPECIAL_ACTION;
-
-  const refusal = (index: number): string | undefined => {
-    const words = t().table.reasons;
-    if (!decision) return words.notYourTurn;
-    if (canPick(hand, index, moves)) return undefined;
-    if (special) return words.declareFirst;
-    if (props.refusal) return props.refusal;
-    if (decision.kind === DecisionKind.EXCHANGE) return words.gift;
-    return reasonWords(decision.requirement ? reasonAgainst(decision.requirement, hand, index) : { kind: "other" });
-  };
-  const putBack = () => {
-    setPicked(NOTHING);
-    setRemark("");
-  };
-  const answer = (action: number) => {
-    setRemark("");
-    if (decision?.kind === DecisionKind.EXCHANGE) {
-      gave.current = { of: mine?.hand, hand: hand.filter((_, index) => !picked.has(index)) };
-    }
-    props.onAnswer?.(action);
-  };
   // While a physical table is paused, the clock stands still.
   const wholeMs = props.untimed || table.paused || !table.policy ? 0 : clockOfPeople(table.policy).decisionTimeMs;
 
@@ -148,6 +147,7 @@ export function TableView(props: TableViewProps) {
         <Log table={table} />
         <div class={css.centre}>
           <Board table={table} />
+          <Moment table={table} />
           <Result table={table} own={own} links={!props.replayed} onward={props.onward} />
         </div>
         <div class={`${css.side} sheet`}>
@@ -155,10 +155,12 @@ export function TableView(props: TableViewProps) {
             table={table}
             own={own}
             decision={decision}
+            awaited={props.awaited}
             next={next}
             kind={kind}
             mayPass={moves.some((legal) => legal.kind === "pass")}
             handAwaited={handAwaited && table.phase === "dealt"}
+            onHelp={help}
           />
           <Played table={table} />
         </div>
@@ -181,7 +183,7 @@ export function TableView(props: TableViewProps) {
             cards={false}
           />
           {/* Before the hand, so that the buttons are one Tab after the cards. */}
-          {props.onExpress && <Expressions onExpress={props.onExpress} />}
+          {props.onExpress && <Expressions onExpress={props.onExpress} phrases={props.phrases ?? false} />}
           <div class={css.ownCards} data-part="own-cards">
             <Hand
               row={row}
@@ -193,21 +195,15 @@ export function TableView(props: TableViewProps) {
                     ? t().table.physical.handUnknown
                     : t().table.hand.empty
               }
-              picked={picked}
+              picked={deciding.picked}
               received={mine.received}
-              refusal={refusal}
+              refusal={deciding.refusal}
               label={handLabel}
-              onToggle={(index) => {
-                setRemark("");
-                setPicked(toggle(hand, picked, index, moves, decision?.requirement?.goldenCard));
-              }}
-              onPlay={() => {
-                if (!move || sending) return false;
-                answer(actionOf(move, table.faces));
-                return true;
-              }}
-              onPutBack={putBack}
-              onRefused={setRemark}
+              keys={props.onAnswer !== undefined && isOn("keys")}
+              onToggle={deciding.toggle}
+              onPlay={deciding.play}
+              onPutBack={() => deciding.press("Escape")}
+              onRefused={deciding.setRemark}
             />
           </div>
           {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
@@ -215,17 +211,14 @@ export function TableView(props: TableViewProps) {
               table={table}
               own={own}
               decision={decision}
-              moves={moves}
-              picked={picked}
-              move={move}
+              deciding={deciding}
               sending={sending}
-              remark={remark || props.trouble || ""}
+              remark={deciding.remark || props.trouble || ""}
               taught={props.refusal !== undefined}
+              autoPassing={props.autoPassing ?? false}
               given={given}
               onHint={props.onHint}
               wholeMs={wholeMs}
-              onAnswer={answer}
-              onPutBack={putBack}
             />
           )}
         </section>
@@ -233,6 +226,16 @@ export function TableView(props: TableViewProps) {
         <Seats table={table} own={own} next={next} kind={kind} lower />
       )}
       {props.children}
+      {helped && (
+        <Help
+          table={table}
+          own={own}
+          decision={decision}
+          next={next}
+          plays={props.onAnswer !== undefined}
+          onClose={() => setHelped(false)}
+        />
+      )}
     </div>
   );
 }

@@ -3,9 +3,10 @@
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { t } from "../../i18n";
+import { Button } from "../../parts/Button";
 import { Dialog } from "../../parts/Dialog";
 import { Icon } from "../../parts/Icon";
-import { LABELS, type Label } from "../expressions";
+import { type Gesture, gesture, LABELS, PHRASES, type Phrase, phraseGesture } from "../expressions";
 import type { OpenDecision } from "../model/live";
 import { lookupOf } from "../model/lookup";
 import type { Requirement } from "../model/requirement";
@@ -80,8 +81,15 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
   );
 }
 
-export function Expressions({ onExpress }: { onExpress: (label: Label) => void }) {
+interface ExpressionsProps {
+  onExpress: (gesture: Gesture) => void;
+  /** Whether there are quick phrases too. */
+  phrases: boolean;
+}
+
+export function Expressions({ onExpress, phrases }: ExpressionsProps) {
   const words = t().table.expressions;
+  const [talking, setTalking] = useState(false);
   return (
     <fieldset class={css.expressions} data-part="expressions" aria-label={words.label}>
       {LABELS.map((label) => (
@@ -92,11 +100,42 @@ export function Expressions({ onExpress }: { onExpress: (label: Label) => void }
           data-part="tool"
           aria-label={words.words[label]}
           title={words.words[label]}
-          onClick={() => onExpress(label)}
+          onClick={() => onExpress(gesture(label))}
         >
           <Face label={label} />
         </button>
       ))}
+      {phrases && (
+        <button
+          type="button"
+          class={css.tool}
+          data-part="tool"
+          aria-label={words.say}
+          title={words.say}
+          onClick={() => setTalking(true)}
+        >
+          <Icon>
+            <path d="M4 5h16v11H11l-4.500 4v-4H4ZM8 9h8M8 12h5" />
+          </Icon>
+        </button>
+      )}
+      {talking && (
+        <Dialog title={words.say} onClose={() => setTalking(false)}>
+          <div class={css.phrases} data-part="phrases">
+            {(Object.keys(PHRASES) as Phrase[]).map((phrase) => (
+              <Button
+                key={phrase}
+                onClick={() => {
+                  setTalking(false);
+                  onExpress(phraseGesture(phrase));
+                }}
+              >
+                {words.phrases[phrase]}
+              </Button>
+            ))}
+          </div>
+        </Dialog>
+      )}
     </fieldset>
   );
 }

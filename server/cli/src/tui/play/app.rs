@@ -6,6 +6,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
+use crate::narration::awaited::AwaitedSeat;
 use crate::narration::view::GameView;
 use crate::tui::log::Log;
 use crate::tui::screen::Key;
@@ -84,6 +85,8 @@ pub(super) struct App {
     pub(super) table: GameView,
     pub(super) me: Option<u32>,
     pub(super) open: Option<Open>,
+    /// Whom of the others the game waits for.
+    pub(super) awaited: Option<AwaitedSeat>,
     pub(super) dialog: Option<Dialog>,
     pub(super) link: Link,
     /// A notice for the person: why a key was refused, or a message of the server.
@@ -119,6 +122,7 @@ impl App {
             table,
             me,
             open: None,
+            awaited: None,
             dialog: None,
             link: Link::Connecting,
             notice: String::new(),
@@ -186,7 +190,9 @@ impl App {
                 self.link = Link::Live;
                 self.notice.clear();
                 self.open = None;
+                self.awaited = None;
             }
+            Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
             Update::Events(batch) => {
                 for event in &batch.events {
                     self.log.follow(&mut self.table, event);

@@ -164,6 +164,7 @@ fn expressions_and_resuming_have_keys() {
         kind: Some(Kind::Substituted(v1::Substituted {
             seat: 0,
             built_in_agent: "random".into(),
+            for_good: false,
         })),
         ..v1::GameEvent::default()
     };

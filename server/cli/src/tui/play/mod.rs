@@ -69,7 +69,7 @@ pub(crate) struct Play {
         conflicts_with = "ticket"
     )]
     name: String,
-    /// With --local: the built-in agents, in turn: random, random_unmasked, greedy, trained.
+    /// With --local: the built-in agents, in turn: random, greedy, trained.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent,
           default_values = ["trained", "greedy", "random"])]
     agents: Vec<NamedAgent>,

@@ -170,7 +170,10 @@ fn shown(open: &Open) -> Vec<Shown> {
 }
 
 fn draw_asked(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64, area: Rect) {
-    let mut first = vec![Span::styled(format!(" {}", asked(app)), theme.bold())];
+    let mut first = vec![Span::styled(
+        format!(" {}", asked(app, now_ms)),
+        theme.bold(),
+    )];
     if let (Some((time, bank)), Some(open)) = (app.clock(now_ms), &app.open) {
         let line: usize = first.iter().map(Span::width).sum();
         let clock = clock(open, time, bank);
@@ -198,7 +201,7 @@ fn draw_asked(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64, area:
 }
 
 /// The request to the person, or whose turn it is.
-fn asked(app: &App) -> String {
+fn asked(app: &App, now_ms: u64) -> String {
     if let Link::Lost(why) = &app.link {
         return format!("Connection lost, reconnecting: {why}");
     }
@@ -206,7 +209,7 @@ fn asked(app: &App) -> String {
         return "A substitute plays for you. Press r to take your seat back.".to_owned();
     }
     let Some(open) = &app.open else {
-        return waiting(app);
+        return waiting(app, now_ms);
     };
     let decision = &open.decision;
     if open.sent {
@@ -230,8 +233,12 @@ fn asked(app: &App) -> String {
 }
 
 /// What the game waits for.
-fn waiting(app: &App) -> String {
+fn waiting(app: &App, now_ms: u64) -> String {
     let table = &app.table;
+    let awaited = app.awaited.as_ref().filter(|_| table.end.is_none());
+    if let Some(words) = awaited.and_then(|awaited| awaited.words(table, now_ms)) {
+        return words;
+    }
     let first = table.turns == 0 && table.shift > 0;
     match table.turn {
         _ if table.end.is_some() => String::new(),

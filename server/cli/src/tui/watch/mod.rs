@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use chefshat_client::v1::{self, record_line};
-use chefshat_client::{Backoff, Client, Spectator};
+use chefshat_client::{Backoff, Client, Spectator, Watched};
 use chefshat_record::jsonl;
 use chefshat_record::replay::{ReplayError, replay};
 use clap::Args;
@@ -149,7 +149,10 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
             event = next(&mut following) => {
                 dirty = true;
                 match event {
-                    Some(Ok(event)) => reel.push(event),
+                    Some(Ok(Watched::Event(event))) => reel.push(*event),
+                    Some(Ok(Watched::Awaited(awaited))) => {
+                        reel.wait_for(&awaited, screen.now_ms());
+                    }
                     over => {
                         let why = over.and_then(Result::err);
                         reel.close(why.map(|error| error.message().to_owned()));
@@ -162,15 +165,15 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
     Ok(ExitCode::SUCCESS)
 }
 
-/// An event of a room, or why no more follow.
-type PartInput = Result<v1::GameEvent, chefshat_client::Error>;
+/// What is learnt of a room, or why no more follows.
+type PartInput = Result<Watched, chefshat_client::Error>;
 
 /// Follows the room in a separate task: keys and ticks would otherwise cancel its connection
 /// attempts.
 fn follow(mut spectator: Spectator) -> mpsc::Receiver<PartInput> {
     let (sender, heard) = mpsc::channel(EVENTS);
     tokio::spawn(async move {
-        while let Some(event) = spectator.next().await.transpose() {
+        while let Some(event) = spectator.next_watched().await.transpose() {
             let over = event.is_err();
             if sender.send(event).await.is_err() || over {
                 return;

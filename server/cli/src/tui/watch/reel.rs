@@ -4,6 +4,7 @@
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
 
+use crate::narration::awaited::AwaitedSeat;
 use crate::narration::view::GameView;
 use crate::tui::log::Log;
 use crate::tui::screen::Key;
@@ -28,6 +29,10 @@ pub(super) struct Reel {
     moved_ms: u64,
     /// More events may come.
     pub(super) live: bool,
+    /// Whom a live game waits for.
+    awaited: Option<AwaitedSeat>,
+    /// The same in words, as of the last tick.
+    pub(super) waiting: Option<String>,
     /// Why no more events come although the game has not ended.
     pub(super) lost: Option<String>,
     pub(super) hands: bool,
@@ -60,6 +65,8 @@ impl Reel {
             pace: STANDARD_PACE,
             moved_ms: 0,
             live,
+            awaited: None,
+            waiting: None,
             lost: None,
             hands: !live,
             help: false,
@@ -88,14 +95,34 @@ impl Reel {
         }
     }
 
+    /// Takes whom a live game waits for.
+    pub(super) fn wait_for(&mut self, awaited: &v1::Awaited, now_ms: u64) {
+        self.awaited = AwaitedSeat::new(awaited, now_ms);
+        self.count_waiting(now_ms);
+    }
+
+    /// Brings the words about waiting up to date; whether they changed.
+    fn count_waiting(&mut self, now_ms: u64) -> bool {
+        let newest = self.live && self.at == self.events.len();
+        let awaited = self.awaited.as_ref().filter(|_| newest);
+        let words = awaited.and_then(|awaited| awaited.words(&self.table, now_ms));
+        std::mem::replace(&mut self.waiting, words) != self.waiting
+    }
+
     /// Ends a live game; with the reason if it has not ended.
     pub(super) fn close(&mut self, why: Option<String>) {
         self.live = false;
+        self.waiting = None;
         self.lost = why;
     }
 
-    /// Advances if it is time; whether it did.
+    /// Advances if it is time; whether anything changed.
     pub(super) fn tick(&mut self, now_ms: u64) -> bool {
+        let advanced = self.advance(now_ms);
+        self.count_waiting(now_ms) || advanced
+    }
+
+    fn advance(&mut self, now_ms: u64) -> bool {
         let due = now_ms.saturating_sub(self.moved_ms) >= PACES_MS[self.pace];
         if !self.running || !due || self.at == self.events.len() {
             return false;

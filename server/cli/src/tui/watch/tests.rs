@@ -40,6 +40,24 @@ fn every_moment_is_the_same_forwards_and_back() {
 }
 
 #[test]
+fn a_live_game_shows_whom_it_waits_for() {
+    let mut reel = Reel::live(GameView::default());
+    let awaited = v1::Awaited {
+        seat: Some(1),
+        away: true,
+        waited_ms: 0,
+        left_ms: 12_000,
+    };
+    reel.wait_for(&awaited, 500);
+    assert!(screen(&reel).contains("Waiting for seat 2 (away): 12 s"));
+    assert!(!reel.tick(501), "the same second");
+    assert!(reel.tick(1_500));
+    assert!(screen(&reel).contains("Waiting for seat 2 (away): 11 s"));
+    reel.wait_for(&v1::Awaited::default(), 1_600);
+    assert!(!screen(&reel).contains("Waiting"));
+}
+
+#[test]
 fn the_reel_runs_stops_and_jumps() {
     let mut reel = reel();
     let deal = reel.at;

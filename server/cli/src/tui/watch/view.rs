@@ -116,6 +116,10 @@ fn draw_bar(frame: &mut Frame<'_>, theme: Theme, reel: &Reel, area: Rect) {
         frame.render_widget(Paragraph::new(words).style(theme.warning()), area);
         return;
     }
+    if let Some(waiting) = &reel.waiting {
+        frame.render_widget(Paragraph::new(format!(" {waiting}")), area);
+        return;
+    }
     let words = format!(" {}/{} · {}/s ", reel.at, reel.len(), reel.per_second());
     let room = usize::from(area.width).saturating_sub(words.chars().count() + 2);
     let filled = (room * reel.at).checked_div(reel.len()).unwrap_or(0);

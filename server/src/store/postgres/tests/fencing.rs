@@ -9,14 +9,14 @@ const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
 
 /// Two nodes on one database, whose first node has stopped to beat long ago when `stall` is called.
-struct Pair {
-    database: Database,
-    first: PostgresStore,
-    second: PostgresStore,
+pub(super) struct Pair {
+    pub(super) database: Database,
+    pub(super) first: PostgresStore,
+    pub(super) second: PostgresStore,
 }
 
 impl Pair {
-    async fn new() -> Self {
+    pub(super) async fn new() -> Self {
         let database = chefshat_postgres::database();
         let first = node(&database).await;
         stop_clock(&database);
@@ -31,13 +31,13 @@ impl Pair {
     }
 
     /// Lets the lease of the first node expire.
-    async fn stall(&self) {
+    pub(super) async fn stall(&self) {
         advance(&self.database, 8_000);
         let beat = self.second.beat().await.expect("it answers");
         assert!(beat.is_some(), "the second node is known");
     }
 
-    async fn close(self) {
+    pub(super) async fn close(self) {
         self.first.close().await;
         self.second.close().await;
     }
@@ -228,7 +228,7 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
     assert_eq!(games, [(false, vec![1, 0]), (true, vec![1])]);
     let appended = pair.second.append_tournament(unit, 1, begun());
     appended.await.expect("committed");
-    assert_eq!(pair.first.tournament_rows(unit).await, Ok(2));
+    assert_eq!(tournament_rows(&pair.first, 9).await, 2);
     let added = pair.second.create(room(6), vec![entry(1)]);
     added
         .await
@@ -260,11 +260,15 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     }
     assert_eq!(pair.first.locate(Id([7; 16])).await, Ok(None));
     assert_eq!(pair.first.locate_code("NOTHING").await, Ok(None));
+    let game = durable(1).game_id;
+    let by_game = pair.second.locate_game(game).await.expect("readable");
+    assert_eq!(by_game.expect("it runs").id, Id([1; 16]));
 
     let finished = journal.finish(Some(summary(1)), None);
     finished.await.expect("committed");
     let found = pair.second.locate_code("ROOM1").await.expect("readable");
     assert!(found.expect("known").over);
+    assert_eq!(pair.second.locate_game(game).await, Ok(None));
     let shown = pair.second.ended_room(Id([1; 16])).await.expect("readable");
     assert!(shown.expect("stored").concluded);
     // Another room may have the code from now on.
@@ -278,7 +282,7 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     assert_eq!(found.expect("known").id, Id([2; 16]));
     // In the end nothing is left of the first room but its record.
     advance(&pair.database, 600_001);
-    pair.first.orphans(9).await.expect("it answers");
+    pair.first.tidy().await.expect("it answers");
     assert_eq!(pair.first.locate(Id([1; 16])).await, Ok(None));
     assert!(matches!(pair.first.ended_room(Id([1; 16])).await, Ok(None)));
     assert_eq!(pair.first.finished_games().await, Ok(1));

@@ -1,7 +1,7 @@
 //! Random operations of several nodes do to the database exactly what they do to its
 //! specification, `chefshat_cluster::Tables`.
 
-use chefshat_cluster::{Created, Kept, LeaseTimes, Tables};
+use chefshat_cluster::{Created, LeaseTimes, Tables, Written};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -187,9 +187,13 @@ impl Worlds {
                 let Some((journal, epoch, position)) = server.journals.get_mut(&room) else {
                     return;
                 };
-                let kept = self.tables.append(id(room), *epoch, *position, number);
+                let written = self.tables.append(id(room), *epoch, *position, number);
                 let appended = append(journal, number).await;
-                assert_eq!(appended.is_ok(), kept == Kept::Kept, "{appended:?}");
+                assert_eq!(
+                    appended.is_ok(),
+                    written == Written::Committed,
+                    "{appended:?}"
+                );
                 match appended {
                     Ok(()) => *position += 1,
                     // Its owner stops.
@@ -201,9 +205,13 @@ impl Worlds {
                 let Some((journal, epoch, rows)) = server.journals.get_mut(&room) else {
                     return;
                 };
-                let kept = self.tables.finish(id(room), *epoch, *rows);
+                let written = self.tables.finish(id(room), *epoch, *rows);
                 let finished = journal.finish(Some(summary(room)), None).await;
-                assert_eq!(finished.is_ok(), kept == Kept::Kept, "{finished:?}");
+                assert_eq!(
+                    finished.is_ok(),
+                    written == Written::Committed,
+                    "{finished:?}"
+                );
             }
             Operation::Claim(node, unit, lag) => self.claim(node, unit, lag).await,
             Operation::Release(node, unit) => {

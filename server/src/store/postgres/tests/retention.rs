@@ -33,7 +33,7 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     // Also when the rooms have been removed.
     advance(&database, 600_001);
     first.beat().await.expect("it answers");
-    second.orphans(9).await.expect("it answers");
+    second.tidy().await.expect("it answers");
     assert_eq!(second.locate(Id([2; 16])).await, Ok(None));
     assert_eq!(prunable(&second).await, [2]);
     // Its owner does not read them all when it resumes it.
@@ -45,7 +45,7 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     let ended = first.append_tournament(Id([9; 16]), 1, end);
     ended.await.expect("committed");
     assert_eq!(prunable(&second).await, [1, 2]);
-    second.orphans(9).await.expect("it answers");
+    second.tidy().await.expect("it answers");
     assert_eq!(second.locate(Id([1; 16])).await, Ok(None));
     first.close().await;
     second.close().await;

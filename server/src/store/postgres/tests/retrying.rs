@@ -95,7 +95,7 @@ async fn what_an_earlier_attempt_still_commits_counts_as_done() {
     let appended = store.append_tournament(Id([9; 16]), 1, begun());
     let (appended, ()) = futures::join!(appended, overtake(&line, &mut holder));
     assert_eq!(appended, Ok(()));
-    assert_eq!(store.tournament_rows(Id([9; 16])).await, Ok(2));
+    assert_eq!(tournament_rows(&store, 9).await, 2);
     store.close().await;
 }
 
@@ -107,7 +107,7 @@ async fn connections_that_hang_do_not_keep_their_places() {
     let (mut holder, mut observer) = (connected(&database).await, connected(&database).await);
     run(&mut holder, "BEGIN").await;
     run(&mut holder, "LOCK nodes").await;
-    let beats: Vec<_> = (0..CONTROLLERS)
+    let beats: Vec<_> = (0..BEATERS)
         .map(|_| {
             let store = Arc::clone(&store);
             tokio::spawn(async move { store.beat().await })
@@ -117,7 +117,7 @@ async fn connections_that_hang_do_not_keep_their_places() {
                WHERE datname = current_database() AND wait_event = 'relation'";
     let mut wait = false;
     while !wait {
-        let all = sqlx::query_scalar(all).bind(i64::from(CONTROLLERS));
+        let all = sqlx::query_scalar(all).bind(i64::from(BEATERS));
         wait = all.fetch_one(&mut observer).await.expect("readable");
     }
     line.fail(Fault::Hang);
@@ -279,5 +279,40 @@ async fn what_stands_does_not_fail_with_what_is_refused_beside_it() {
     let (stands, refused) = created.await;
     assert_eq!(stands, Ok(()));
     assert!(matches!(refused, Err(StoreError::Failed(_))), "{refused:?}");
+    store.close().await;
+}
+
+#[tokio::test]
+async fn one_row_that_cannot_be_written_does_not_hold_up_others() {
+    const ROOMS: u8 = 8;
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    let mut journals = Vec::new();
+    for room in 1..=ROOMS {
+        let created = store.create(durable(room), vec![entry(1)]).await;
+        journals.push(created.expect("created"));
+    }
+    // As on a damaged page.
+    database.run(
+        "CREATE FUNCTION damaged() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             RAISE 'damaged' USING ERRCODE = 'XX001';
+         END $$;
+         CREATE TRIGGER damaged BEFORE INSERT ON journal FOR EACH ROW
+             WHEN (NEW.game = 5) EXECUTE FUNCTION damaged()",
+    );
+    let mut damaged = journals.remove(4);
+    // All of them wait for the two writers.
+    let mut late = pin!(append(&mut damaged, 2));
+    assert_eq!(late.as_mut().now_or_never(), None);
+    let others = journals.iter_mut().map(|journal| append(journal, 2));
+    let others = futures::future::join_all(others);
+    tokio::select! {
+        biased;
+        written = &mut late => panic!("{written:?}"),
+        others = others => assert!(others.iter().all(Result::is_ok), "{others:?}"),
+    }
+    database.run("DROP TRIGGER damaged ON journal");
+    assert_eq!(late.await, Ok(()));
     store.close().await;
 }

@@ -124,7 +124,7 @@ pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
         change(Change::Finished),
         change(Change::Closed),
         // Fields that are newer than the entries above.
-        change(Change::Joined(at_table)),
+        change(Change::Joined(at_table.clone())),
         change(Change::Counted {
             game: 2,
             result: GameResult {
@@ -132,6 +132,22 @@ pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
                 seats: vec![hinted],
             },
         }),
+        change(Change::Withdrawn {
+            participant: 2,
+            removed: true,
+        }),
+        change(Change::Replaced {
+            participant: 3,
+            by: at_table,
+        }),
+        change(Change::Paused),
+        change(Change::Resumed),
+        change(Change::Postponed { game: 4, by: None }),
+        change(Change::Postponed {
+            game: 5,
+            by: Some(0),
+        }),
+        change(Change::Recalled { game: 6 }),
     ]
 }
 

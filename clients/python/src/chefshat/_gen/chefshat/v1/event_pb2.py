@@ -28,15 +28,15 @@ from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb
 from chefshat._gen.chefshat.v1 import table_pb2 as chefshat_dot_v1_dot_table__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/event.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\x1a\x17\x63hefshat/v1/table.proto\"\xcb\t\n\tGameEvent\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12\x12\n\nelapsed_ms\x18\x02 \x01(\x04\x12(\n\x07rewards\x18\x03 \x03(\x0b\x32\x17.chefshat.v1.SeatReward\x12%\n\x06seated\x18\x04 \x01(\x0b\x32\x13.chefshat.v1.SeatedH\x00\x12\x31\n\x0c\x64isconnected\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.DisconnectedH\x00\x12)\n\x08returned\x18\x06 \x01(\x0b\x32\x15.chefshat.v1.ReturnedH\x00\x12/\n\x0bsubstituted\x18\x07 \x01(\x0b\x32\x18.chefshat.v1.SubstitutedH\x00\x12\x30\n\x0cgame_started\x18\x08 \x01(\x0b\x32\x18.chefshat.v1.GameStartedH\x00\x12\x32\n\rshift_started\x18\t \x01(\x0b\x32\x19.chefshat.v1.ShiftStartedH\x00\x12\x34\n\x0eroles_assigned\x18\n \x01(\x0b\x32\x1a.chefshat.v1.RolesAssignedH\x00\x12\x45\n\x17special_action_declared\x18\x0b \x01(\x0b\x32\".chefshat.v1.SpecialActionDeclaredH\x00\x12\x36\n\x0f\x63\x61rds_exchanged\x18\x0c \x01(\x0b\x32\x1b.chefshat.v1.CardsExchangedH\x00\x12!\n\x04play\x18\r \x01(\x0b\x32\x11.chefshat.v1.PlayH\x00\x12!\n\x04pass\x18\x0e \x01(\x0b\x32\x11.chefshat.v1.PassH\x00\x12,\n\npizza_done\x18\x0f \x01(\x0b\x32\x16.chefshat.v1.PizzaDoneH\x00\x12\x32\n\rseat_finished\x18\x10 \x01(\x0b\x32\x19.chefshat.v1.SeatFinishedH\x00\x12.\n\x0bshift_ended\x18\x11 \x01(\x0b\x32\x17.chefshat.v1.ShiftEndedH\x00\x12,\n\ngame_ended\x18\x12 \x01(\x0b\x32\x16.chefshat.v1.GameEndedH\x00\x12\x30\n\x0cgame_aborted\x18\x13 \x01(\x0b\x32\x18.chefshat.v1.GameAbortedH\x00\x12\x38\n\x10\x65xpression_shown\x18\x14 \x01(\x0b\x32\x1c.chefshat.v1.ExpressionShownH\x00\x12\'\n\x07vacated\x18\x15 \x01(\x0b\x32\x14.chefshat.v1.VacatedH\x00\x12\x38\n\x10server_restarted\x18\x16 \x01(\x0b\x32\x1c.chefshat.v1.ServerRestartedH\x00\x12\x32\n\rhand_reported\x18\x17 \x01(\x0b\x32\x19.chefshat.v1.HandReportedH\x00\x12+\n\tviolation\x18\x18 \x01(\x0b\x32\x16.chefshat.v1.ViolationH\x00\x12-\n\ncorrection\x18\x19 \x01(\x0b\x32\x17.chefshat.v1.CorrectionH\x00\x12\x30\n\x0ctable_paused\x18\x1a \x01(\x0b\x32\x18.chefshat.v1.TablePausedH\x00\x42\x06\n\x04kind\")\n\nSeatReward\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\r\n\x05value\x18\x02 \x01(\x02\"P\n\x06Seated\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0c\n\x04name\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\"\x17\n\x07Vacated\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x1c\n\x0c\x44isconnected\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x18\n\x08Returned\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x11\n\x0fServerRestarted\"3\n\x0bSubstituted\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x16\n\x0e\x62uilt_in_agent\x18\x02 \x01(\t\"\x88\x02\n\x0bGameStarted\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12#\n\x05rules\x18\x02 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x15\n\rrules_version\x18\x03 \x01(\r\x12\'\n\x06policy\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\x05 \x03(\x0b\x32\x18.chefshat.v1.Participant\x12.\n\x0c\x61\x63tion_space\x18\x06 \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12\x11\n\thand_size\x18\x07 \x01(\r\x12\x17\n\x0fseed_commitment\x18\x08 \x01(\x0c\"D\n\x0cShiftStarted\x12\r\n\x05shift\x18\x01 \x01(\r\x12%\n\x05hands\x18\x02 \x03(\x0b\x32\x16.chefshat.v1.SeatCards\"1\n\rRolesAssigned\x12 \n\x05roles\x18\x01 \x03(\x0e\x32\x11.chefshat.v1.Role\"\x98\x01\n\x15SpecialActionDeclared\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12*\n\x06\x61\x63tion\x18\x02 \x01(\x0e\x32\x1a.chefshat.v1.SpecialAction\x12+\n\x06source\x18\x03 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x04 \x01(\x04\"_\n\x0e\x43\x61rdsExchanged\x12\r\n\x05giver\x18\x01 \x01(\r\x12\x10\n\x08receiver\x18\x02 \x01(\r\x12\r\n\x05\x63ount\x18\x03 \x01(\r\x12\r\n\x05\x63\x61rds\x18\x04 \x03(\r\x12\x0e\n\x06golden\x18\x05 \x01(\x08\"\xaf\x01\n\x04Play\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0e\n\x06\x61\x63tion\x18\x02 \x01(\r\x12\x0c\n\x04\x66\x61\x63\x65\x18\x03 \x01(\r\x12\x10\n\x08quantity\x18\x04 \x01(\r\x12\x0e\n\x06jokers\x18\x05 \x01(\r\x12\x12\n\ncards_left\x18\x06 \x01(\r\x12+\n\x06source\x18\x07 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x08 \x01(\x04\"[\n\x04Pass\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12+\n\x06source\x18\x02 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x03 \x01(\x04\"[\n\tPizzaDone\x12\r\n\x05pizza\x18\x01 \x01(\r\x12\x19\n\x0clast_to_play\x18\x02 \x01(\rH\x00\x88\x01\x01\x12\x13\n\x0bnext_leader\x18\x03 \x01(\rB\x0f\n\r_last_to_play\"+\n\x0cSeatFinished\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\r\n\x05place\x18\x02 \x01(\r\"\xa3\x01\n\nShiftEnded\x12\r\n\x05shift\x18\x01 \x01(\r\x12\r\n\x05order\x18\x02 \x03(\r\x12\x14\n\x0cshift_points\x18\x03 \x03(\r\x12\x0e\n\x06points\x18\x04 \x03(\x04\x12\x0f\n\x07starter\x18\x05 \x01(\r\x12\x0e\n\x06pizzas\x18\x06 \x01(\r\x12\x0c\n\x04laps\x18\x07 \x01(\r\x12\r\n\x05turns\x18\x08 \x01(\r\x12\x13\n\x0b\x61\x64judicated\x18\t \x01(\x08\"7\n\x08Standing\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0e\n\x06points\x18\x02 \x01(\x04\x12\r\n\x05place\x18\x03 \x01(\r\"Y\n\nSeedReveal\x12\x13\n\x0bserver_seed\x18\x01 \x01(\x0c\x12\r\n\x05nonce\x18\x02 \x01(\x0c\x12\x14\n\x0cseat_entropy\x18\x03 \x03(\x0c\x12\x11\n\tgame_seed\x18\x04 \x01(\x0c\"^\n\tGameEnded\x12(\n\tstandings\x18\x01 \x03(\x0b\x32\x15.chefshat.v1.Standing\x12\'\n\x06reveal\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.SeedReveal\"`\n\x0bGameAborted\x12(\n\x06reason\x18\x01 \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\'\n\x06reveal\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.SeedReveal\"L\n\x0f\x45xpressionShown\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12+\n\nexpression\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.Expression\"C\n\x0cHandReported\x12$\n\x04hand\x18\x01 \x01(\x0b\x32\x16.chefshat.v1.SeatCards\x12\r\n\x05\x64\x65\x61lt\x18\x02 \x01(\x08\">\n\nCorrection\x12\x12\n\nfirst_void\x18\x01 \x01(\x04\x12\x0c\n\x04text\x18\x02 \x01(\t\x12\x0e\n\x06report\x18\x03 \x01(\x04\"\x1d\n\x0bTablePaused\x12\x0e\n\x06paused\x18\x01 \x01(\x08*\x81\x02\n\x0e\x44\x65\x63isionSource\x12\x1f\n\x1b\x44\x45\x43ISION_SOURCE_UNSPECIFIED\x10\x00\x12\x19\n\x15\x44\x45\x43ISION_SOURCE_AGENT\x10\x01\x12\x1b\n\x17\x44\x45\x43ISION_SOURCE_TIMEOUT\x10\x02\x12\x1b\n\x17\x44\x45\x43ISION_SOURCE_INVALID\x10\x03\x12 \n\x1c\x44\x45\x43ISION_SOURCE_DISCONNECTED\x10\x04\x12\x1e\n\x1a\x44\x45\x43ISION_SOURCE_SUBSTITUTE\x10\x05\x12\x1c\n\x18\x44\x45\x43ISION_SOURCE_RECORDED\x10\x06\x12\x19\n\x15\x44\x45\x43ISION_SOURCE_TABLE\x10\x07\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/event.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\x1a\x17\x63hefshat/v1/table.proto\"\xcb\t\n\tGameEvent\x12\x10\n\x08sequence\x18\x01 \x01(\x04\x12\x12\n\nelapsed_ms\x18\x02 \x01(\x04\x12(\n\x07rewards\x18\x03 \x03(\x0b\x32\x17.chefshat.v1.SeatReward\x12%\n\x06seated\x18\x04 \x01(\x0b\x32\x13.chefshat.v1.SeatedH\x00\x12\x31\n\x0c\x64isconnected\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.DisconnectedH\x00\x12)\n\x08returned\x18\x06 \x01(\x0b\x32\x15.chefshat.v1.ReturnedH\x00\x12/\n\x0bsubstituted\x18\x07 \x01(\x0b\x32\x18.chefshat.v1.SubstitutedH\x00\x12\x30\n\x0cgame_started\x18\x08 \x01(\x0b\x32\x18.chefshat.v1.GameStartedH\x00\x12\x32\n\rshift_started\x18\t \x01(\x0b\x32\x19.chefshat.v1.ShiftStartedH\x00\x12\x34\n\x0eroles_assigned\x18\n \x01(\x0b\x32\x1a.chefshat.v1.RolesAssignedH\x00\x12\x45\n\x17special_action_declared\x18\x0b \x01(\x0b\x32\".chefshat.v1.SpecialActionDeclaredH\x00\x12\x36\n\x0f\x63\x61rds_exchanged\x18\x0c \x01(\x0b\x32\x1b.chefshat.v1.CardsExchangedH\x00\x12!\n\x04play\x18\r \x01(\x0b\x32\x11.chefshat.v1.PlayH\x00\x12!\n\x04pass\x18\x0e \x01(\x0b\x32\x11.chefshat.v1.PassH\x00\x12,\n\npizza_done\x18\x0f \x01(\x0b\x32\x16.chefshat.v1.PizzaDoneH\x00\x12\x32\n\rseat_finished\x18\x10 \x01(\x0b\x32\x19.chefshat.v1.SeatFinishedH\x00\x12.\n\x0bshift_ended\x18\x11 \x01(\x0b\x32\x17.chefshat.v1.ShiftEndedH\x00\x12,\n\ngame_ended\x18\x12 \x01(\x0b\x32\x16.chefshat.v1.GameEndedH\x00\x12\x30\n\x0cgame_aborted\x18\x13 \x01(\x0b\x32\x18.chefshat.v1.GameAbortedH\x00\x12\x38\n\x10\x65xpression_shown\x18\x14 \x01(\x0b\x32\x1c.chefshat.v1.ExpressionShownH\x00\x12\'\n\x07vacated\x18\x15 \x01(\x0b\x32\x14.chefshat.v1.VacatedH\x00\x12\x38\n\x10server_restarted\x18\x16 \x01(\x0b\x32\x1c.chefshat.v1.ServerRestartedH\x00\x12\x32\n\rhand_reported\x18\x17 \x01(\x0b\x32\x19.chefshat.v1.HandReportedH\x00\x12+\n\tviolation\x18\x18 \x01(\x0b\x32\x16.chefshat.v1.ViolationH\x00\x12-\n\ncorrection\x18\x19 \x01(\x0b\x32\x17.chefshat.v1.CorrectionH\x00\x12\x30\n\x0ctable_paused\x18\x1a \x01(\x0b\x32\x18.chefshat.v1.TablePausedH\x00\x42\x06\n\x04kind\")\n\nSeatReward\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\r\n\x05value\x18\x02 \x01(\x02\"P\n\x06Seated\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0c\n\x04name\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\"\x17\n\x07Vacated\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x1c\n\x0c\x44isconnected\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x18\n\x08Returned\x12\x0c\n\x04seat\x18\x01 \x01(\r\"\x11\n\x0fServerRestarted\"E\n\x0bSubstituted\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x16\n\x0e\x62uilt_in_agent\x18\x02 \x01(\t\x12\x10\n\x08\x66or_good\x18\x03 \x01(\x08\"\x88\x02\n\x0bGameStarted\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12#\n\x05rules\x18\x02 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x15\n\rrules_version\x18\x03 \x01(\r\x12\'\n\x06policy\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\x05 \x03(\x0b\x32\x18.chefshat.v1.Participant\x12.\n\x0c\x61\x63tion_space\x18\x06 \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12\x11\n\thand_size\x18\x07 \x01(\r\x12\x17\n\x0fseed_commitment\x18\x08 \x01(\x0c\"D\n\x0cShiftStarted\x12\r\n\x05shift\x18\x01 \x01(\r\x12%\n\x05hands\x18\x02 \x03(\x0b\x32\x16.chefshat.v1.SeatCards\"1\n\rRolesAssigned\x12 \n\x05roles\x18\x01 \x03(\x0e\x32\x11.chefshat.v1.Role\"\x98\x01\n\x15SpecialActionDeclared\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12*\n\x06\x61\x63tion\x18\x02 \x01(\x0e\x32\x1a.chefshat.v1.SpecialAction\x12+\n\x06source\x18\x03 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x04 \x01(\x04\"_\n\x0e\x43\x61rdsExchanged\x12\r\n\x05giver\x18\x01 \x01(\r\x12\x10\n\x08receiver\x18\x02 \x01(\r\x12\r\n\x05\x63ount\x18\x03 \x01(\r\x12\r\n\x05\x63\x61rds\x18\x04 \x03(\r\x12\x0e\n\x06golden\x18\x05 \x01(\x08\"\xaf\x01\n\x04Play\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0e\n\x06\x61\x63tion\x18\x02 \x01(\r\x12\x0c\n\x04\x66\x61\x63\x65\x18\x03 \x01(\r\x12\x10\n\x08quantity\x18\x04 \x01(\r\x12\x0e\n\x06jokers\x18\x05 \x01(\r\x12\x12\n\ncards_left\x18\x06 \x01(\r\x12+\n\x06source\x18\x07 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x08 \x01(\x04\"[\n\x04Pass\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12+\n\x06source\x18\x02 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x03 \x01(\x04\"[\n\tPizzaDone\x12\r\n\x05pizza\x18\x01 \x01(\r\x12\x19\n\x0clast_to_play\x18\x02 \x01(\rH\x00\x88\x01\x01\x12\x13\n\x0bnext_leader\x18\x03 \x01(\rB\x0f\n\r_last_to_play\"+\n\x0cSeatFinished\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\r\n\x05place\x18\x02 \x01(\r\"\xa3\x01\n\nShiftEnded\x12\r\n\x05shift\x18\x01 \x01(\r\x12\r\n\x05order\x18\x02 \x03(\r\x12\x14\n\x0cshift_points\x18\x03 \x03(\r\x12\x0e\n\x06points\x18\x04 \x03(\x04\x12\x0f\n\x07starter\x18\x05 \x01(\r\x12\x0e\n\x06pizzas\x18\x06 \x01(\r\x12\x0c\n\x04laps\x18\x07 \x01(\r\x12\r\n\x05turns\x18\x08 \x01(\r\x12\x13\n\x0b\x61\x64judicated\x18\t \x01(\x08\"7\n\x08Standing\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x0e\n\x06points\x18\x02 \x01(\x04\x12\r\n\x05place\x18\x03 \x01(\r\"Y\n\nSeedReveal\x12\x13\n\x0bserver_seed\x18\x01 \x01(\x0c\x12\r\n\x05nonce\x18\x02 \x01(\x0c\x12\x14\n\x0cseat_entropy\x18\x03 \x03(\x0c\x12\x11\n\tgame_seed\x18\x04 \x01(\x0c\"^\n\tGameEnded\x12(\n\tstandings\x18\x01 \x03(\x0b\x32\x15.chefshat.v1.Standing\x12\'\n\x06reveal\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.SeedReveal\"`\n\x0bGameAborted\x12(\n\x06reason\x18\x01 \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\'\n\x06reveal\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.SeedReveal\"L\n\x0f\x45xpressionShown\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12+\n\nexpression\x18\x02 \x01(\x0b\x32\x17.chefshat.v1.Expression\"C\n\x0cHandReported\x12$\n\x04hand\x18\x01 \x01(\x0b\x32\x16.chefshat.v1.SeatCards\x12\r\n\x05\x64\x65\x61lt\x18\x02 \x01(\x08\">\n\nCorrection\x12\x12\n\nfirst_void\x18\x01 \x01(\x04\x12\x0c\n\x04text\x18\x02 \x01(\t\x12\x0e\n\x06report\x18\x03 \x01(\x04\"\x1d\n\x0bTablePaused\x12\x0e\n\x06paused\x18\x01 \x01(\x08*\x81\x02\n\x0e\x44\x65\x63isionSource\x12\x1f\n\x1b\x44\x45\x43ISION_SOURCE_UNSPECIFIED\x10\x00\x12\x19\n\x15\x44\x45\x43ISION_SOURCE_AGENT\x10\x01\x12\x1b\n\x17\x44\x45\x43ISION_SOURCE_TIMEOUT\x10\x02\x12\x1b\n\x17\x44\x45\x43ISION_SOURCE_INVALID\x10\x03\x12 \n\x1c\x44\x45\x43ISION_SOURCE_DISCONNECTED\x10\x04\x12\x1e\n\x1a\x44\x45\x43ISION_SOURCE_SUBSTITUTE\x10\x05\x12\x1c\n\x18\x44\x45\x43ISION_SOURCE_RECORDED\x10\x06\x12\x19\n\x15\x44\x45\x43ISION_SOURCE_TABLE\x10\x07\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.event_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_DECISIONSOURCE']._serialized_start=3450
-  _globals['_DECISIONSOURCE']._serialized_end=3707
+  _globals['_DECISIONSOURCE']._serialized_start=3468
+  _globals['_DECISIONSOURCE']._serialized_end=3725
   _globals['_GAMEEVENT']._serialized_start=143
   _globals['_GAMEEVENT']._serialized_end=1370
   _globals['_SEATREWARD']._serialized_start=1372
@@ -52,41 +52,41 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SERVERRESTARTED']._serialized_start=1578
   _globals['_SERVERRESTARTED']._serialized_end=1595
   _globals['_SUBSTITUTED']._serialized_start=1597
-  _globals['_SUBSTITUTED']._serialized_end=1648
-  _globals['_GAMESTARTED']._serialized_start=1651
-  _globals['_GAMESTARTED']._serialized_end=1915
-  _globals['_SHIFTSTARTED']._serialized_start=1917
-  _globals['_SHIFTSTARTED']._serialized_end=1985
-  _globals['_ROLESASSIGNED']._serialized_start=1987
-  _globals['_ROLESASSIGNED']._serialized_end=2036
-  _globals['_SPECIALACTIONDECLARED']._serialized_start=2039
-  _globals['_SPECIALACTIONDECLARED']._serialized_end=2191
-  _globals['_CARDSEXCHANGED']._serialized_start=2193
-  _globals['_CARDSEXCHANGED']._serialized_end=2288
-  _globals['_PLAY']._serialized_start=2291
-  _globals['_PLAY']._serialized_end=2466
-  _globals['_PASS']._serialized_start=2468
-  _globals['_PASS']._serialized_end=2559
-  _globals['_PIZZADONE']._serialized_start=2561
-  _globals['_PIZZADONE']._serialized_end=2652
-  _globals['_SEATFINISHED']._serialized_start=2654
-  _globals['_SEATFINISHED']._serialized_end=2697
-  _globals['_SHIFTENDED']._serialized_start=2700
-  _globals['_SHIFTENDED']._serialized_end=2863
-  _globals['_STANDING']._serialized_start=2865
-  _globals['_STANDING']._serialized_end=2920
-  _globals['_SEEDREVEAL']._serialized_start=2922
-  _globals['_SEEDREVEAL']._serialized_end=3011
-  _globals['_GAMEENDED']._serialized_start=3013
-  _globals['_GAMEENDED']._serialized_end=3107
-  _globals['_GAMEABORTED']._serialized_start=3109
-  _globals['_GAMEABORTED']._serialized_end=3205
-  _globals['_EXPRESSIONSHOWN']._serialized_start=3207
-  _globals['_EXPRESSIONSHOWN']._serialized_end=3283
-  _globals['_HANDREPORTED']._serialized_start=3285
-  _globals['_HANDREPORTED']._serialized_end=3352
-  _globals['_CORRECTION']._serialized_start=3354
-  _globals['_CORRECTION']._serialized_end=3416
-  _globals['_TABLEPAUSED']._serialized_start=3418
-  _globals['_TABLEPAUSED']._serialized_end=3447
+  _globals['_SUBSTITUTED']._serialized_end=1666
+  _globals['_GAMESTARTED']._serialized_start=1669
+  _globals['_GAMESTARTED']._serialized_end=1933
+  _globals['_SHIFTSTARTED']._serialized_start=1935
+  _globals['_SHIFTSTARTED']._serialized_end=2003
+  _globals['_ROLESASSIGNED']._serialized_start=2005
+  _globals['_ROLESASSIGNED']._serialized_end=2054
+  _globals['_SPECIALACTIONDECLARED']._serialized_start=2057
+  _globals['_SPECIALACTIONDECLARED']._serialized_end=2209
+  _globals['_CARDSEXCHANGED']._serialized_start=2211
+  _globals['_CARDSEXCHANGED']._serialized_end=2306
+  _globals['_PLAY']._serialized_start=2309
+  _globals['_PLAY']._serialized_end=2484
+  _globals['_PASS']._serialized_start=2486
+  _globals['_PASS']._serialized_end=2577
+  _globals['_PIZZADONE']._serialized_start=2579
+  _globals['_PIZZADONE']._serialized_end=2670
+  _globals['_SEATFINISHED']._serialized_start=2672
+  _globals['_SEATFINISHED']._serialized_end=2715
+  _globals['_SHIFTENDED']._serialized_start=2718
+  _globals['_SHIFTENDED']._serialized_end=2881
+  _globals['_STANDING']._serialized_start=2883
+  _globals['_STANDING']._serialized_end=2938
+  _globals['_SEEDREVEAL']._serialized_start=2940
+  _globals['_SEEDREVEAL']._serialized_end=3029
+  _globals['_GAMEENDED']._serialized_start=3031
+  _globals['_GAMEENDED']._serialized_end=3125
+  _globals['_GAMEABORTED']._serialized_start=3127
+  _globals['_GAMEABORTED']._serialized_end=3223
+  _globals['_EXPRESSIONSHOWN']._serialized_start=3225
+  _globals['_EXPRESSIONSHOWN']._serialized_end=3301
+  _globals['_HANDREPORTED']._serialized_start=3303
+  _globals['_HANDREPORTED']._serialized_end=3370
+  _globals['_CORRECTION']._serialized_start=3372
+  _globals['_CORRECTION']._serialized_end=3434
+  _globals['_TABLEPAUSED']._serialized_start=3436
+  _globals['_TABLEPAUSED']._serialized_end=3465
 # @@protoc_insertion_point(module_scope)

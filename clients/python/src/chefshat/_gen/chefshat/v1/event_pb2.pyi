@@ -318,7 +318,9 @@ Global___Vacated: _TypeAlias = Vacated  # noqa: Y015
 
 @_typing.final
 class Disconnected(_message.Message):
-    """A seat lost its connection or detached. The clock of its open decision continues."""
+    """A seat lost its connection or detached. RoomPolicy.absence_time_ms says how long the game waits
+    for it at each of its decisions; without one, the clock of its open decision continues.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -364,7 +366,7 @@ Global___Returned: _TypeAlias = Returned  # noqa: Y015
 class ServerRestarted(_message.Message):
     """The server was restarted and resumed the game after its last committed decision. All connections
     were lost. The clock of the open decision restarts when its seat is attached again, at the latest
-    one minute after the restart.
+    one minute after the restart; until then the absence time does not run either.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -383,27 +385,33 @@ Global___ServerRestarted: _TypeAlias = ServerRestarted  # noqa: Y015
 @_typing.final
 class Substituted(_message.Message):
     """A built-in agent plays for a seat from here on, until Returned. Follows the default decision with
-    which the seat reached its limit of timeouts, never a special action: nobody else may learn that
-    one ran out.
+    which the seat reached its limit of timeouts, or that ended while it was away
+    (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
+    participant has left the tournament (`for_good`), it comes at any time, and the built-in agent plays
+    until the end of the game.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
 
     SEAT_FIELD_NUMBER: _builtins.int
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
+    FOR_GOOD_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
     built_in_agent: _builtins.str
     """Name of the built-in agent."""
+    for_good: _builtins.bool
+    """Whether the participant has left the tournament, or was replaced there. It never returns."""
     def __init__(
         self,
         *,
         seat: _builtins.int = ...,
         built_in_agent: _builtins.str = ...,
+        for_good: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "for_good", b"for_good", "seat", b"seat"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -6,6 +6,7 @@ Playing: seats attach to a stream, receive events and decisions, and answer."""
 from chefshat._gen.chefshat.v1 import analysis_service_pb2 as _analysis_service_pb2
 from chefshat._gen.chefshat.v1 import decision_pb2 as _decision_pb2
 from chefshat._gen.chefshat.v1 import event_pb2 as _event_pb2
+from chefshat._gen.chefshat.v1 import room_pb2 as _room_pb2
 from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
@@ -35,7 +36,7 @@ class _EventDeliveryEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_EventDe
     of a Shift and of the game, and when many events are pending. For programs.
     """
     EVENT_DELIVERY_AT_ONCE: _EventDelivery.ValueType  # 2
-    """Each event immediately. For people and robots."""
+    """Each event immediately, and Awaited updates. For people and robots."""
 
 class EventDelivery(_EventDelivery, metaclass=_EventDeliveryEnumTypeWrapper):
     """When events are sent to a seat."""
@@ -47,7 +48,7 @@ EVENT_DELIVERY_WITH_DECISIONS: EventDelivery.ValueType  # 1
 of a Shift and of the game, and when many events are pending. For programs.
 """
 EVENT_DELIVERY_AT_ONCE: EventDelivery.ValueType  # 2
-"""Each event immediately. For people and robots."""
+"""Each event immediately, and Awaited updates. For people and robots."""
 Global___EventDelivery: _TypeAlias = EventDelivery  # noqa: Y015
 
 class _DetachReason:
@@ -59,13 +60,15 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     DETACH_REASON_UNSPECIFIED: _DetachReason.ValueType  # 0
     """Not set."""
     DETACH_REASON_REQUESTED: _DetachReason.ValueType  # 1
-    """The client requested it, or gave the seat back."""
+    """The client requested it, or gave the seat back; or the participant has left the tournament."""
     DETACH_REASON_SUPERSEDED: _DetachReason.ValueType  # 2
     """A newer connection attached the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
     """The game is over and all its events have been sent."""
     DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
-    """The tournament is over. Its participant is not seated again."""
+    """The tournament is over, at least for the participant: it withdrew, was removed or replaced. It is
+    not seated again.
+    """
     DETACH_REASON_SERVER_STOPPING: _DetachReason.ValueType  # 6
     """The server stops, and the game continues when it is started again. The stream ends after this:
     connect again, and attach with the same ticket.
@@ -77,13 +80,15 @@ class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
 DETACH_REASON_UNSPECIFIED: DetachReason.ValueType  # 0
 """Not set."""
 DETACH_REASON_REQUESTED: DetachReason.ValueType  # 1
-"""The client requested it, or gave the seat back."""
+"""The client requested it, or gave the seat back; or the participant has left the tournament."""
 DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 """A newer connection attached the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
 """The game is over and all its events have been sent."""
 DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
-"""The tournament is over. Its participant is not seated again."""
+"""The tournament is over, at least for the participant: it withdrew, was removed or replaced. It is
+not seated again.
+"""
 DETACH_REASON_SERVER_STOPPING: DetachReason.ValueType  # 6
 """The server stops, and the game continues when it is started again. The stream ends after this:
 connect again, and attach with the same ticket.
@@ -501,6 +506,7 @@ class SeatUpdate(_message.Message):
     DETACHED_FIELD_NUMBER: _builtins.int
     REFUSED_FIELD_NUMBER: _builtins.int
     ENTERED_FIELD_NUMBER: _builtins.int
+    AWAITED_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
     """Handle of the seat on this stream: the number of its Attach on the stream, from 0. Refused
     Attaches and those of participants are counted. Seats that the server attaches, in games of a
@@ -538,6 +544,12 @@ class SeatUpdate(_message.Message):
     def entered(self) -> Global___Entered:
         """A participant of a tournament is attached."""
 
+    @_builtins.property
+    def awaited(self) -> _room_pb2.Awaited:
+        """Whom of the others the game waits for, when that changes. Only with AT_ONCE. `seat` is never
+        the seat's own.
+        """
+
     def __init__(
         self,
         *,
@@ -550,12 +562,13 @@ class SeatUpdate(_message.Message):
         detached: Global___Detached | None = ...,
         refused: Global___Refused | None = ...,
         entered: Global___Entered | None = ...,
+        awaited: _room_pb2.Awaited | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused", "entered"]  # noqa: Y015
+    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused", "entered", "awaited"]  # noqa: Y015
     _WhichOneofArgType_update: _TypeAlias = _typing.Literal["update", b"update"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_update) -> _WhichOneofReturnType_update | None: ...
 

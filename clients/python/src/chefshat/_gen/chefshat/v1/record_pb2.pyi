@@ -124,7 +124,7 @@ class RecordHeader(_message.Message):
 
     @_builtins.property
     def policy(self) -> _room_pb2.RoomPolicy:
-        """The policy, every field set."""
+        """The policy, every field set; absence_time_ms only if the game had one."""
 
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Participant]:
@@ -267,7 +267,9 @@ class DecisionRecord(_message.Message):
     for built-in agents.
     """
     bank_left_ms: _builtins.int
-    """Milliseconds left in the seat's time bank afterwards."""
+    """Milliseconds left in the seat's time bank afterwards. Time in which the seat was not connected is
+    not taken from it, if the policy has an absence time.
+    """
     action_mask: _builtins.bytes
     """Legal actions, as in DecisionRequest; empty in an imported game if the hand is unknown."""
     invalid_reward: _builtins.float

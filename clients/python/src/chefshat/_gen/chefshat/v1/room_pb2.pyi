@@ -417,7 +417,8 @@ Global___BranchPoint: _TypeAlias = BranchPoint  # noqa: Y015
 @_typing.final
 class RoomPolicy(_message.Message):
     """Times and limits of a room. In a request an unset field means its default; in a response every
-    field is set, except a `pace_ms` that depends on who will play.
+    field is set, except a `pace_ms` that depends on who will play, and `absence_time_ms` of games
+    that did not have one.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -439,6 +440,7 @@ class RoomPolicy(_message.Message):
     ONE_SEAT_PER_CLIENT_FIELD_NUMBER: _builtins.int
     VISIBILITY_FIELD_NUMBER: _builtins.int
     HINTS_FIELD_NUMBER: _builtins.int
+    ABSENCE_TIME_MS_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. A
     special action has the longest time of any seat that participants can take, for every holder of
@@ -457,7 +459,8 @@ class RoomPolicy(_message.Message):
     1..=1000; by default 3. Invalid answers, attaching again and the return from a substitution
     reset nothing: a seat that returned is substituted again at its next timeout unless it has
     answered. A special action that is declined or runs out does not count, since others could
-    infer it.
+    infer it. A decision that ends while its seat is not connected substitutes it at once, if the
+    policy has an absence_time_ms.
     """
     substitute: _builtins.str
     """Built-in agent that plays for a substituted seat; by default "random"."""
@@ -502,10 +505,25 @@ class RoomPolicy(_message.Message):
     """Whether seats may ask for hints (AskHint); by default not. Not at physical tables. A game in
     which one was given is not rated.
     """
+    absence_time_ms: _builtins.int
+    """The absence time: milliseconds that the game waits, at each decision, for a seat that is not
+    connected, 0..=86400000; never longer than its time for a decision. By default 20000 for people,
+    for others their decision time. When it is over, the server takes the default decision
+    (DISCONNECTED) and a substitute plays until the seat returns, or the game is aborted by `abort`.
+    It runs from the loss of the connection, or from the start of the decision if that is later;
+    several absences during one decision share it. Outside of tournaments it runs only while another
+    participant, who waits, is connected or sits at the table; otherwise the decision ends when the
+    seat's own time is over. An absence never uses the bank: if the seat returns in time, only the time in
+    which it was connected is taken from it. A special action ends as it would with the seat
+    connected, and substitutes nobody, since others could infer it. After a restart of the server,
+    see ServerRestarted. Unset in games of earlier servers: the decision time and the bank run on
+    while a seat is away, and max_timeouts alone decides when it is substituted.
+    """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
         """Other times for some kinds of participants, each kind at most once. People have the default
-        times for people unless their clock, decision_time_ms or bank_ms is set.
+        times for people unless their clock, decision_time_ms or bank_ms is set; a clock that sets
+        absence_time_ms alone leaves them as they are.
         """
 
     def __init__(
@@ -528,11 +546,14 @@ class RoomPolicy(_message.Message):
         one_seat_per_client: _builtins.bool = ...,
         visibility: Global___Visibility.ValueType = ...,
         hints: _builtins.bool = ...,
+        absence_time_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "hints", b"hints", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "visibility", b"visibility", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "hints", b"hints", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "visibility", b"visibility", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__absence_time_ms: _TypeAlias = _typing.Literal["absence_time_ms"]  # noqa: Y015
+    _WhichOneofArgType__absence_time_ms: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms"]  # noqa: Y015
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015
     _WhichOneofReturnType__decision_time_ms: _TypeAlias = _typing.Literal["decision_time_ms"]  # noqa: Y015
@@ -551,6 +572,8 @@ class RoomPolicy(_message.Message):
     _WhichOneofArgType__spectators_see_hands: _TypeAlias = _typing.Literal["_spectators_see_hands", b"_spectators_see_hands"]  # noqa: Y015
     _WhichOneofReturnType__waiting_time_ms: _TypeAlias = _typing.Literal["waiting_time_ms"]  # noqa: Y015
     _WhichOneofArgType__waiting_time_ms: _TypeAlias = _typing.Literal["_waiting_time_ms", b"_waiting_time_ms"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__absence_time_ms) -> _WhichOneofReturnType__absence_time_ms | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__bank_ms) -> _WhichOneofReturnType__bank_ms | None: ...
     @_typing.overload
@@ -581,27 +604,37 @@ class KindClock(_message.Message):
     KIND_FIELD_NUMBER: _builtins.int
     DECISION_TIME_MS_FIELD_NUMBER: _builtins.int
     BANK_MS_FIELD_NUMBER: _builtins.int
+    ABSENCE_TIME_MS_FIELD_NUMBER: _builtins.int
     kind: Global___ParticipantKind.ValueType
     """The kind."""
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; unset: the room's."""
     bank_ms: _builtins.int
     """Milliseconds of the time bank, 0..=86400000; unset: the room's."""
+    absence_time_ms: _builtins.int
+    """Milliseconds of the absence time, 0..=86400000; unset: the room's. If that is unset too, by
+    default 20000 for people and the decision time of their own clock for others.
+    """
     def __init__(
         self,
         *,
         kind: Global___ParticipantKind.ValueType = ...,
         decision_time_ms: _builtins.int | None = ...,
         bank_ms: _builtins.int | None = ...,
+        absence_time_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "kind", b"kind"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "kind", b"kind"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__absence_time_ms: _TypeAlias = _typing.Literal["absence_time_ms"]  # noqa: Y015
+    _WhichOneofArgType__absence_time_ms: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms"]  # noqa: Y015
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015
     _WhichOneofReturnType__decision_time_ms: _TypeAlias = _typing.Literal["decision_time_ms"]  # noqa: Y015
     _WhichOneofArgType__decision_time_ms: _TypeAlias = _typing.Literal["_decision_time_ms", b"_decision_time_ms"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__absence_time_ms) -> _WhichOneofReturnType__absence_time_ms | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__bank_ms) -> _WhichOneofReturnType__bank_ms | None: ...
     @_typing.overload
@@ -669,6 +702,48 @@ class Participant(_message.Message):
 Global___Participant: _TypeAlias = Participant  # noqa: Y015
 
 @_typing.final
+class Awaited(_message.Message):
+    """Whom the game waits for, as everybody may know it. Built-in agents and players at a physical table
+    are not awaited. While a special action is open, which only its own seat may know of, it is the
+    seat that decides next if none is declared.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SEAT_FIELD_NUMBER: _builtins.int
+    AWAY_FIELD_NUMBER: _builtins.int
+    WAITED_MS_FIELD_NUMBER: _builtins.int
+    LEFT_MS_FIELD_NUMBER: _builtins.int
+    seat: _builtins.int
+    """The seat whose decision is open; unset: none."""
+    away: _builtins.bool
+    """Whether the seat is not connected."""
+    waited_ms: _builtins.int
+    """Milliseconds since its decision was opened, when the message was written."""
+    left_ms: _builtins.int
+    """Milliseconds until the server decides for it, when the message was written, unless it answers,
+    leaves or returns: what is left of its decision time and bank, and while it is away of its absence
+    time. Invalid answers and a slow store may extend it.
+    """
+    def __init__(
+        self,
+        *,
+        seat: _builtins.int | None = ...,
+        away: _builtins.bool = ...,
+        waited_ms: _builtins.int = ...,
+        left_ms: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "seat", b"seat"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "away", b"away", "left_ms", b"left_ms", "seat", b"seat", "waited_ms", b"waited_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
+    _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__seat) -> _WhichOneofReturnType__seat | None: ...
+
+Global___Awaited: _TypeAlias = Awaited  # noqa: Y015
+
+@_typing.final
 class Room(_message.Message):
     """A room, as everybody sees it."""
 
@@ -689,6 +764,7 @@ class Room(_message.Message):
     ABORT_REASON_FIELD_NUMBER: _builtins.int
     TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
     SERIES_ID_FIELD_NUMBER: _builtins.int
+    AWAITED_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room: 32 hexadecimal digits."""
     game_id: _builtins.str
@@ -731,6 +807,10 @@ class Room(_message.Message):
     def branched_from(self) -> Global___BranchPoint:
         """For a game that branches from a record: the point."""
 
+    @_builtins.property
+    def awaited(self) -> Global___Awaited:
+        """Whom the game waits for; unset if for nobody, and in rooms that delay their events for spectators."""
+
     def __init__(
         self,
         *,
@@ -749,10 +829,11 @@ class Room(_message.Message):
         abort_reason: Global___AbortReason.ValueType = ...,
         tournament_id: _builtins.str = ...,
         series_id: _builtins.str = ...,
+        awaited: Global___Awaited | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["awaited", b"awaited", "branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "series_id", b"series_id", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "awaited", b"awaited", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "series_id", b"series_id", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -27,7 +27,7 @@ from chefshat._gen.chefshat.v1 import play_service_pb2 as chefshat_dot_v1_dot_pl
 from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#chefshat/v1/spectator_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x1e\x63hefshat/v1/play_service.proto\x1a\x16\x63hefshat/v1/room.proto\"X\n\x1cSpectatorServiceWatchRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x15\n\rfrom_sequence\x18\x02 \x01(\x04\x12\x10\n\x08snapshot\x18\x03 \x01(\x08\"\x91\x01\n\x1dSpectatorServiceWatchResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\x12\x1f\n\x04room\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\'\n\x08snapshot\x18\x03 \x01(\x0b\x32\x15.chefshat.v1.Snapshot2t\n\x10SpectatorService\x12`\n\x05Watch\x12).chefshat.v1.SpectatorServiceWatchRequest\x1a*.chefshat.v1.SpectatorServiceWatchResponse0\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#chefshat/v1/spectator_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x1e\x63hefshat/v1/play_service.proto\x1a\x16\x63hefshat/v1/room.proto\"X\n\x1cSpectatorServiceWatchRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x15\n\rfrom_sequence\x18\x02 \x01(\x04\x12\x10\n\x08snapshot\x18\x03 \x01(\x08\"\xb8\x01\n\x1dSpectatorServiceWatchResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\x12\x1f\n\x04room\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\'\n\x08snapshot\x18\x03 \x01(\x0b\x32\x15.chefshat.v1.Snapshot\x12%\n\x07\x61waited\x18\x04 \x03(\x0b\x32\x14.chefshat.v1.Awaited2t\n\x10SpectatorService\x12`\n\x05Watch\x12).chefshat.v1.SpectatorServiceWatchRequest\x1a*.chefshat.v1.SpectatorServiceWatchResponse0\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -37,7 +37,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SPECTATORSERVICEWATCHREQUEST']._serialized_start=133
   _globals['_SPECTATORSERVICEWATCHREQUEST']._serialized_end=221
   _globals['_SPECTATORSERVICEWATCHRESPONSE']._serialized_start=224
-  _globals['_SPECTATORSERVICEWATCHRESPONSE']._serialized_end=369
-  _globals['_SPECTATORSERVICE']._serialized_start=371
-  _globals['_SPECTATORSERVICE']._serialized_end=487
+  _globals['_SPECTATORSERVICEWATCHRESPONSE']._serialized_end=408
+  _globals['_SPECTATORSERVICE']._serialized_start=410
+  _globals['_SPECTATORSERVICE']._serialized_end=526
 # @@protoc_insertion_point(module_scope)

@@ -62,6 +62,7 @@ class SpectatorServiceWatchResponse(_message.Message):
     EVENTS_FIELD_NUMBER: _builtins.int
     ROOM_FIELD_NUMBER: _builtins.int
     SNAPSHOT_FIELD_NUMBER: _builtins.int
+    AWAITED_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def events(self) -> _containers.RepeatedCompositeFieldContainer[_event_pb2.GameEvent]:
         """Events in order."""
@@ -74,16 +75,23 @@ class SpectatorServiceWatchResponse(_message.Message):
     def snapshot(self) -> _play_service_pb2.Snapshot:
         """The state of the game; in the first message only, if requested."""
 
+    @_builtins.property
+    def awaited(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Awaited]:
+        """Whom the game waits for after these events, when that changes; the last one counts. Not in rooms
+        with a delay.
+        """
+
     def __init__(
         self,
         *,
         events: _abc.Iterable[_event_pb2.GameEvent] | None = ...,
         room: _room_pb2.Room | None = ...,
         snapshot: _play_service_pb2.Snapshot | None = ...,
+        awaited: _abc.Iterable[_room_pb2.Awaited] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["room", b"room", "snapshot", b"snapshot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["events", b"events", "room", b"room", "snapshot", b"snapshot"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["awaited", b"awaited", "events", b"events", "room", b"room", "snapshot", b"snapshot"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

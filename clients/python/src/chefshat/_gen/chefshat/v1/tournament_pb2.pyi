@@ -198,6 +198,7 @@ class TournamentSettings(_message.Message):
     FILLER_FIELD_NUMBER: _builtins.int
     DEAL_SEED_FIELD_NUMBER: _builtins.int
     PHYSICAL_TABLES_FIELD_NUMBER: _builtins.int
+    START_AT_MS_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Display name, 1..=64 characters."""
     format: Global___TournamentFormat.ValueType
@@ -247,6 +248,11 @@ class TournamentSettings(_message.Message):
     as many at the same time as there are tables. Only with INDEPENDENT deals, without `deal_seed`,
     and with rules that physical rooms accept.
     """
+    start_at_ms: _builtins.int
+    """Milliseconds since the Unix epoch at which the tournament starts by itself, at most 366 days
+    ahead; 0: only its owner, or `start_when_joined`, starts it. If fewer than two participants have
+    joined by then, it starts as soon as two have.
+    """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set of all games."""
@@ -286,14 +292,49 @@ class TournamentSettings(_message.Message):
         filler: _builtins.str = ...,
         deal_seed: _builtins.bytes = ...,
         physical_tables: _builtins.int = ...,
+        start_at_ms: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "deal_seed", b"deal_seed", "deals", b"deals", "draw_seed", b"draw_seed", "filler", b"filler", "format", b"format", "games_per_pairing", b"games_per_pairing", "kinds", b"kinds", "max_calls", b"max_calls", "max_parallel_games", b"max_parallel_games", "max_participants", b"max_participants", "name", b"name", "no_show_time_ms", b"no_show_time_ms", "physical_tables", b"physical_tables", "policy", b"policy", "rounds", b"rounds", "rules", b"rules", "start_when_joined", b"start_when_joined"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agents", b"built_in_agents", "deal_seed", b"deal_seed", "deals", b"deals", "draw_seed", b"draw_seed", "filler", b"filler", "format", b"format", "games_per_pairing", b"games_per_pairing", "kinds", b"kinds", "max_calls", b"max_calls", "max_parallel_games", b"max_parallel_games", "max_participants", b"max_participants", "name", b"name", "no_show_time_ms", b"no_show_time_ms", "physical_tables", b"physical_tables", "policy", b"policy", "rounds", b"rounds", "rules", b"rules", "start_at_ms", b"start_at_ms", "start_when_joined", b"start_when_joined"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___TournamentSettings: _TypeAlias = TournamentSettings  # noqa: Y015
+
+@_typing.final
+class FormerParticipant(_message.Message):
+    """A participant who was replaced."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    KIND_FIELD_NUMBER: _builtins.int
+    BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
+    GAMES_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """Display name."""
+    kind: _room_pb2.ParticipantKind.ValueType
+    """Its kind."""
+    built_in_agent: _builtins.str
+    """Name of the built-in agent, or empty."""
+    games: _builtins.int
+    """Number of counted games that the place in the tournament had when it was replaced."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+        kind: _room_pb2.ParticipantKind.ValueType = ...,
+        built_in_agent: _builtins.str = ...,
+        games: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "games", b"games", "kind", b"kind", "name", b"name"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___FormerParticipant: _TypeAlias = FormerParticipant  # noqa: Y015
 
 @_typing.final
 class TournamentParticipant(_message.Message):
@@ -310,8 +351,12 @@ class TournamentParticipant(_message.Message):
     MAX_GAMES_FIELD_NUMBER: _builtins.int
     CONNECTED_FIELD_NUMBER: _builtins.int
     AT_TABLE_FIELD_NUMBER: _builtins.int
+    WITHDRAWN_FIELD_NUMBER: _builtins.int
+    FORMER_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
-    """Number in the tournament, from 0, in the order of joining."""
+    """Number in the tournament, from 0, in the order of joining. A participant who joins after another
+    left before the start takes its number.
+    """
     name: _builtins.str
     """Display name, unique in the tournament."""
     kind: _room_pb2.ParticipantKind.ValueType
@@ -328,6 +373,14 @@ class TournamentParticipant(_message.Message):
     """Whether it is connected now; a built-in agent or a participant at a physical table always is."""
     at_table: _builtins.bool
     """Whether it plays at a physical table with real cards. Nobody connects for it."""
+    withdrawn: _builtins.bool
+    """Whether it withdrew or was removed. Before the start its place is free, and its name too; after
+    that it forfeits its games without being waited for.
+    """
+    @_builtins.property
+    def former(self) -> _containers.RepeatedCompositeFieldContainer[Global___FormerParticipant]:
+        """Who had its place before, in order. Their results count for the place."""
+
     def __init__(
         self,
         *,
@@ -340,10 +393,12 @@ class TournamentParticipant(_message.Message):
         max_games: _builtins.int = ...,
         connected: _builtins.bool = ...,
         at_table: _builtins.bool = ...,
+        withdrawn: _builtins.bool = ...,
+        former: _abc.Iterable[Global___FormerParticipant] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "kind", b"kind", "max_games", b"max_games", "name", b"name", "participant", b"participant", "stateless", b"stateless"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "former", b"former", "kind", b"kind", "max_games", b"max_games", "name", b"name", "participant", b"participant", "stateless", b"stateless", "withdrawn", b"withdrawn"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -367,6 +422,7 @@ class TournamentGameSeat(_message.Message):
     DECISION_TIME_US_FIELD_NUMBER: _builtins.int
     TIMED_DECISIONS_FIELD_NUMBER: _builtins.int
     PERFORMANCE_SCORE_FIELD_NUMBER: _builtins.int
+    LEFT_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
     """Number of the participant. The index in `seats` is the seat."""
     forfeited: _builtins.bool
@@ -393,6 +449,10 @@ class TournamentGameSeat(_message.Message):
     """Number of decisions with a measured time."""
     performance_score: _builtins.float
     """Its performance score: the mean over the game's Shifts of 10 * points / pizzas."""
+    left: _builtins.bool
+    """Whether it left the tournament, or was replaced, while the game was being played. A substitute
+    plays the game to its end.
+    """
     def __init__(
         self,
         *,
@@ -408,10 +468,11 @@ class TournamentGameSeat(_message.Message):
         decision_time_us: _builtins.int = ...,
         timed_decisions: _builtins.int = ...,
         performance_score: _builtins.float = ...,
+        left: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_time_us", b"decision_time_us", "decisions", b"decisions", "forfeited", b"forfeited", "participant", b"participant", "performance_score", b"performance_score", "place", b"place", "points", b"points", "score", b"score", "substituted", b"substituted", "timed_decisions", b"timed_decisions", "timeouts", b"timeouts", "wrong_actions", b"wrong_actions"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_time_us", b"decision_time_us", "decisions", b"decisions", "forfeited", b"forfeited", "left", b"left", "participant", b"participant", "performance_score", b"performance_score", "place", b"place", "points", b"points", "score", b"score", "substituted", b"substituted", "timed_decisions", b"timed_decisions", "timeouts", b"timeouts", "wrong_actions", b"wrong_actions"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -436,6 +497,7 @@ class TournamentGame(_message.Message):
     RATED_FIELD_NUMBER: _builtins.int
     SHIFTS_FIELD_NUMBER: _builtins.int
     PHYSICAL_FIELD_NUMBER: _builtins.int
+    POSTPONED_FIELD_NUMBER: _builtins.int
     game: _builtins.int
     """Number in the tournament, from 0."""
     round: _builtins.int
@@ -464,6 +526,8 @@ class TournamentGame(_message.Message):
     """Number of Shifts, once it is counted."""
     physical: _builtins.bool
     """Whether it is played at a physical table."""
+    postponed: _builtins.int
+    """Number of times that it was postponed (PostponeGame)."""
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[Global___TournamentGameSeat]:
         """Its seats. Results are set when the game is counted."""
@@ -484,10 +548,11 @@ class TournamentGame(_message.Message):
         rated: _builtins.bool = ...,
         shifts: _builtins.int = ...,
         physical: _builtins.bool = ...,
+        postponed: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["calls", b"calls", "game", b"game", "game_id", b"game_id", "number", b"number", "physical", b"physical", "rated", b"rated", "room_id", b"room_id", "round", b"round", "seats", b"seats", "series_id", b"series_id", "shifts", b"shifts", "state", b"state", "table", b"table"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["calls", b"calls", "game", b"game", "game_id", b"game_id", "number", b"number", "physical", b"physical", "postponed", b"postponed", "rated", b"rated", "room_id", b"room_id", "round", b"round", "seats", b"seats", "series_id", b"series_id", "shifts", b"shifts", "state", b"state", "table", b"table"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -515,9 +580,9 @@ class TournamentStanding(_message.Message):
     PERFORMANCE_SCORE_FIELD_NUMBER: _builtins.int
     RATING_FIELD_NUMBER: _builtins.int
     place: _builtins.int
-    """Place in the tournament, from 1. In a knockout by the last round reached, else by mean score
-    per game; then by mean points, better places when they met, and the draw. 0 for all until a
-    game has been counted.
+    """Place in the tournament, from 1. Those who have played a game stand before those who have not.
+    Then in a knockout by the last round reached, else by mean score per game; then by mean points,
+    better places when they met, and the draw. 0 for all until a game has been counted.
     """
     participant: _builtins.int
     """Number of the participant."""
@@ -726,6 +791,7 @@ class Tournament(_message.Message):
     GAMES_PLAYING_FIELD_NUMBER: _builtins.int
     GAMES_FIELD_NUMBER: _builtins.int
     CREATED_AT_MS_FIELD_NUMBER: _builtins.int
+    PAUSED_FIELD_NUMBER: _builtins.int
     tournament_id: _builtins.str
     """Identifies the tournament: 32 hexadecimal digits."""
     state: Global___TournamentState.ValueType
@@ -742,6 +808,8 @@ class Tournament(_message.Message):
     """Total number of games, as far as known before all rounds are drawn."""
     created_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when it was created."""
+    paused: _builtins.bool
+    """Whether it is paused: no game is called until it is resumed. Games in progress continue."""
     @_builtins.property
     def settings(self) -> Global___TournamentSettings:
         """Its settings, every field set except `draw_seed` and `deal_seed`, which are empty until it is
@@ -765,10 +833,11 @@ class Tournament(_message.Message):
         games_playing: _builtins.int = ...,
         games: _builtins.int = ...,
         created_at_ms: _builtins.int = ...,
+        paused: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["settings", b"settings"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["created_at_ms", b"created_at_ms", "games", b"games", "games_over", b"games_over", "games_playing", b"games_playing", "participants", b"participants", "round", b"round", "rounds", b"rounds", "settings", b"settings", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["created_at_ms", b"created_at_ms", "games", b"games", "games_over", b"games_over", "games_playing", b"games_playing", "participants", b"participants", "paused", b"paused", "round", b"round", "rounds", b"rounds", "settings", b"settings", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -64,9 +64,7 @@ class CreateTournamentResponse(_message.Message):
     join_code: _builtins.str
     """The join code: what participants need to join."""
     owner_token: _builtins.str
-    """Secret that authorises the owner, for AddTableParticipant, GetPhysicalTable, StartTournament and
-    CloseTournament.
-    """
+    """Secret that authorises the owner, for every call that takes an `owner_token`."""
     @_builtins.property
     def tournament(self) -> _tournament_pb2.Tournament:
         """The tournament."""
@@ -258,7 +256,7 @@ class JoinTournamentResponse(_message.Message):
     """The participant's number."""
     ticket: _builtins.str
     """Secret of the participant, which Attach accepts in place of a seat's ticket. Valid as long as
-    the tournament exists.
+    the tournament exists, unless the participant withdraws before the start, is removed or replaced.
     """
     @_builtins.property
     def tournament(self) -> _tournament_pb2.Tournament:
@@ -510,6 +508,422 @@ class CloseTournamentResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___CloseTournamentResponse: _TypeAlias = CloseTournamentResponse  # noqa: Y015
+
+@_typing.final
+class WithdrawParticipantRequest(_message.Message):
+    """Requests to withdraw a participant: `ticket`, or `owner_token` and `participant`."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    TICKET_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    ticket: _builtins.str
+    """`ticket` of JoinTournamentResponse, or empty."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse, or empty."""
+    participant: _builtins.int
+    """Number of the participant; used with `owner_token` only."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        ticket: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        participant: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "participant", b"participant", "ticket", b"ticket", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___WithdrawParticipantRequest: _TypeAlias = WithdrawParticipantRequest  # noqa: Y015
+
+@_typing.final
+class WithdrawParticipantResponse(_message.Message):
+    """The tournament without the participant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___WithdrawParticipantResponse: _TypeAlias = WithdrawParticipantResponse  # noqa: Y015
+
+@_typing.final
+class RemoveParticipantRequest(_message.Message):
+    """Requests to remove a participant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    participant: _builtins.int
+    """Number of the participant."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        participant: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "participant", b"participant", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RemoveParticipantRequest: _TypeAlias = RemoveParticipantRequest  # noqa: Y015
+
+@_typing.final
+class RemoveParticipantResponse(_message.Message):
+    """The tournament without the participant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RemoveParticipantResponse: _TypeAlias = RemoveParticipantResponse  # noqa: Y015
+
+@_typing.final
+class ReplaceParticipantRequest(_message.Message):
+    """Requests to replace a participant by a built-in agent or by somebody else."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
+    NAME_FIELD_NUMBER: _builtins.int
+    KIND_FIELD_NUMBER: _builtins.int
+    MAX_GAMES_FIELD_NUMBER: _builtins.int
+    STATELESS_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    participant: _builtins.int
+    """Number of the participant."""
+    built_in_agent: _builtins.str
+    """Built-in agent that takes the place; empty: somebody else takes it."""
+    name: _builtins.str
+    """Display name, 1..=64 characters, unique in the tournament. May be empty with `built_in_agent`:
+    then it is named after the agent.
+    """
+    kind: _room_pb2.ParticipantKind.ValueType
+    """Kind of the new participant; UNSPECIFIED means that of the former one. Not with
+    `built_in_agent`, which is an agent.
+    """
+    max_games: _builtins.int
+    """Number of games it can play in parallel, 1..=64; 0 means 1."""
+    stateless: _builtins.bool
+    """Declares it stateless: it remembers nothing from one game to the next."""
+    request_id: _builtins.bytes
+    """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
+    lost response, gets the same response with the same ticket. The same id for another participant,
+    name, kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        participant: _builtins.int = ...,
+        built_in_agent: _builtins.str = ...,
+        name: _builtins.str = ...,
+        kind: _room_pb2.ParticipantKind.ValueType = ...,
+        max_games: _builtins.int = ...,
+        stateless: _builtins.bool = ...,
+        request_id: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "kind", b"kind", "max_games", b"max_games", "name", b"name", "owner_token", b"owner_token", "participant", b"participant", "request_id", b"request_id", "stateless", b"stateless", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ReplaceParticipantRequest: _TypeAlias = ReplaceParticipantRequest  # noqa: Y015
+
+@_typing.final
+class ReplaceParticipantResponse(_message.Message):
+    """The tournament with the new participant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    TICKET_FIELD_NUMBER: _builtins.int
+    ticket: _builtins.str
+    """Secret of the new participant, to be passed on to it: as `ticket` of JoinTournamentResponse.
+    Empty for a built-in agent or at a physical table.
+    """
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+        ticket: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["ticket", b"ticket", "tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ReplaceParticipantResponse: _TypeAlias = ReplaceParticipantResponse  # noqa: Y015
+
+@_typing.final
+class PauseTournamentRequest(_message.Message):
+    """Requests to pause a tournament."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PauseTournamentRequest: _TypeAlias = PauseTournamentRequest  # noqa: Y015
+
+@_typing.final
+class PauseTournamentResponse(_message.Message):
+    """The paused tournament."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PauseTournamentResponse: _TypeAlias = PauseTournamentResponse  # noqa: Y015
+
+@_typing.final
+class ResumeTournamentRequest(_message.Message):
+    """Requests to resume a tournament."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ResumeTournamentRequest: _TypeAlias = ResumeTournamentRequest  # noqa: Y015
+
+@_typing.final
+class ResumeTournamentResponse(_message.Message):
+    """The resumed tournament."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def tournament(self) -> _tournament_pb2.Tournament:
+        """The tournament."""
+
+    def __init__(
+        self,
+        *,
+        tournament: _tournament_pb2.Tournament | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["tournament", b"tournament"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ResumeTournamentResponse: _TypeAlias = ResumeTournamentResponse  # noqa: Y015
+
+@_typing.final
+class PostponeGameRequest(_message.Message):
+    """Requests to postpone a game: `ticket` or `owner_token`."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    TICKET_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    GAME_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    ticket: _builtins.str
+    """`ticket` of JoinTournamentResponse, of a participant of the game, or empty."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse, or empty."""
+    game: _builtins.int
+    """Number of the game in the tournament."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        ticket: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        game: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game", b"game", "owner_token", b"owner_token", "ticket", b"ticket", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PostponeGameRequest: _TypeAlias = PostponeGameRequest  # noqa: Y015
+
+@_typing.final
+class PostponeGameResponse(_message.Message):
+    """The postponed game."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAME_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def game(self) -> _tournament_pb2.TournamentGame:
+        """The game."""
+
+    def __init__(
+        self,
+        *,
+        game: _tournament_pb2.TournamentGame | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["game", b"game"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game", b"game"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PostponeGameResponse: _TypeAlias = PostponeGameResponse  # noqa: Y015
+
+@_typing.final
+class CallGameRequest(_message.Message):
+    """Requests to call a game."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    GAME_FIELD_NUMBER: _builtins.int
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateTournamentResponse."""
+    game: _builtins.int
+    """Number of the game in the tournament."""
+    def __init__(
+        self,
+        *,
+        tournament_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        game: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game", b"game", "owner_token", b"owner_token", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___CallGameRequest: _TypeAlias = CallGameRequest  # noqa: Y015
+
+@_typing.final
+class CallGameResponse(_message.Message):
+    """The game that was called."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAME_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def game(self) -> _tournament_pb2.TournamentGame:
+        """The game. It is still due if a participant is away or busy."""
+
+    def __init__(
+        self,
+        *,
+        game: _tournament_pb2.TournamentGame | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["game", b"game"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game", b"game"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___CallGameResponse: _TypeAlias = CallGameResponse  # noqa: Y015
 
 @_typing.final
 class FollowTournamentRequest(_message.Message):

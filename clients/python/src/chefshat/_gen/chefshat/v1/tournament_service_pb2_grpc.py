@@ -27,7 +27,9 @@ if _version_not_supported:
 
 class TournamentServiceStub(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     def __init__(self, channel):
@@ -76,6 +78,41 @@ class TournamentServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentResponse.FromString,
                 _registered_method=True)
+        self.WithdrawParticipant = channel.unary_unary(
+                '/chefshat.v1.TournamentService/WithdrawParticipant',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantResponse.FromString,
+                _registered_method=True)
+        self.RemoveParticipant = channel.unary_unary(
+                '/chefshat.v1.TournamentService/RemoveParticipant',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantResponse.FromString,
+                _registered_method=True)
+        self.ReplaceParticipant = channel.unary_unary(
+                '/chefshat.v1.TournamentService/ReplaceParticipant',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantResponse.FromString,
+                _registered_method=True)
+        self.PauseTournament = channel.unary_unary(
+                '/chefshat.v1.TournamentService/PauseTournament',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentResponse.FromString,
+                _registered_method=True)
+        self.ResumeTournament = channel.unary_unary(
+                '/chefshat.v1.TournamentService/ResumeTournament',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentResponse.FromString,
+                _registered_method=True)
+        self.PostponeGame = channel.unary_unary(
+                '/chefshat.v1.TournamentService/PostponeGame',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameResponse.FromString,
+                _registered_method=True)
+        self.CallGame = channel.unary_unary(
+                '/chefshat.v1.TournamentService/CallGame',
+                request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.CallGameRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.CallGameResponse.FromString,
+                _registered_method=True)
         self.FollowTournament = channel.unary_stream(
                 '/chefshat.v1.TournamentService/FollowTournament',
                 request_serializer=chefshat_dot_v1_dot_tournament__service__pb2.FollowTournamentRequest.SerializeToString,
@@ -100,7 +137,9 @@ class TournamentServiceStub(object):
 
 class TournamentServiceServicer(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     def CreateTournament(self, request, context):
@@ -134,8 +173,8 @@ class TournamentServiceServicer(object):
     def JoinTournament(self, request, context):
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
-        TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
+        fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
         NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -145,7 +184,8 @@ class TournamentServiceServicer(object):
     def AddTableParticipant(self, request, context):
         """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
         does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
+        TOURNAMENT_STARTED);
         INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
         (SHUTTING_DOWN).
         """
@@ -174,6 +214,81 @@ class TournamentServiceServicer(object):
     def CloseTournament(self, request, context):
         """Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
         (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def WithdrawParticipant(self, request, context):
+        """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
+        again, and its ticket ends. After that a substitute plays its games in progress to their end, it
+        forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
+        the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def RemoveParticipant(self, request, context):
+        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
+        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
+        FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ReplaceParticipant(self, request, context):
+        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
+        to somebody else, with all its results. The former participant's ticket ends; games in progress
+        are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+        (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
+        NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
+        (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
+        UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def PauseTournament(self, request, context):
+        """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
+        a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ResumeTournament(self, request, context):
+        """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
+        changes nothing. Errors as PauseTournament.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def PostponeGame(self, request, context):
+        """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
+        participants restarts, and this costs no call. The owner may do so at any time, a participant of
+        the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+        (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
+        (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
+        POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def CallGame(self, request, context):
+        """Calls a game before all others, with as many calls as at first: one that is due, also after it
+        was postponed, or one that is void. In a knockout a void game can be called as long as the next
+        round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
+        GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -258,6 +373,41 @@ def add_TournamentServiceServicer_to_server(servicer, server):
                     request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentResponse.SerializeToString,
             ),
+            'WithdrawParticipant': grpc.unary_unary_rpc_method_handler(
+                    servicer.WithdrawParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantResponse.SerializeToString,
+            ),
+            'RemoveParticipant': grpc.unary_unary_rpc_method_handler(
+                    servicer.RemoveParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantResponse.SerializeToString,
+            ),
+            'ReplaceParticipant': grpc.unary_unary_rpc_method_handler(
+                    servicer.ReplaceParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantResponse.SerializeToString,
+            ),
+            'PauseTournament': grpc.unary_unary_rpc_method_handler(
+                    servicer.PauseTournament,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentResponse.SerializeToString,
+            ),
+            'ResumeTournament': grpc.unary_unary_rpc_method_handler(
+                    servicer.ResumeTournament,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentResponse.SerializeToString,
+            ),
+            'PostponeGame': grpc.unary_unary_rpc_method_handler(
+                    servicer.PostponeGame,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameResponse.SerializeToString,
+            ),
+            'CallGame': grpc.unary_unary_rpc_method_handler(
+                    servicer.CallGame,
+                    request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.CallGameRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_tournament__service__pb2.CallGameResponse.SerializeToString,
+            ),
             'FollowTournament': grpc.unary_stream_rpc_method_handler(
                     servicer.FollowTournament,
                     request_deserializer=chefshat_dot_v1_dot_tournament__service__pb2.FollowTournamentRequest.FromString,
@@ -288,7 +438,9 @@ def add_TournamentServiceServicer_to_server(servicer, server):
  # This class is part of an EXPERIMENTAL API.
 class TournamentService(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     @staticmethod
@@ -497,6 +649,195 @@ class TournamentService(object):
             '/chefshat.v1.TournamentService/CloseTournament',
             chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentRequest.SerializeToString,
             chefshat_dot_v1_dot_tournament__service__pb2.CloseTournamentResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def WithdrawParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/WithdrawParticipant',
+            chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.WithdrawParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def RemoveParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/RemoveParticipant',
+            chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.RemoveParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ReplaceParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/ReplaceParticipant',
+            chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.ReplaceParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def PauseTournament(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/PauseTournament',
+            chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.PauseTournamentResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ResumeTournament(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/ResumeTournament',
+            chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.ResumeTournamentResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def PostponeGame(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/PostponeGame',
+            chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.PostponeGameResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def CallGame(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.TournamentService/CallGame',
+            chefshat_dot_v1_dot_tournament__service__pb2.CallGameRequest.SerializeToString,
+            chefshat_dot_v1_dot_tournament__service__pb2.CallGameResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -28,7 +28,9 @@ GRPC_VERSION: str
 
 class TournamentServiceStub:
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     @_typing.overload
@@ -54,14 +56,15 @@ class TournamentServiceStub:
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
-    TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
+    fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
     NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
     does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
+    TOURNAMENT_STARTED);
     INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
     (SHUTTING_DOWN).
     """
@@ -78,6 +81,53 @@ class TournamentServiceStub:
     CloseTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]
     """Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    WithdrawParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.WithdrawParticipantRequest, _tournament_service_pb2.WithdrawParticipantResponse]
+    """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
+    again, and its ticket ends. After that a substitute plays its games in progress to their end, it
+    forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
+    the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    RemoveParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]
+    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
+    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
+    FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    ReplaceParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ReplaceParticipantRequest, _tournament_service_pb2.ReplaceParticipantResponse]
+    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
+    to somebody else, with all its results. The former participant's ticket ends; games in progress
+    are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+    (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
+    NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
+    (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
+    UNAVAILABLE (SHUTTING_DOWN).
+    """
+    PauseTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.PauseTournamentRequest, _tournament_service_pb2.PauseTournamentResponse]
+    """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
+    a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    ResumeTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ResumeTournamentRequest, _tournament_service_pb2.ResumeTournamentResponse]
+    """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
+    changes nothing. Errors as PauseTournament.
+    """
+    PostponeGame: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.PostponeGameRequest, _tournament_service_pb2.PostponeGameResponse]
+    """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
+    participants restarts, and this costs no call. The owner may do so at any time, a participant of
+    the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+    (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
+    (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
+    POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    CallGame: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CallGameRequest, _tournament_service_pb2.CallGameResponse]
+    """Calls a game before all others, with as many calls as at first: one that is due, also after it
+    was postponed, or one that is void. In a knockout a void game can be called as long as the next
+    round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
+    GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     FollowTournament: _grpc.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]
     """Streams the tournament now and after every change, at most about four times a second, until it
@@ -103,7 +153,9 @@ class TournamentServiceStub:
 @_typing.type_check_only
 class TournamentServiceAsyncStub(TournamentServiceStub):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -126,14 +178,15 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
-    TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
+    fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
     NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
     does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
+    TOURNAMENT_STARTED);
     INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
     (SHUTTING_DOWN).
     """
@@ -150,6 +203,53 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     CloseTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]  # type: ignore[assignment]
     """Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    WithdrawParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.WithdrawParticipantRequest, _tournament_service_pb2.WithdrawParticipantResponse]  # type: ignore[assignment]
+    """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
+    again, and its ticket ends. After that a substitute plays its games in progress to their end, it
+    forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
+    the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    RemoveParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]  # type: ignore[assignment]
+    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
+    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
+    FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    ReplaceParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ReplaceParticipantRequest, _tournament_service_pb2.ReplaceParticipantResponse]  # type: ignore[assignment]
+    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
+    to somebody else, with all its results. The former participant's ticket ends; games in progress
+    are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+    (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
+    NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
+    (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
+    UNAVAILABLE (SHUTTING_DOWN).
+    """
+    PauseTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.PauseTournamentRequest, _tournament_service_pb2.PauseTournamentResponse]  # type: ignore[assignment]
+    """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
+    a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    ResumeTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ResumeTournamentRequest, _tournament_service_pb2.ResumeTournamentResponse]  # type: ignore[assignment]
+    """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
+    changes nothing. Errors as PauseTournament.
+    """
+    PostponeGame: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.PostponeGameRequest, _tournament_service_pb2.PostponeGameResponse]  # type: ignore[assignment]
+    """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
+    participants restarts, and this costs no call. The owner may do so at any time, a participant of
+    the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+    (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
+    (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
+    POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    CallGame: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CallGameRequest, _tournament_service_pb2.CallGameResponse]  # type: ignore[assignment]
+    """Calls a game before all others, with as many calls as at first: one that is due, also after it
+    was postponed, or one that is void. In a knockout a void game can be called as long as the next
+    round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
+    GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     FollowTournament: _aio.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]  # type: ignore[assignment]
     """Streams the tournament now and after every change, at most about four times a second, until it
@@ -174,7 +274,9 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
-    the answer for a private tournament without a secret of it (`Visibility`).
+    the answer for a private tournament without a secret of it (`Visibility`). The calls from
+    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
+    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
     """
 
     @_abc_1.abstractmethod
@@ -219,8 +321,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.JoinTournamentResponse, _abc.Awaitable[_tournament_service_pb2.JoinTournamentResponse]]:
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
-        TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
+        fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
         NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
@@ -232,7 +334,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.AddTableParticipantResponse, _abc.Awaitable[_tournament_service_pb2.AddTableParticipantResponse]]:
         """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
         does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, TOURNAMENT_STARTED);
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
+        TOURNAMENT_STARTED);
         INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
         (SHUTTING_DOWN).
         """
@@ -267,6 +370,95 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.CloseTournamentResponse, _abc.Awaitable[_tournament_service_pb2.CloseTournamentResponse]]:
         """Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
         (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def WithdrawParticipant(
+        self,
+        request: _tournament_service_pb2.WithdrawParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.WithdrawParticipantResponse, _abc.Awaitable[_tournament_service_pb2.WithdrawParticipantResponse]]:
+        """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
+        again, and its ticket ends. After that a substitute plays its games in progress to their end, it
+        forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
+        the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def RemoveParticipant(
+        self,
+        request: _tournament_service_pb2.RemoveParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.RemoveParticipantResponse, _abc.Awaitable[_tournament_service_pb2.RemoveParticipantResponse]]:
+        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
+        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
+        FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def ReplaceParticipant(
+        self,
+        request: _tournament_service_pb2.ReplaceParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.ReplaceParticipantResponse, _abc.Awaitable[_tournament_service_pb2.ReplaceParticipantResponse]]:
+        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
+        to somebody else, with all its results. The former participant's ticket ends; games in progress
+        are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+        (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
+        NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
+        (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
+        UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def PauseTournament(
+        self,
+        request: _tournament_service_pb2.PauseTournamentRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.PauseTournamentResponse, _abc.Awaitable[_tournament_service_pb2.PauseTournamentResponse]]:
+        """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
+        a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def ResumeTournament(
+        self,
+        request: _tournament_service_pb2.ResumeTournamentRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.ResumeTournamentResponse, _abc.Awaitable[_tournament_service_pb2.ResumeTournamentResponse]]:
+        """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
+        changes nothing. Errors as PauseTournament.
+        """
+
+    @_abc_1.abstractmethod
+    def PostponeGame(
+        self,
+        request: _tournament_service_pb2.PostponeGameRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.PostponeGameResponse, _abc.Awaitable[_tournament_service_pb2.PostponeGameResponse]]:
+        """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
+        participants restarts, and this costs no call. The owner may do so at any time, a participant of
+        the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+        (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
+        (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
+        POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def CallGame(
+        self,
+        request: _tournament_service_pb2.CallGameRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_tournament_service_pb2.CallGameResponse, _abc.Awaitable[_tournament_service_pb2.CallGameResponse]]:
+        """Calls a game before all others, with as many calls as at first: one that is due, also after it
+        was postponed, or one that is void. In a knockout a void game can be called as long as the next
+        round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
+        GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod

@@ -1,0 +1,55 @@
+// A special moment of the game, over the pizza for a few seconds, with what it means. The event
+// itself is read out with all others (following.ts), its explanation here.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { hidden } from "../../experiment/hiding";
+import { t } from "../../i18n";
+import { announce } from "../../parts/Announcer";
+import { Drawing } from "../../parts/Drawing";
+import { isOn } from "../../preferences";
+import { type Moment as Happening, type MomentKind, momentSince } from "../model/moments";
+import type { TableState } from "../model/state";
+import { distinctName } from "../words";
+import css from "./Moment.module.css";
+
+/** More events than this at once are a past that is caught up with. */
+const MOST_AT_ONCE = 14;
+/** How long a moment is shown, milliseconds. */
+const SHOWN_MS = 4500;
+
+const DRAWINGS: Record<MomentKind, string> = {
+  foodFight: "face-10-tomato",
+  dinner: "role-chef",
+  opening: "golden",
+  lastCard: "face-1-truffle",
+};
+
+export function Moment({ table }: { table: TableState }) {
+  const [shown, setShown] = useState<Happening | undefined>(undefined);
+  // The past of a table that has just been opened is no moment.
+  const last = table.log.at(-1)?.sequence ?? 0;
+  const seen = useRef(last);
+  useEffect(() => {
+    const fresh = last - seen.current;
+    const found = fresh > 0 && fresh <= MOST_AT_ONCE ? momentSince(table, seen.current) : undefined;
+    seen.current = last;
+    if (!found || !isOn("moments") || hidden.peek().includes("log")) return;
+    setShown(found);
+    const words = t().table.moments[found.kind];
+    announce(found.kind === "lastCard" ? `${words.title(distinctName(table, found.seat))}.` : words.text);
+  }, [last]);
+  useEffect(() => {
+    if (!shown) return;
+    const timer = setTimeout(() => setShown(undefined), SHOWN_MS);
+    return () => clearTimeout(timer);
+  }, [shown]);
+  if (!shown) return null;
+  const words = t().table.moments[shown.kind];
+  return (
+    <div class={css.moment} data-part="moment" key={shown.sequence} aria-hidden="true">
+      <Drawing name={DRAWINGS[shown.kind]} class={css.picture} />
+      <p class={css.title}>{words.title(distinctName(table, shown.seat))}</p>
+      <p>{words.text}</p>
+    </div>
+  );
+}

@@ -1,0 +1,206 @@
+// The organiser's changes of a tournament by hand: pausing, and for each participant and game what
+// can be done about it.
+
+import { useState } from "preact/hooks";
+import {
+  type Tournament,
+  type TournamentGame,
+  TournamentGameState,
+  TournamentState,
+} from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { CopyLine } from "../lobby/Invite";
+import { MAX_NAME } from "../lobby/room-form";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import { ConfirmButton } from "../parts/ConfirmButton";
+import { SelectField, TextField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import css from "./ByHand.module.css";
+import { type LiveTournament, useGames } from "./following";
+import { callGame, postponeGame, removeParticipant, replaceByAgent, replaceByPerson, setPaused } from "./hosting";
+import { joinedIn, nameOf } from "./structure";
+
+/** Pauses or resumes the tournament, and says what that means. */
+export function Pause({ tournament }: { tournament: Tournament }) {
+  const { tournamentId, paused } = tournament;
+  const words = t().organise.own.pause;
+  const { busy, fault, run } = useAttempt();
+  const act = async () => {
+    await setPaused(tournamentId, !paused);
+    return false;
+  };
+  return (
+    <div class={css.part} data-part="pause">
+      {paused && <Notice kind="hint">{words.isPaused}</Notice>}
+      <div class={css.row}>
+        <Button look={paused ? "main" : "plain"} busy={busy} onClick={() => run(act)}>
+          {paused ? words.resume : words.pause}
+        </Button>
+        {!paused && <span class="soft small">{words.text}</span>}
+      </div>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </div>
+  );
+}
+
+/** The participants, each with what can be done about it. */
+export function ManageParticipants({ tournament, agents }: { tournament: Tournament; agents: readonly string[] }) {
+  const words = t().organise.own.people;
+  const listed = joinedIn(tournament);
+  // Stays after the participant has changed.
+  const [link, setLink] = useState<{ name: string; address: string } | null>(null);
+  if (listed.length === 0) return null;
+  return (
+    <details class={css.part} data-part="manage-participants">
+      <summary>{words.title}</summary>
+      {link && (
+        <Notice kind="good">
+          {words.linkFor(link.name)}
+          <CopyLine label={words.link} text={link.address} />
+        </Notice>
+      )}
+      <ul class={css.list}>
+        {listed.map(({ participant, withdrawn, filler, former }) => (
+          <li key={participant}>
+            <div>
+              <b>{nameOf(tournament, participant)}</b>
+              {withdrawn && <span class="soft small"> {words.withdrawn}</span>}
+              {former.length > 0 && (
+                <span class="soft small"> {words.former(former.map(({ name }) => name).join(", "))}</span>
+              )}
+            </div>
+            <details class={css.change}>
+              <summary>
+                {words.change}
+                <span class="visually-hidden"> {nameOf(tournament, participant)}</span>
+              </summary>
+              {!withdrawn && !filler && (
+                <ConfirmButton
+                  label={words.remove}
+                  confirm={words.removeDo}
+                  act={() => removeParticipant(tournament.tournamentId, participant).then(() => false)}
+                >
+                  {tournament.state === TournamentState.OPEN ? words.removeOpen : words.removePlaying}
+                </ConfirmButton>
+              )}
+              <Replace {...{ tournament, participant, agents, onLink: setLink }} />
+            </details>
+          </li>
+        ))}
+      </ul>
+    </details>
+  );
+}
+
+interface ReplaceProps {
+  tournament: Tournament;
+  participant: number;
+  agents: readonly string[];
+  onLink: (link: { name: string; address: string }) => void;
+}
+
+/** Gives the place of a participant to a built-in agent or to another person. */
+function Replace({ tournament, participant, agents, onLink }: ReplaceProps) {
+  const words = t().organise.own.people;
+  const { tournamentId } = tournament;
+  const [by, setBy] = useState("");
+  const [name, setName] = useState("");
+  const [tried, setTried] = useState(false);
+  const { busy, fault, run } = useAttempt();
+  const replace = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    if (by === "" && name.trim() === "") return;
+    run(async () => {
+      if (by === "") onLink({ name: name.trim(), address: await replaceByPerson(tournamentId, participant, name) });
+      else await replaceByAgent(tournamentId, participant, by);
+      setName("");
+      setTried(false);
+      return false;
+    });
+  };
+  return (
+    <form class={css.form} onSubmit={replace}>
+      <SelectField
+        label={words.replace}
+        value={by}
+        options={[
+          { value: "", label: words.somebody },
+          ...agents.map((value) => ({ value, label: words.agent(value) })),
+        ]}
+        onPick={setBy}
+      />
+      {by === "" && (
+        <TextField
+          label={words.newName}
+          value={name}
+          onText={setName}
+          maxLength={MAX_NAME}
+          autoComplete="off"
+          fault={tried && name.trim() === "" ? t().organise.problems.nameMissing : undefined}
+        />
+      )}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <Button type="submit" busy={busy}>
+        {words.replaceDo}
+      </Button>
+    </form>
+  );
+}
+
+/** The games that are due or void, each with what can be done about it; null without one. */
+export function ManageGames({ live }: { live: LiveTournament }) {
+  const { tournament } = live;
+  const words = t().organise.own.games;
+  const changeable = useGames(live).filter(
+    ({ state }) => state === TournamentGameState.DUE || state === TournamentGameState.VOID,
+  );
+  if (changeable.length === 0) return null;
+  return (
+    <details class={css.part} data-part="manage-games">
+      <summary>{words.title}</summary>
+      <p class="soft small">{words.text}</p>
+      <ul class={css.list}>
+        {changeable.slice(0, MAX_LISTED).map((game) => (
+          <Game key={game.game} tournament={tournament} game={game} />
+        ))}
+      </ul>
+      {changeable.length > MAX_LISTED && <p class="soft small">{words.more(changeable.length - MAX_LISTED)}</p>}
+    </details>
+  );
+}
+
+/** Most games listed. */
+const MAX_LISTED = 50;
+
+function Game({ tournament, game }: { tournament: Tournament; game: TournamentGame }) {
+  const { tournamentId } = tournament;
+  const words = t().organise.own.games;
+  const { round, table, games } = t().tournaments;
+  const { busy, fault, run } = useAttempt();
+  const isDue = game.state === TournamentGameState.DUE;
+  const act = (change: () => Promise<void>) => run(() => change().then(() => false));
+  const names = game.seats.map(({ participant }) => nameOf(tournament, participant));
+  return (
+    <li>
+      <div>
+        <b>{games.of(`${round(game.round)}, ${table(game.table)}`, game.number)}</b>{" "}
+        <span class="soft small">
+          {names.join(", ")} · {isDue ? games.due : games.void}
+        </span>
+      </div>
+      <div class={css.row}>
+        <Button busy={busy} onClick={() => act(() => callGame(tournamentId, game.game))}>
+          {words.call}
+        </Button>
+        {isDue && (
+          <Button look="quiet" busy={busy} onClick={() => act(() => postponeGame(tournamentId, game.game))}>
+            {words.postpone}
+          </Button>
+        )}
+      </div>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </li>
+  );
+}

@@ -1,0 +1,121 @@
+// What calls a person back on their turn, and keeps the screen on: each way only if it is switched on
+// and allowed, and never asked for by itself.
+
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Settings } from "../src/parts/Settings";
+import { useTab } from "../src/parts/tab";
+import { isOn, setPreference } from "../src/preferences";
+import { useAttention } from "../src/table/attention";
+import type { OpenDecision } from "../src/table/model/live";
+import { root } from "./mounted";
+
+const TURN = { id: 7n } as unknown as OpenDecision;
+
+/** The title of a page, as the layout sets it, around a table. */
+function Page({ decision, playing }: { decision: OpenDecision | undefined; playing: boolean }) {
+  useTab("Table");
+  return <AtTable decision={decision} playing={playing} />;
+}
+
+function AtTable({ decision, playing }: { decision: OpenDecision | undefined; playing: boolean }) {
+  useAttention(decision, playing);
+  return null;
+}
+
+const notified = vi.fn();
+const asked = vi.fn(async () => "granted");
+const vibrate = vi.fn();
+const released = vi.fn();
+const locked = vi.fn(async () => ({ release: released }));
+let focused = false;
+
+class FakeNotification {
+  static permission = "granted";
+  static requestPermission = asked;
+  onclick = () => {};
+  constructor(title: string) {
+    notified(title);
+  }
+  close() {}
+}
+
+beforeEach(() => {
+  vi.stubGlobal("Notification", FakeNotification);
+  vi.stubGlobal("isSecureContext", true);
+  vi.spyOn(document, "hasFocus").mockImplementation(() => focused);
+  Object.defineProperties(navigator, {
+    vibrate: { value: vibrate, configurable: true },
+    userActivation: { value: { hasBeenActive: true }, configurable: true },
+    wakeLock: { value: { request: locked }, configurable: true },
+    serviceWorker: { value: { getRegistration: async () => undefined }, configurable: true },
+  });
+  for (const mock of [notified, asked, vibrate, released, locked]) mock.mockClear();
+  focused = false;
+});
+
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+  for (const name of ["tab", "vibration", "awake"] as const) setPreference(name, true);
+  setPreference("notification", false);
+});
+
+const show = (decision: OpenDecision | undefined, playing = true) =>
+  act(() => render(<Page decision={decision} playing={playing} />, root));
+
+test("the title and the icon say whose turn it is, as long as it is", async () => {
+  const icon = document.head.appendChild(document.createElement("link"));
+  icon.rel = "icon";
+  icon.href = "/hat.svg";
+  const plain = icon.href;
+  await show(undefined);
+  expect([document.title, icon.href]).toEqual(["Table", plain]);
+  await show(TURN);
+  expect([document.title, icon.href]).toEqual(["Your turn · Table", expect.stringContaining("data:image/svg+xml")]);
+  await show(undefined);
+  expect([document.title, icon.href]).toEqual(["Table", plain]);
+  icon.remove();
+});
+
+test("a turn vibrates and keeps the screen on until the game ends; nothing is asked for", async () => {
+  await show(TURN);
+  expect(vibrate).toHaveBeenCalledTimes(1);
+  expect(locked).toHaveBeenCalledTimes(1);
+  expect(released).not.toHaveBeenCalled();
+  await show(undefined, false);
+  await vi.waitFor(() => expect(released).toHaveBeenCalled());
+  expect([asked.mock.calls, notified.mock.calls]).toEqual([[], []]);
+});
+
+test("all of it can be switched off", async () => {
+  for (const name of ["tab", "vibration", "awake"] as const) setPreference(name, false);
+  await show(TURN);
+  expect(document.title).toBe("Table");
+  expect([vibrate.mock.calls, locked.mock.calls]).toEqual([[], []]);
+});
+
+test("a notification comes only if it is switched on and the page is not seen", async () => {
+  setPreference("notification", true);
+  focused = true;
+  await show(TURN);
+  focused = false;
+  await show({ ...TURN, id: 8n });
+  await vi.waitFor(() => expect(notified.mock.calls).toEqual([["Your turn"]]));
+});
+
+test.each([
+  ["granted", true],
+  ["denied", false],
+])("the settings ask the browser on a click; if it is %s, the switch is %s", async (answer, on) => {
+  asked.mockImplementation(async () => answer);
+  await act(() => render(<Settings onClose={() => {}} />, root));
+  expect(asked).not.toHaveBeenCalled();
+  const label = [...root.querySelectorAll("label")].find((one) => one.textContent === "Notify me on my turn");
+  await act(() => root.querySelector<HTMLInputElement>(`#${CSS.escape(label?.htmlFor ?? "")}`)?.click());
+  await vi.waitFor(() => expect(isOn("notification")).toBe(on));
+  expect(asked).toHaveBeenCalledTimes(1);
+  await act(() => undefined);
+  expect(root.textContent?.includes("does not allow notifications")).toBe(!on);
+});

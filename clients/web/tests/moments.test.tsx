@@ -1,0 +1,90 @@
+// Special moments: which events are one, and that they are shown once, with what they mean.
+
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, expect, test, vi } from "vitest";
+import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
+import { SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
+import { setPreference } from "../src/preferences";
+import { momentSince } from "../src/table/model/moments";
+import { applyEvents } from "../src/table/model/reduce";
+import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
+import { Moment } from "../src/table/view/Moment";
+import { root } from "./mounted";
+import { RECORDS, recorded } from "./record";
+import { stateOf } from "./table-state";
+
+type Kind = NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>;
+
+const start = () => emptyTable((stateOf().room?.seats ?? []).map(seatFromParticipant));
+const played = (table: TableState, ...kinds: Kind[]) =>
+  applyEvents(
+    table,
+    kinds.map((kind, index) => create(GameEventSchema, { sequence: BigInt(table.nextSequence + index), kind })),
+  );
+const deal: Kind = { case: "shiftStarted", value: { shift: 1 } };
+const play = (seat: number, face: number, quantity: number, cardsLeft: number): Kind => {
+  return { case: "play", value: { seat, face, quantity, cardsLeft } };
+};
+
+afterEach(() => {
+  vi.useRealTimers();
+  setPreference("moments", true);
+});
+
+test.each<[string, Kind[], string | undefined]>([
+  ["the Golden card opens a Shift", [deal, play(1, 11, 2, 15)], "opening"],
+  ["a later play", [deal, play(1, 11, 2, 15), play(2, 9, 2, 15)], "opening"],
+  ["a last card", [deal, play(1, 11, 2, 15), play(2, 9, 2, 1)], "lastCard"],
+  ["Dinner is Served", [deal, declared(SpecialAction.DINNER_IS_SERVED)], "dinner"],
+  ["a Food Fight", [deal, declared(SpecialAction.FOOD_FIGHT)], "foodFight"],
+  ["a deal", [deal], undefined],
+])("%s", (_, kinds, kind) => {
+  expect(momentSince(played(start(), ...kinds), 0)?.kind).toBe(kind);
+});
+
+test("only events after a number count", () => {
+  const table = played(start(), deal, play(1, 11, 2, 15));
+  expect(momentSince(table, table.nextSequence - 1)).toBeUndefined();
+});
+
+test.each(RECORDS)("each Shift of %s has one opening at most", (name) => {
+  let table = emptyTable();
+  let shifts = 0;
+  let openings = 0;
+  for (const { line } of recorded(name)) {
+    if (line.case !== "event") continue;
+    const before = table.nextSequence - 1;
+    table = applyEvents(table, [line.value]);
+    if (line.value.kind.case === "shiftStarted") shifts += 1;
+    if (momentSince(table, before)?.kind === "opening") openings += 1;
+  }
+  expect(openings).toBeLessThanOrEqual(shifts);
+});
+
+test("a moment is shown for a while; the past of a table is not", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+  const dealt = played(start(), deal);
+  const opened = played(dealt, play(1, 11, 2, 15));
+  const show = (table: TableState) => act(() => render(<Moment table={table} />, root));
+  const shown = () => root.querySelector('[data-part~="moment"]')?.textContent;
+  await show(opened);
+  expect(shown()).toBeUndefined();
+  await show(played(opened, play(2, 9, 2, 1)));
+  expect(shown()).toContain("Cleo has one card left");
+  await act(() => void vi.advanceTimersByTime(10_000));
+  expect(shown()).toBeUndefined();
+});
+
+test("moments can be switched off", async () => {
+  setPreference("moments", false);
+  const dealt = played(start(), deal);
+  await act(() => render(<Moment table={dealt} />, root));
+  await act(() => render(<Moment table={played(dealt, play(1, 11, 2, 15))} />, root));
+  expect(root.querySelector('[data-part~="moment"]')).toBeNull();
+});
+
+function declared(action: SpecialAction): Kind {
+  return { case: "specialActionDeclared", value: { seat: 1, action } };
+}

@@ -1,0 +1,152 @@
+// Choosing a play before the turn: it is sent on the turn, unless it has become illegal; and passing
+// by itself.
+
+import { signal } from "@preact/signals";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import type { Acting } from "../src/table/acting";
+import { passDelayMs, useAutoPass } from "../src/table/auto-pass";
+import { actionOf, type Move } from "../src/table/model/actions";
+import { cardsFromNumbers, playedCards } from "../src/table/model/cards";
+import { type OpenDecision, startLive } from "../src/table/model/live";
+import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
+import { TableView } from "../src/table/view/TableView";
+import { root } from "./mounted";
+import { SEATS, stateOf } from "./table-state";
+
+const FACES = 11;
+const OWN = 0;
+const HAND = cardsFromNumbers([3, 8, 8, 9, 9], false, FACES);
+const EIGHTS: Move = { kind: "play", face: 8, quantity: 2, jokers: 0 };
+const PASS: Move = { kind: "pass" };
+const action = (move: Move) => actionOf(move, FACES);
+
+beforeEach(() => vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] }));
+afterEach(() => vi.useRealTimers());
+
+/** Others decide while 9s lie on the board. */
+function table(changed: Partial<TableState> = {}): TableState {
+  const seats = (stateOf().room?.seats ?? []).map((seat) => ({
+    ...seatFromParticipant(seat),
+    cardsLeft: 5,
+    hand: seat.seat === OWN ? HAND : undefined,
+  }));
+  expect(seats).toHaveLength(SEATS.length);
+  const board = playedCards(9, 2, 0, false);
+  return { ...emptyTable(seats), phase: "pizza", shift: 1, pizza: 1, turn: 5, board, boardBy: 1, next: 2, ...changed };
+}
+
+const turn = (...moves: Move[]) =>
+  ({
+    id: 7n,
+    kind: DecisionKind.TURN,
+    hand: HAND,
+    legal: moves.map(action),
+    timeLeftMs: 0,
+    bankLeftMs: 0,
+    receivedAtMs: 0,
+  }) as unknown as OpenDecision;
+
+let answers: [number, string | undefined][] = [];
+const show = (table: TableState, decision?: OpenDecision, plans = true) => {
+  const onAnswer = (action: number, automatic?: string) => answers.push([action, automatic]);
+  return act(() => render(<TableView {...{ table, decision, plans, onAnswer }} own={OWN} untimed />, root));
+};
+const button = (id: string) => root.querySelector<HTMLButtonElement>(`[data-action="${id}"]`);
+const click = (id: string) => act(() => button(id)?.click());
+const pick = (face: number) => act(() => root.querySelector<HTMLElement>(`[data-card="${face}"]`)?.click());
+const note = () => root.querySelector('[role="note"]')?.textContent;
+const wait = () => act(() => void vi.advanceTimersByTime(60_000));
+
+beforeEach(() => {
+  answers = [];
+});
+
+test("a chosen play is sent on the turn", async () => {
+  await show(table());
+  await pick(8);
+  expect(button("plan-play")?.textContent).toBe("Then: 2 × 8");
+  await click("plan-play");
+  await wait();
+  expect(answers).toEqual([]);
+  expect(note()).toBe("Chosen for your turn: 2 × 8");
+  await show(table(), turn(EIGHTS, PASS));
+  await wait();
+  expect(answers).toEqual([[action(EIGHTS), "planned"]]);
+});
+
+test("it can be taken back until it is sent", async () => {
+  await show(table());
+  await pick(8);
+  await click("plan-play");
+  await show(table(), turn(EIGHTS, PASS));
+  await click("unplan");
+  await wait();
+  expect(answers).toEqual([]);
+  // The cards stay picked.
+  await click("play");
+  expect(answers).toEqual([[action(EIGHTS), undefined]]);
+});
+
+test.each([
+  ["the board rises above it", { board: playedCards(7, 2, 0, false) }],
+  ["the pizza is done", { pizza: 2, board: [] }],
+])("it is dropped when %s", async (_, changed) => {
+  await show(table());
+  await pick(8);
+  await click("plan-play");
+  await show(table(changed));
+  expect(note()).toBe("Not possible any more: 2 × 8. Choose again.");
+  await show(table(changed), turn(EIGHTS, PASS));
+  await wait();
+  expect(answers).toEqual([]);
+});
+
+test("a pass is planned too, and cards that do not beat the board are refused", async () => {
+  await show(table());
+  await pick(9);
+  expect(note()).toBe("9 is not rarer than 9: a lower number is needed.");
+  await click("plan-pass");
+  await show(table(), turn(EIGHTS, PASS));
+  await wait();
+  expect(answers).toEqual([[action(PASS), "planned"]]);
+});
+
+test.each([
+  ["without the preference, or in a study", {}, false],
+  ["with real cards", { physical: true }, true],
+  ["while the own play is on its way", { next: OWN }, true],
+])("nothing is chosen before the turn %s", async (_, changed, plans) => {
+  await show(table(changed), undefined, plans);
+  expect(button("plan-pass")).toBeNull();
+  await pick(8);
+  expect(note()).toBe("It is not your turn.");
+});
+
+test.each([
+  ["nothing but a pass is legal", [PASS], true, [[action(PASS), "auto_pass"]]],
+  ["something can be played", [EIGHTS, PASS], true, []],
+  ["it is switched off", [PASS], false, []],
+])("when %s, the page passes by itself or does not", async (_, moves, on, expected) => {
+  const live = signal({ ...startLive(table(), OWN), decision: turn(...moves) });
+  const answer = (action: number, automatic?: string) => answers.push([action, automatic]);
+  const acting = { live, answer } as unknown as Acting;
+  const AutoPass = () => <>{String(useAutoPass(acting, on))}</>;
+  await act(() => render(<AutoPass />, root));
+  expect(root.textContent).toBe(String(expected.length > 0));
+  await act(() => void vi.advanceTimersByTime(1000));
+  expect(answers).toEqual([]);
+  await wait();
+  expect(answers).toEqual(expected);
+});
+
+test("a pass by itself takes as long as one of the person's decisions, within bounds", () => {
+  expect(passDelayMs([], 0, 0)).toBe(2000);
+  expect(passDelayMs([], 0, 1)).toBe(5500);
+  const own = [100, 3000, 60_000];
+  expect([0, 0.5, 0.99].map((random) => passDelayMs(own, 0, random))).toEqual([1500, 3000, 9000]);
+  // Never more than a third of the time that is left.
+  expect(passDelayMs(own, 6000, 0.99)).toBe(2000);
+});

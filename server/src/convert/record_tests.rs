@@ -1,0 +1,195 @@
+//! Records of games whose seats come and go: they verify, and do not when the time of an absence is
+//! changed.
+
+use chefshat_engine::{RuleSetSpec, Seat, Stop};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::replay::replay;
+use chefshat_room::ConnectionId;
+use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
+use chefshat_room::testing::{OPEN, Table, ms};
+
+use super::record_lines;
+
+/// A small generator of random numbers (SplitMix64).
+struct Chance(u64);
+
+impl Chance {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (mixed ^ (mixed >> 31)) % bound
+    }
+
+    fn index(&mut self, length: usize) -> usize {
+        usize::try_from(self.below(length as u64)).expect("below the length")
+    }
+}
+
+fn policy(chance: &mut Chance) -> Policy {
+    let absence_time = match chance.below(4) {
+        0 => None,
+        _ => Some(ms(chance.below(1_200))),
+    };
+    Policy {
+        decision_time: ms(1_000),
+        bank: ms(chance.below(3) * 700),
+        max_timeouts: 3,
+        pace: Some(ms(0)),
+        abort: AbortPolicy::Never,
+        clocks: vec![KindClock {
+            kind: ParticipantKind::Human,
+            decision_time: Some(ms(1_500)),
+            bank: None,
+            absence_time: absence_time.map(|_| ms(400)),
+        }],
+        absence_time,
+        ..Policy::default()
+    }
+}
+
+/// Plays a random game to its end. Seats lose their connections and return at any time.
+fn played(chance: &mut Chance) -> Table {
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(2),
+        ..RuleSetSpec::default()
+    };
+    let mut table = Table::with_rules(policy(chance), vec![OPEN; 4], rules);
+    for seat in 0..4 {
+        let kind = match seat % 2 {
+            0 => ParticipantKind::Agent,
+            _ => ParticipantKind::Human,
+        };
+        table.join(kind).expect("a seat is free");
+    }
+    let mut connections: Vec<Option<ConnectionId>> = (0..4)
+        .map(|seat| Some(table.attach(Seat::new(seat))))
+        .collect();
+    while !table.core.state().is_over() {
+        let open = table.core.awaited().map(|open| open.decision.seat);
+        let seat = chance.index(4);
+        match chance.below(12) {
+            0 => {
+                if let Some(connection) = connections[seat].take() {
+                    table.lost(Seat::new(seat), connection);
+                }
+            }
+            1..3 => connections[seat] = Some(table.attach(Seat::new(seat))),
+            3..5 => table.pass_time(ms(chance.below(900))),
+            // Microseconds are truncated, too.
+            5 => table.now += std::time::Duration::from_micros(chance.below(1_000)),
+            _ => match open {
+                Some(open) if connections[open.index()].is_some() => {
+                    let (seat, id) = table.open();
+                    let action = table.legal(chance.index(9));
+                    table.answer(seat, id, action);
+                }
+                _ => table.pass_time(ms(chance.below(300))),
+            },
+        }
+        // What is due happens before anything else.
+        table.pass_time(ms(0));
+    }
+    table
+}
+
+fn record_of(table: &Table) -> Vec<v1::RecordLine> {
+    record_lines(table.core.header(), &table.journal)
+}
+
+#[test]
+fn games_with_absences_verify() {
+    let mut substituted = 0;
+    for seed in 0..300 {
+        let mut chance = Chance(seed);
+        let table = played(&mut chance);
+        let lines = record_of(&table);
+        replay(&lines).unwrap_or_else(|error| panic!("game {seed}: {error}"));
+        substituted += lines.iter().filter(|line| is_substitution(line)).count();
+    }
+    assert!(substituted > 100, "only {substituted} substitutions");
+}
+
+fn is_substitution(line: &v1::RecordLine) -> bool {
+    matches!(&line.line, Some(Line::Event(event)) if matches!(event.kind, Some(Kind::Substituted(_))))
+}
+
+/// The record of a game in which the first seat to decide is away for its absence time.
+fn record_with_an_absence(absence_time: Option<std::time::Duration>) -> Vec<v1::RecordLine> {
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::default()
+    };
+    let policy = Policy {
+        decision_time: ms(1_000),
+        bank: ms(500),
+        abort: AbortPolicy::Never,
+        absence_time,
+        ..Policy::default()
+    };
+    let mut table = Table::with_rules(policy, vec![OPEN; 4], rules);
+    table.fill();
+    let (seat, _) = table.open();
+    let connection = u64::try_from(seat.index()).expect("small") + 1;
+    table.lost(seat, ConnectionId(connection));
+    while !table.core.state().is_over() {
+        match table.core.awaited().map(|open| open.decision.seat) {
+            Some(open) if open != seat => {
+                table.play_one();
+            }
+            _ => table.pass_time(ms(100)),
+        }
+    }
+    record_of(&table)
+}
+
+/// The first decision that was taken because its seat was away.
+fn absent(lines: &mut [v1::RecordLine]) -> &mut v1::DecisionRecord {
+    let mut decisions = lines.iter_mut().filter_map(|line| match &mut line.line {
+        Some(Line::Decision(decision)) => Some(decision),
+        _ => None,
+    });
+    let source = v1::DecisionSource::Disconnected;
+    decisions
+        .find(|decision| decision.source() == source)
+        .expect("a seat was away")
+}
+
+#[test]
+fn the_record_of_an_absence_cannot_be_changed() {
+    let lines = record_with_an_absence(Some(ms(400)));
+    replay(&lines).expect("the record verifies");
+    type Edit = fn(&mut Vec<v1::RecordLine>);
+    let edits: [(Edit, &str); 4] = [
+        (|lines| absent(lines).bank_left_ms -= 1, "bankLeftMs"),
+        (
+            |lines| absent(lines).decision_time_us = 399_999,
+            "the time was not up: the seat had 400 ms",
+        ),
+        (
+            |lines| absent(lines).source = v1::DecisionSource::Timeout.into(),
+            "by the events the seat was not connected",
+        ),
+        (
+            |lines| {
+                let given = lines.iter().position(is_substitution);
+                lines.remove(given.expect("a substitution"));
+            },
+            "`substituted` must come here",
+        ),
+    ];
+    for (edit, problem) in edits {
+        let mut edited = lines.clone();
+        edit(&mut edited);
+        let error = replay(&edited).expect_err(problem).to_string();
+        assert!(error.contains(problem), "{error}");
+    }
+    // Without an absence time, the same absence is judged as earlier servers did.
+    let earlier = record_with_an_absence(None);
+    replay(&earlier).expect("the record verifies");
+    let mut lines = earlier;
+    assert_eq!(absent(&mut lines).bank_left_ms, 0);
+    assert_eq!(lines.iter().filter(|line| is_substitution(line)).count(), 1);
+}

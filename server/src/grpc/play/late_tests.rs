@@ -1,0 +1,222 @@
+//! Attachments that come late: the newer stream of a client keeps its seats and participants.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_engine::RuleSetSpec;
+use chefshat_proto::v1::{self, seat_command::Command};
+use futures::{FutureExt as _, StreamExt as _};
+use tokio::time::Instant;
+use tokio_util::task::TaskTracker;
+
+use super::reader::{Reader, Requests as _};
+use crate::access::Caller;
+use crate::config::ServerConfig;
+use crate::convert;
+use crate::limits::Key;
+use crate::outbox::{Outbox, OutboxStream};
+use crate::room::{JoinRequest, Joined};
+use crate::rooms::{NewRoom, Rooms};
+use crate::store::MemoryStore;
+use crate::tournaments::{Call, Entry, Tournaments};
+use crate::wire::Received;
+use crate::wire::peer::{PlayInput, PlayRequest, play_input::Input};
+use chefshat_room::journal::{Fill, GameStart, ParticipantKind};
+use chefshat_room::policy::Policy;
+
+struct Server {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+}
+
+/// A stream of a client.
+struct Stream {
+    reader: Reader,
+    updates: OutboxStream,
+}
+
+impl Server {
+    fn start() -> Self {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms = rooms.expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        Self { rooms, tournaments }
+    }
+
+    /// A stream of a client that is connected here.
+    fn stream(&self) -> Stream {
+        let (outbox, updates) = Outbox::new();
+        let caller = Caller::default();
+        let reader = Reader::new(&self.rooms, &self.tournaments, caller, &outbox, true);
+        Stream { reader, updates }
+    }
+
+    /// A stream of a client that is connected to another node.
+    fn stream_by_gateway(&self) -> Stream {
+        let Stream { reader, updates } = self.stream();
+        let reader = reader.by_gateway();
+        Stream { reader, updates }
+    }
+
+    /// The ticket of a seat in a room that waits for others.
+    async fn seat(&self) -> v1::Attach {
+        let created = self.rooms.create(NewRoom {
+            name: "a room".into(),
+            rules: RuleSetSpec::default().validate().expect("the standard"),
+            policy: Policy::default(),
+            fills: vec![Fill::Open { reserved_for: None }; 4],
+            display_names: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: None,
+            physical: false,
+            request: None,
+            charged: Key::Local,
+            seating: None,
+        });
+        let room = created.await.expect("a room").handle;
+        let joined = room.join(JoinRequest {
+            name: "Ada".into(),
+            kind: ParticipantKind::Agent,
+            seat: None,
+            request_id: None,
+            client: None,
+        });
+        let Joined { ticket, .. } = joined.await.expect("it runs").expect("a free seat");
+        attachment(&ticket.to_text())
+    }
+
+    /// The ticket of a participant of a tournament that has not started.
+    async fn participant(&self) -> v1::Attach {
+        let settings = v1::TournamentSettings {
+            format: v1::TournamentFormat::Swiss.into(),
+            ..v1::TournamentSettings::default()
+        };
+        let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+        let created = (self.tournaments).create("Coppa", plan, None, Key::Local);
+        let (tournament, _owner) = created.await.expect("a tournament");
+        let entry = Entry {
+            name: "Ada".into(),
+            kind: ParticipantKind::Agent,
+            max_games: 1,
+            stateless: true,
+            at_table: false,
+            request_id: None,
+        };
+        let joined = tournament.join(entry).await.expect("it runs");
+        let (_participant, ticket) = joined.expect("it is open");
+        attachment(&ticket.to_text())
+    }
+}
+
+fn attachment(ticket: &str) -> v1::Attach {
+    v1::Attach {
+        ticket: ticket.to_owned(),
+        ..v1::Attach::default()
+    }
+}
+
+impl Stream {
+    /// The next call of the tournament to the participant of this stream.
+    async fn called(&mut self) -> (u32, Call) {
+        self.reader.called.recv().await.expect("the stream is open")
+    }
+
+    /// The seats and participants about which the gateway is asked.
+    fn questions(&mut self) -> Vec<u32> {
+        let updates = self.updates.next().now_or_never().flatten();
+        let updates = updates.expect("updates wait").expect("no error");
+        let contested = (updates.received()).filter(|(_, it)| *it == Received::Contested);
+        contested.map(|(handle, _)| handle).collect()
+    }
+
+    /// What another node sends for this handle.
+    async fn receive(&mut self, handle: u32, command: Command) {
+        let command = v1::SeatCommand {
+            handle,
+            command: Some(command),
+        };
+        self.read(Input::Command(command)).await;
+    }
+
+    async fn read(&mut self, input: Input) {
+        let request = PlayRequest {
+            inputs: vec![PlayInput {
+                input: Some(input),
+                elapsed_us: None,
+            }],
+            first_assigned_handle: 0,
+        };
+        let executed = request.execute(&mut self.reader, Instant::now());
+        executed.await.expect("a valid message");
+    }
+}
+
+#[tokio::test]
+async fn a_stream_whose_client_has_gone_attaches_nothing() {
+    let server = Server::start();
+    for attach in [server.participant().await, server.seat().await] {
+        let mut newer = server.stream();
+        newer.reader.attach(attach.clone()).await;
+        assert!(newer.reader.has_attached());
+        // The messages of a lost connection may be read after those of the next.
+        let mut older = server.stream();
+        drop(older.updates);
+        older.reader.attach(attach).await;
+        assert!(!older.reader.has_attached(), "it would supersede the newer");
+    }
+}
+
+#[tokio::test]
+async fn a_late_attachment_through_another_node_takes_no_seat_from_a_newer_stream() {
+    let server = Server::start();
+    let attach = server.seat().await;
+    let mut newer = server.stream();
+    newer.reader.attach(attach.clone()).await;
+    let mut late = server.stream_by_gateway();
+    late.receive(3, Command::Attach(attach.clone())).await;
+    assert_eq!(late.questions(), [3]);
+    assert!(late.reader.seats.is_empty());
+    assert!(!newer.reader.seats[&0].is_detached());
+    // The gateway never answers, because its client has left.
+    drop(late);
+    assert!(!newer.reader.seats[&0].is_detached());
+
+    // A client that has lost a stream of which this node does not know yet that it is lost.
+    let mut next = server.stream_by_gateway();
+    next.receive(5, Command::Attach(attach.clone())).await;
+    next.receive(5, Command::Detach(v1::Detach {})).await;
+    assert_eq!(next.questions(), [5]);
+    // Meanwhile it attaches on yet another one.
+    let mut newest = server.stream();
+    newest.reader.attach(attach.clone()).await;
+    assert!(newer.reader.seats[&0].is_detached());
+    next.read(Input::StillOpen(5)).await;
+    assert_eq!(next.questions(), [5], "about the newest stream");
+    assert!(!newest.reader.seats[&0].is_detached());
+    next.read(Input::StillOpen(5)).await;
+    assert!(newest.reader.seats[&0].is_detached());
+    assert!(
+        !next.reader.has_attached(),
+        "it was attached, and detached as its client asked"
+    );
+}
+
+#[tokio::test]
+async fn a_late_attachment_through_another_node_takes_no_participant_from_a_newer_stream() {
+    let server = Server::start();
+    let attach = server.participant().await;
+    let mut newer = server.stream_by_gateway();
+    newer.receive(0, Command::Attach(attach.clone())).await;
+    let mut late = server.stream_by_gateway();
+    late.receive(0, Command::Attach(attach.clone())).await;
+    let (handle, call) = late.called().await;
+    assert!(matches!(call, Call::HeldBy(_)), "{call:?}");
+    late.reader.follow_call(handle, call).await;
+    assert_eq!(late.questions(), [0]);
+    assert!(newer.called().now_or_never().is_none());
+
+    late.read(Input::StillOpen(0)).await;
+    assert_eq!(newer.called().await, (0, Call::Superseded));
+}

@@ -1,0 +1,87 @@
+//! The journal of a game that a database stores when it ends. Until then its entries are in memory,
+//! encoded, which takes a small part of the space.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+use tracing::error;
+
+use super::form;
+use super::{Journal, Signed, StoreError};
+use chefshat_room::journal::{Entry, GameHeader};
+
+/// Stores one game when it has ended.
+pub(super) trait StoreWhole: Send + Sync + 'static {
+    /// Stores its header and encoded entries. A game without a summary has no record; only that it
+    /// is over counts.
+    fn store_whole<'a>(
+        &'a self,
+        header: &'a GameHeader,
+        entries: Vec<u8>,
+        summary: Option<Box<v1::RecordSummary>>,
+        signature: Option<Vec<u8>>,
+    ) -> BoxFuture<'a, Result<(), StoreError>>;
+}
+
+/// The journal of a game that is stored by `whole`.
+pub(super) struct EphemeralJournal<W> {
+    header: Arc<GameHeader>,
+    encoded: Vec<u8>,
+    whole: W,
+}
+
+impl<W> EphemeralJournal<W> {
+    /// A journal that begins with these encoded entries.
+    pub(super) fn new(header: Arc<GameHeader>, encoded: Vec<u8>, whole: W) -> Self {
+        Self {
+            header,
+            encoded,
+            whole,
+        }
+    }
+}
+
+impl<W: StoreWhole> Journal for EphemeralJournal<W> {
+    fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
+        form::put_entries(entries, &mut self.encoded);
+        true
+    }
+
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.append_now(entries);
+        ready(Ok(())).boxed()
+    }
+
+    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+        let mut entries = Vec::new();
+        let read = form::read_entries(&self.encoded, &mut entries);
+        let failed = |problem: form::Unreadable| StoreError::Failed(problem.to_string());
+        ready(read.map(|()| entries).map_err(failed)).boxed()
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+        signed: Option<Signed>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let entries = std::mem::take(&mut self.encoded);
+        let signature = signed.as_ref().map(form::signed_to_bytes);
+        async move {
+            let stored = (self.whole).store_whole(&self.header, entries, summary, signature);
+            match stored.await {
+                // The game was played anyway; the record that was stored first stays.
+                Err(StoreError::Taken(game)) => {
+                    error!(%game, "another record has the id of this game; the game is not stored");
+                    Ok(())
+                }
+                stored => stored,
+            }
+        }
+        .boxed()
+    }
+}

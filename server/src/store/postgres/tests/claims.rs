@@ -1,0 +1,98 @@
+//! Units that are handed over, claimed together, or left to another version of the program.
+
+use super::fencing::Pair;
+use super::*;
+
+const FIRST: Epoch = Epoch::FIRST;
+const SECOND: Epoch = Epoch(2);
+
+async fn create(store: &PostgresStore, rooms: impl IntoIterator<Item = u8>) {
+    for room in rooms {
+        let created = store.create(durable(room), vec![entry(1)]);
+        created.await.expect("created");
+    }
+}
+
+fn at(epoch: Epoch, rooms: impl IntoIterator<Item = u8>) -> Vec<(Id, Epoch)> {
+    let rooms = rooms.into_iter();
+    rooms.map(|room| (Id([room; 16]), epoch)).collect()
+}
+
+#[tokio::test]
+async fn several_orphans_are_claimed_together() {
+    let pair = Pair::new().await;
+    create(&pair.first, 1..=4).await;
+    create(&pair.second, [5]).await;
+    pair.stall().await;
+    let claimed = pair.second.claim(Id([2; 16]), FIRST).await;
+    assert_eq!(claimed, Ok(Some(SECOND)));
+    let orphans = at(FIRST, 1..=6);
+    let claimed = pair.second.claim_all(orphans).await.expect("it answers");
+    let won = Some(SECOND);
+    assert_eq!(claimed, [won, None, won, won, None, None]);
+    for room in 1..=4 {
+        let game = resumed(&pair.second, room, SECOND).await;
+        assert_eq!(numbers(&game.entries), [1, 0]);
+    }
+    assert_eq!(pair.second.orphans(9).await, Ok(vec![]));
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn the_last_word_of_an_owner_costs_no_other_claim() {
+    let pair = Pair::new().await;
+    create(&pair.first, 1..=3).await;
+    // One of them gets a row while it is claimed, again and again.
+    pair.database.run(
+        "CREATE FUNCTION add() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             INSERT INTO journal SELECT NEW.game, NEW.position, 1, NEW.entries;
+             RETURN NEW;
+         END $$;
+         CREATE TRIGGER add BEFORE INSERT ON journal FOR EACH ROW
+             WHEN (NEW.epoch = 2 AND NEW.game = 2) EXECUTE FUNCTION add()",
+    );
+    pair.stall().await;
+    let claimed = pair.second.claim_all(at(FIRST, 1..=3)).await;
+    assert_eq!(claimed, Ok(vec![Some(SECOND), None, Some(SECOND)]));
+    assert_eq!(pair.second.orphans(9).await, Ok(at(FIRST, [2])));
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn a_released_unit_is_offered_to_another_node() {
+    let pair = Pair::new().await;
+    create(&pair.first, [1]).await;
+    let info = NodeInfo {
+        capacity: 1,
+        ..NodeInfo::default()
+    };
+    pair.second.join(info).await.expect("it joins");
+    // It listens from the first time on.
+    assert_eq!(pair.second.handed_over().now_or_never(), None);
+    let mut observer = connected(&pair.database).await;
+    let listens = "SELECT EXISTS (SELECT FROM pg_stat_activity
+                   WHERE datname = current_database() AND query LIKE 'LISTEN%' AND state = 'idle')";
+    let mut is_listening = false;
+    while !is_listening {
+        let listens = sqlx::query_scalar(listens).fetch_one(&mut observer);
+        is_listening = listens.await.expect("readable");
+    }
+    let released = pair.first.release(Id([1; 16]), FIRST);
+    released.await.expect("released");
+    assert_eq!(pair.second.handed_over().await, (Id([1; 16]), FIRST));
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn a_room_of_a_newer_form_is_left_to_newer_nodes() {
+    let pair = Pair::new().await;
+    create(&pair.first, 1..=2).await;
+    pair.database
+        .run("UPDATE owned SET form = form + 1 WHERE game_id = (SELECT game_id FROM games WHERE number = 1)");
+    pair.stall().await;
+    assert_eq!(pair.second.orphans(9).await, Ok(at(FIRST, [2])));
+    let claimed = pair.second.claim_all(at(FIRST, 1..=2)).await;
+    assert_eq!(claimed, Ok(vec![None, Some(SECOND)]));
+    pair.close().await;
+}

@@ -1,0 +1,35 @@
+//! Shows what is over and in the memory of no node: the end of a room's game, or a tournament.
+
+use super::Tournaments;
+use crate::store::StoreError;
+use crate::store::cluster::Kind;
+use chefshat_room::ids::Id;
+
+impl Tournaments {
+    /// Brings a room or tournament that is over into memory, unless it is there. What cannot be shown
+    /// is logged.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub(crate) async fn show_ended(&self, id: Id, kind: Kind) -> Result<(), StoreError> {
+        // Each id has one place, so nothing is read twice at a time.
+        let place = usize::from(id.0[0]) % self.reading.len();
+        let _reading = self.reading[place].lock().await;
+        let directory = self.rooms.directory();
+        match kind {
+            Kind::Room => {
+                let is_shown = self.rooms.get(id).is_some_and(|room| !room.is_gone());
+                if !is_shown && let Some(game) = directory.ended_room(id).await? {
+                    self.rooms.show_ended(game).await;
+                }
+            }
+            Kind::Tournament => {
+                let is_shown = self.get(id).is_some();
+                if !is_shown && let Some(stored) = directory.ended_tournament(id).await? {
+                    self.resume(stored).await;
+                }
+            }
+        }
+        Ok(())
+    }
+}

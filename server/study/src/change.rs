@@ -1,0 +1,152 @@
+//! The changes of a study and the values in them. `state` applies them; `commands` and `games`
+//! decide when they follow.
+
+use crate::questionnaire::ItemAnswer;
+
+/// A step of a study. Folding the same changes again restores the study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Change {
+    /// A participant was added.
+    Added {
+        /// Its number, from 1.
+        number: u32,
+        /// Its pseudonym.
+        pseudonym: String,
+    },
+    /// A participant opened a session, which supersedes its earlier ones.
+    Opened {
+        /// The participant.
+        number: u32,
+        /// The slot that it gets, if this is its first session.
+        slot: Option<u32>,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A participant consented, and is at its next step.
+    Consented {
+        /// The participant.
+        number: u32,
+        /// The consent.
+        consent: ConsentGiven,
+    },
+    /// A participant answered a questionnaire, and is at its next step.
+    Answered {
+        /// The participant.
+        number: u32,
+        /// The answers.
+        answers: Vec<ItemAnswer>,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A game of a participant was assigned a room, before the room is created.
+    Placed {
+        /// The participant.
+        number: u32,
+        /// The game.
+        game: PlacedGame,
+    },
+    /// The participant's game ended.
+    GameEnded {
+        /// The participant.
+        number: u32,
+        /// How.
+        outcome: Outcome,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A participant continued from a text, an external questionnaire or a game.
+    Continued {
+        /// The participant.
+        number: u32,
+        /// Whether it is at its next step; otherwise at the next game of its step.
+        step_over: bool,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A participant had no session open for too long.
+    DroppedOut {
+        /// The participant.
+        number: u32,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A participant withdrew.
+    Withdrew {
+        /// The participant.
+        number: u32,
+        /// Whether its data are deleted.
+        delete_data: bool,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// The study's owner removed a participant.
+    Removed {
+        /// The participant.
+        number: u32,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// The study was closed.
+    Closed,
+}
+
+impl Change {
+    /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym and its
+    /// answers. The changes fold to the same study as before. Returns whether this one is different
+    /// now and must be stored again.
+    pub fn forget(&mut self, forgotten: u32) -> bool {
+        match self {
+            Self::Added { number, pseudonym } if *number == forgotten => {
+                !std::mem::take(pseudonym).is_empty()
+            }
+            Self::Answered {
+                number, answers, ..
+            } if *number == forgotten => !std::mem::take(answers).is_empty(),
+            _ => false,
+        }
+    }
+}
+
+/// A consent that was given.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConsentGiven {
+    /// SHA-256 of the text, in UTF-8.
+    pub text_sha256: [u8; 32],
+    /// Version of the text.
+    pub version: String,
+    /// Code of the page's language.
+    pub language: String,
+    /// When, in milliseconds since the Unix epoch.
+    pub at_ms: u64,
+}
+
+/// A game of a participant that has a room.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlacedGame {
+    /// The step in which it is played, from 0.
+    pub step: usize,
+    /// Index of the condition.
+    pub condition: usize,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// Index of its seed in the list of the condition if that has one, else of the study; `None`
+    /// for practice.
+    pub seed_index: Option<usize>,
+    /// The participant's seat.
+    pub seat: usize,
+    /// Attempt at this game, from 1.
+    pub attempt: u32,
+    /// Id of the room.
+    pub room: [u8; 16],
+    /// Id of the game.
+    pub game: [u8; 16],
+}
+
+/// How a game ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// With a result.
+    Finished,
+    /// Without a result.
+    Aborted,
+}

@@ -1,0 +1,255 @@
+//! What researchers and participants ask for. A command returns the change that follows, or refuses
+//! and leaves the study as it is. Secrets and links are checked before.
+
+use std::collections::BTreeSet;
+
+use sha2::{Digest as _, Sha256};
+use thiserror::Error;
+
+use crate::Study;
+use crate::change::{Change, ConsentGiven};
+use crate::games::Phase;
+use crate::questionnaire::{AnswerProblem, ItemAnswer};
+use crate::settings::MAX_PARTICIPANTS;
+use crate::stage::{Step, Task};
+use crate::state::{Participant, Status};
+
+/// Maximum number of sessions that a participant may open, which bounds the journal.
+pub const MAX_SESSIONS: u32 = 1000;
+
+/// Why a command is refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum Refusal {
+    /// No such participant.
+    #[error("the study has no such participant")]
+    Unknown,
+    /// The study is closed.
+    #[error("the study is closed")]
+    Closed,
+    /// All slots are taken.
+    #[error("the study has all its participants")]
+    Full,
+    /// The participant has completed the study or left it.
+    #[error("the participation is over")]
+    Over,
+    /// A newer session was opened.
+    #[error("the study was opened again, here or on another device; use that page")]
+    Superseded,
+    /// The participant is at another step.
+    #[error("this step is over; reload the page")]
+    StepOver,
+    /// The step needs another command.
+    #[error("this step needs another answer; reload the page")]
+    StepMismatch,
+    /// The game has not ended.
+    #[error("the game has not ended")]
+    GameNotOver,
+    /// The participant has opened too many sessions.
+    #[error("the study was opened more than {MAX_SESSIONS} times")]
+    TooManySessions,
+    /// The answers are invalid.
+    #[error(transparent)]
+    Answers(#[from] AnswerProblem),
+    /// Another participant has this pseudonym.
+    #[error("another participant is called {0:?}")]
+    NameTaken(String),
+    /// Too many participants, with those who left.
+    #[error("a study has at most {MAX_PARTICIPANTS} participants, with those who left")]
+    TooManyParticipants,
+}
+
+/// Where a participant's command comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct At {
+    /// Number of the participant.
+    pub number: u32,
+    /// Number of its session.
+    pub session: u32,
+    /// The step that was shown, from 0.
+    pub step: usize,
+}
+
+impl Study {
+    /// The changes that add participants with these pseudonyms; an empty one stands for a name by
+    /// number, such as "P01".
+    ///
+    /// # Errors
+    /// If the study is closed or has too many participants, or if a pseudonym is taken.
+    pub fn add(&self, pseudonyms: &[String]) -> Result<Vec<Change>, Refusal> {
+        if self.is_closed() {
+            return Err(Refusal::Closed);
+        }
+        let first = self.participants().len() as u32 + 1;
+        if self.participants().len() + pseudonyms.len() > MAX_PARTICIPANTS as usize {
+            return Err(Refusal::TooManyParticipants);
+        }
+        let participants = self.participants().values();
+        let mut taken: BTreeSet<String> =
+            participants.map(|it| it.pseudonym.to_lowercase()).collect();
+        for pseudonym in pseudonyms.iter().filter(|it| !it.is_empty()) {
+            if !taken.insert(pseudonym.to_lowercase()) {
+                return Err(Refusal::NameTaken(pseudonym.clone()));
+            }
+        }
+        let mut changes = Vec::new();
+        for (number, pseudonym) in (first..).zip(pseudonyms) {
+            let mut pseudonym = pseudonym.clone();
+            if pseudonym.is_empty() {
+                // A name by number that was given to somebody else is skipped.
+                pseudonym = (number..)
+                    .map(|number| format!("P{number:02}"))
+                    .find(|name| taken.insert(name.to_lowercase()))
+                    .expect("there are more numbers than participants");
+            }
+            changes.push(Change::Added { number, pseudonym });
+        }
+        Ok(changes)
+    }
+
+    /// The change that opens a session of a participant, which is the newest then; `None` if its
+    /// participation is over, and there is only its end to show. The first session takes a slot.
+    ///
+    /// # Errors
+    /// If the participant is unknown or cannot begin.
+    pub fn open(&self, number: u32, now_ms: u64) -> Result<Option<Change>, Refusal> {
+        let participant = self.known(number)?;
+        let slot = match participant.status {
+            Status::Invited if self.is_closed() => return Err(Refusal::Closed),
+            Status::Invited => Some(self.free_slot().ok_or(Refusal::Full)?),
+            Status::Active => None,
+            Status::DroppedOut if self.holder_of(participant.slot).is_none() => None,
+            _ => return Ok(None),
+        };
+        if participant.session >= MAX_SESSIONS {
+            return Err(Refusal::TooManySessions);
+        }
+        Ok(Some(Change::Opened {
+            number,
+            slot,
+            at_ms: now_ms,
+        }))
+    }
+
+    /// The change by which a participant consents.
+    ///
+    /// # Errors
+    /// If the participant is not at this step in this session, or it is not consent.
+    pub fn consent(&self, at: At, now_ms: u64) -> Result<Change, Refusal> {
+        let (_, step) = self.at(at)?;
+        let Task::Consent(consent) = step.task else {
+            return Err(Refusal::StepMismatch);
+        };
+        Ok(Change::Consented {
+            number: at.number,
+            consent: ConsentGiven {
+                text_sha256: Sha256::digest(&consent.text).into(),
+                version: consent.version.clone(),
+                language: self.settings().language.code().to_owned(),
+                at_ms: now_ms,
+            },
+        })
+    }
+
+    /// The change by which a participant answers a questionnaire.
+    ///
+    /// # Errors
+    /// If the participant is not at this step in this session, it is not a questionnaire, or the
+    /// answers are invalid.
+    pub fn answer(&self, at: At, answers: Vec<ItemAnswer>, now_ms: u64) -> Result<Change, Refusal> {
+        let (_, step) = self.at(at)?;
+        let Task::Questionnaire(questionnaire) = step.task else {
+            return Err(Refusal::StepMismatch);
+        };
+        questionnaire.check_answers(&answers)?;
+        Ok(Change::Answered {
+            number: at.number,
+            answers,
+            at_ms: now_ms,
+        })
+    }
+
+    /// The change by which a participant continues from a text, an external questionnaire or a game
+    /// that has ended.
+    ///
+    /// # Errors
+    /// If the participant is not at this step in this session, or the step is not over.
+    pub fn proceed(&self, at: At, now_ms: u64) -> Result<Change, Refusal> {
+        let (participant, step) = self.at(at)?;
+        let count = match step.task {
+            Task::Text(_) | Task::External(_) => 0,
+            Task::Practice { .. } => 1,
+            Task::Games { count } => *count,
+            Task::Consent(_) | Task::Questionnaire(_) => return Err(Refusal::StepMismatch),
+        };
+        if count > 0 && !matches!(Phase::of(participant), Phase::Over(_)) {
+            return Err(Refusal::GameNotOver);
+        }
+        Ok(Change::Continued {
+            number: at.number,
+            step_over: participant.games_done() + 1 >= count,
+            at_ms: now_ms,
+        })
+    }
+
+    /// The change by which a participant withdraws; `None` if it has, and no more data are to be
+    /// deleted.
+    ///
+    /// # Errors
+    /// If the participant is unknown.
+    pub fn withdraw(
+        &self,
+        number: u32,
+        delete_data: bool,
+        now_ms: u64,
+    ) -> Result<Option<Change>, Refusal> {
+        let participant = self.known(number)?;
+        let deletes = delete_data && !participant.data_deleted;
+        let withdraws = participant.status != Status::Withdrawn;
+        Ok((withdraws || deletes).then_some(Change::Withdrew {
+            number,
+            delete_data,
+            at_ms: now_ms,
+        }))
+    }
+
+    /// The change that removes a participant; `None` if it was removed before.
+    ///
+    /// # Errors
+    /// If there is no such participant, or it has withdrawn.
+    pub fn remove(&self, number: u32, now_ms: u64) -> Result<Option<Change>, Refusal> {
+        let participant = self.known(number)?;
+        match participant.status {
+            Status::Removed => Ok(None),
+            Status::Withdrawn => Err(Refusal::Over),
+            _ => Ok(Some(Change::Removed {
+                number,
+                at_ms: now_ms,
+            })),
+        }
+    }
+
+    /// The change that closes the study; `None` if it is closed.
+    pub fn close(&self) -> Option<Change> {
+        (!self.is_closed()).then_some(Change::Closed)
+    }
+
+    fn known(&self, number: u32) -> Result<&Participant, Refusal> {
+        self.participant(number).ok_or(Refusal::Unknown)
+    }
+
+    /// The participant and its step, if the command comes from there.
+    fn at(&self, at: At) -> Result<(&Participant, Step<'_>), Refusal> {
+        let participant = self.known(at.number)?;
+        if participant.status != Status::Active {
+            return Err(Refusal::Over);
+        }
+        if participant.session != at.session {
+            return Err(Refusal::Superseded);
+        }
+        if participant.step() != at.step {
+            return Err(Refusal::StepOver);
+        }
+        let step = self.step_of(participant).ok_or(Refusal::Over)?;
+        Ok((participant, step))
+    }
+}

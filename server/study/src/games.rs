@@ -1,0 +1,153 @@
+//! The games of participants: which one comes next, with which condition, seed and seat. Rooms
+//! belong to the server.
+
+use crate::Study;
+use crate::change::{Change, Outcome, PlacedGame};
+use crate::stage::Task;
+use crate::state::{Participant, PlayedGame, Status};
+
+/// Number of times that a game without a result is played.
+pub const MAX_ATTEMPTS: u32 = 3;
+
+/// A game that is to be played now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DueGame {
+    /// Index of the condition.
+    pub condition: usize,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// Index of its seed in the list of the condition if that has one, else of the study, and the
+    /// seed; `None` for practice.
+    pub seed: Option<(usize, [u8; 32])>,
+    /// The participant's seat.
+    pub seat: usize,
+    /// Attempt at this game, from 1.
+    pub attempt: u32,
+}
+
+/// Where a participant is who is to play.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Phase<'p> {
+    /// A game is to be played.
+    Due {
+        /// Attempt at this game, from 1.
+        attempt: u32,
+    },
+    /// It is being played.
+    Playing(&'p PlayedGame),
+    /// It has ended, and the participant has not continued.
+    Over(&'p PlayedGame),
+}
+
+impl Phase<'_> {
+    /// The phase of a participant whose step is practice or games.
+    pub(crate) fn of(participant: &Participant) -> Phase<'_> {
+        let Some(game) = participant.current_game().filter(|game| !game.continued) else {
+            return Phase::Due { attempt: 1 };
+        };
+        let attempt = game.placed.attempt;
+        match game.ended {
+            None => Phase::Playing(game),
+            Some((Outcome::Aborted, _)) if attempt < MAX_ATTEMPTS => Phase::Due {
+                attempt: attempt + 1,
+            },
+            Some(_) => Phase::Over(game),
+        }
+    }
+}
+
+impl Participant {
+    /// Number of games of its step that it has continued from.
+    pub(crate) fn games_done(&self) -> u32 {
+        let step = self.step();
+        let games = self.games.iter();
+        games
+            .filter(|game| game.continued && game.placed.step == step)
+            .count() as u32
+    }
+}
+
+impl Study {
+    /// The game that a participant is to play now. It gets a room by [`Study::place`].
+    pub fn due(&self, number: u32) -> Option<DueGame> {
+        let participant = self.participant(number)?;
+        if participant.status != Status::Active {
+            return None;
+        }
+        let step = self.step_of(participant)?;
+        let practice = match step.task {
+            Task::Games { .. } => false,
+            Task::Practice { .. } => true,
+            _ => return None,
+        };
+        let Phase::Due { attempt } = Phase::of(participant) else {
+            return None;
+        };
+        // Practice outside a block is the same for everybody, so that it reveals no condition.
+        let elsewhere = if practice {
+            0
+        } else {
+            self.sequence_of(participant)?[0]
+        };
+        let index = step.block.unwrap_or(elsewhere);
+        let condition = &self.settings().conditions[index];
+        let has_own = !condition.seeds.is_empty();
+        let before = participant.games.iter().filter(|game| {
+            let counts = game.continued && !game.placed.practice;
+            counts && (!has_own || game.placed.condition == index)
+        });
+        let before = before.count();
+        let seeds = if has_own {
+            &condition.seeds
+        } else {
+            &self.settings().seeds
+        };
+        let (seed, rotated) = match practice {
+            true => (None, 0),
+            false => {
+                let index = before % seeds.len();
+                (Some((index, seeds[index])), before % condition.players)
+            }
+        };
+        Some(DueGame {
+            condition: index,
+            practice,
+            seed,
+            seat: condition.participant_seat.unwrap_or(rotated),
+            attempt,
+        })
+    }
+
+    /// The change by which a participant's due game gets a room; `None` if no game is due.
+    pub fn place(&self, number: u32, room: [u8; 16], game: [u8; 16]) -> Option<Change> {
+        let due = self.due(number)?;
+        let game = PlacedGame {
+            step: self.participant(number)?.step(),
+            condition: due.condition,
+            practice: due.practice,
+            seed_index: due.seed.map(|(index, _)| index),
+            seat: due.seat,
+            attempt: due.attempt,
+            room,
+            game,
+        };
+        Some(Change::Placed { number, game })
+    }
+
+    /// The change by which a participant's game ends; `None` if it is not its running game.
+    pub fn game_ended(
+        &self,
+        number: u32,
+        game: [u8; 16],
+        outcome: Outcome,
+        now_ms: u64,
+    ) -> Option<Change> {
+        let last = self.participant(number)?.games.last()?;
+        let is_running = last.placed.game == game && last.ended.is_none();
+        is_running.then_some(Change::GameEnded {
+            number,
+            outcome,
+            at_ms: now_ms,
+        })
+    }
+}

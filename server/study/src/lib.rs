@@ -1,0 +1,219 @@
+//! Studies with people as values: the assignment of conditions, what each participant does next,
+//! questionnaires, and what a participant may see. A study moves by changes: its owner asks for a
+//! change, stores it and folds it. Folding the same changes again gives the same study. There is no
+//! clock, IO or thread here; rooms, connections and storage belong to the server.
+//!
+//! ```
+//! use chefshat_study::{At, Content, Outcome, Study, testing};
+//!
+//! // Two conditions between participants; consent, a game, a debriefing.
+//! let mut study = Study::new(testing::settings())?;
+//! for change in study.add(&["Ada".to_owned()])? {
+//!     study.fold(&change);
+//! }
+//! let opened = study.open(1, 1000)?.expect("Ada has not begun");
+//! study.fold(&opened);
+//! let at = |step| At { number: 1, session: 1, step };
+//! study.fold(&study.consent(at(0), 2000)?);
+//!
+//! let due = study.due(1).expect("a game comes next");
+//! assert_eq!((due.seat, due.attempt), (0, 1));
+//! study.fold(&study.place(1, [1; 16], [2; 16]).expect("it is due"));
+//! // Here the game would be played.
+//! let ended = study.game_ended(1, [2; 16], Outcome::Finished, 9000);
+//! study.fold(&ended.expect("it is running"));
+//! study.fold(&study.proceed(at(1), 10_000)?);
+//!
+//! let view = study.view(1).expect("Ada has begun");
+//! assert!(matches!(view.content, Content::Text(_)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod assignment;
+mod chance;
+mod change;
+mod checks;
+mod commands;
+mod games;
+mod link;
+mod presence;
+mod questionnaire;
+mod settings;
+mod stage;
+mod state;
+mod templates;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+mod view;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+pub use assignment::Order;
+pub use change::{Change, ConsentGiven, Outcome, PlacedGame};
+pub use checks::SettingsProblem;
+pub use commands::{At, MAX_SESSIONS, Refusal};
+pub use games::{DueGame, MAX_ATTEMPTS};
+pub use link::ParticipantLink;
+pub use questionnaire::{
+    Answer, AnswerProblem, Item, ItemAnswer, ItemKind, MAX_ITEMS, MAX_OPTIONS, Questionnaire,
+};
+pub use settings::{
+    Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
+    MAX_SEEDS, MAX_STEPS, Settings,
+};
+pub use stage::{
+    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Stage, Step, Task, Text,
+};
+pub use state::{Participant, PlayedGame, Status};
+pub use templates::{Language, Template};
+pub use view::{Content, End, ShownGame, ShownItem, ShownQuestionnaire, View};
+
+use assignment::Assignment;
+use presence::Presence;
+use state::StudyState;
+
+/// A study. Two are equal if their changes have led to the same state; who is connected does not
+/// matter.
+#[derive(Debug, Clone)]
+pub struct Study {
+    settings: Settings,
+    assignment: Assignment,
+    step_count: usize,
+    state: StudyState,
+    presence: Presence,
+}
+
+impl PartialEq for Study {
+    fn eq(&self, other: &Self) -> bool {
+        self.settings == other.settings && self.state == other.state
+    }
+}
+
+impl Study {
+    /// A study without participants.
+    ///
+    /// # Errors
+    /// Returns the first invalid setting.
+    pub fn new(settings: Settings) -> Result<Self, SettingsProblem> {
+        settings.check()?;
+        let (sequences, block_size) = (settings.sequences(), settings.slots_of_block());
+        let step_count = settings.steps(&sequences[0]).len();
+        Ok(Self {
+            assignment: Assignment::new(sequences, block_size, settings.assignment_seed),
+            settings,
+            step_count,
+            state: StudyState::new(step_count),
+            presence: Presence::default(),
+        })
+    }
+
+    /// Applies a change. Does not check that the change follows; one that does not fit has no
+    /// effect.
+    pub fn fold(&mut self, change: &Change) {
+        self.state.apply(change);
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Whether nobody may begin any more.
+    pub fn is_closed(&self) -> bool {
+        self.state.closed
+    }
+
+    /// The participants, by number from 1.
+    pub fn participants(&self) -> &BTreeMap<u32, Participant> {
+        &self.state.participants
+    }
+
+    /// The participant with this number.
+    pub fn participant(&self, number: u32) -> Option<&Participant> {
+        self.state.participants.get(&number)
+    }
+
+    /// Number of steps of every participant.
+    pub fn step_count(&self) -> usize {
+        self.step_count
+    }
+
+    /// The sequence of conditions of a slot, from 0.
+    pub fn sequence(&self, slot: u32) -> &[usize] {
+        self.assignment.sequence(slot)
+    }
+
+    /// The order in which a participant meets the items of the questionnaire at a step, from 0;
+    /// `None` if the step is not a questionnaire.
+    pub fn item_order(&self, number: u32, step: usize) -> Option<Vec<usize>> {
+        let sequence = self.sequence_of(self.participant(number)?)?;
+        match self.settings.steps(sequence).get(step)?.task {
+            Task::Questionnaire(it) => Some(it.order(self.settings.assignment_seed, number, step)),
+            _ => None,
+        }
+    }
+
+    /// The sequence of conditions of a participant who has begun.
+    pub fn sequence_of(&self, participant: &Participant) -> Option<&[usize]> {
+        participant.slot.map(|slot| self.sequence(slot))
+    }
+
+    /// The step of a participant; `None` before it begins and after the last.
+    pub fn step_of(&self, participant: &Participant) -> Option<Step<'_>> {
+        let steps = self.settings.steps(self.sequence_of(participant)?);
+        steps.get(participant.step()).copied()
+    }
+
+    /// Sets whether a participant has a session open.
+    pub fn set_connected(&mut self, number: u32, connected: bool, now_ms: u64) {
+        self.presence.set(number, connected, now_ms);
+    }
+
+    /// Whether a participant has a session open.
+    pub fn is_connected(&self, number: u32) -> bool {
+        self.presence.is_connected(number)
+    }
+
+    /// The change that follows by itself at this time, if any: the study closes, or a participant
+    /// drops out. To be folded before the next is asked for.
+    pub fn next(&mut self, now_ms: u64) -> Option<Change> {
+        let closes_at = self.settings.closes_at_ms;
+        if closes_at.is_some_and(|at_ms| at_ms <= now_ms) && !self.is_closed() {
+            return Some(Change::Closed);
+        }
+        let participants = self.state.participants.iter();
+        let active = participants.filter(|(_, it)| it.status == Status::Active);
+        let active = active.map(|(number, _)| *number);
+        let limit_ms = self.settings.drop_out_after_ms;
+        let number = self.presence.drop_out(active, limit_ms, now_ms)?;
+        Some(Change::DroppedOut {
+            number,
+            at_ms: now_ms,
+        })
+    }
+
+    /// When [`Study::next`] is to be asked again if nothing else happens, in milliseconds since the
+    /// Unix epoch. Valid after it returned `None`.
+    pub fn wake_at(&self) -> Option<u64> {
+        let limit_ms = self.settings.drop_out_after_ms;
+        let drop_out = self.presence.next_drop_out_ms(limit_ms);
+        let close = self.settings.closes_at_ms.filter(|_| !self.is_closed());
+        drop_out.into_iter().chain(close).min()
+    }
+
+    /// The participant who keeps a slot.
+    fn holder_of(&self, slot: Option<u32>) -> Option<u32> {
+        let mut participants = self.state.participants.iter();
+        let holder = participants.find(|(_, it)| it.holds_slot() && it.slot == slot);
+        holder.map(|(number, _)| *number)
+    }
+
+    /// The first slot that nobody keeps. A slot that is given again comes before new ones, so that
+    /// blocks fill up in order.
+    fn free_slot(&self) -> Option<u32> {
+        let participants = self.state.participants.values();
+        let kept = participants.filter(|it| it.holds_slot());
+        let kept: BTreeSet<u32> = kept.filter_map(|it| it.slot).collect();
+        (0..self.settings.participants).find(|slot| !kept.contains(slot))
+    }
+}

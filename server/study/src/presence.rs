@@ -1,0 +1,51 @@
+//! Who has a session open, which is not part of the stored state, and who drops out.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The sessions at this moment. After a restart nobody has one.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Presence {
+    connected: BTreeSet<u32>,
+    /// Active participants without a session, with the time since when, in milliseconds since the
+    /// Unix epoch.
+    away: BTreeMap<u32, u64>,
+}
+
+impl Presence {
+    pub(crate) fn set(&mut self, number: u32, connected: bool, now_ms: u64) {
+        if connected {
+            self.connected.insert(number);
+            self.away.remove(&number);
+        } else if self.connected.remove(&number) {
+            self.away.insert(number, now_ms);
+        }
+    }
+
+    pub(crate) fn is_connected(&self, number: u32) -> bool {
+        self.connected.contains(&number)
+    }
+
+    /// One of the active participants who has been away for `limit_ms`. Whoever is away and was not
+    /// before, as after a restart, is away from now.
+    pub(crate) fn drop_out(
+        &mut self,
+        active: impl Iterator<Item = u32>,
+        limit_ms: u64,
+        now_ms: u64,
+    ) -> Option<u32> {
+        let absent: BTreeSet<u32> = active.filter(|it| !self.connected.contains(it)).collect();
+        self.away.retain(|number, _| absent.contains(number));
+        for number in absent {
+            self.away.entry(number).or_insert(now_ms);
+        }
+        let mut away = self.away.iter();
+        let first = away.find(|(_, since)| now_ms.saturating_sub(**since) >= limit_ms);
+        first.map(|(number, _)| *number)
+    }
+
+    /// When the next participant drops out, in milliseconds since the Unix epoch.
+    pub(crate) fn next_drop_out_ms(&self, limit_ms: u64) -> Option<u64> {
+        let since = self.away.values().min();
+        since.map(|since| since.saturating_add(limit_ms))
+    }
+}

@@ -1,0 +1,241 @@
+//! The state of a study, and the effect of each change on it. Nothing here decides what happens
+//! next. A change that does not fit (for an unknown participant, say) has no effect, so the same
+//! changes always lead to the same state.
+
+use std::collections::BTreeMap;
+
+use crate::change::{Change, ConsentGiven, Outcome, PlacedGame};
+use crate::questionnaire::ItemAnswer;
+
+/// The state of a participant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Has not opened its link.
+    Invited,
+    /// Has begun.
+    Active,
+    /// Has finished all steps.
+    Completed,
+    /// Has withdrawn.
+    Withdrawn,
+    /// Had no session open for too long.
+    DroppedOut,
+    /// Was removed by the study's owner.
+    Removed,
+}
+
+/// A participant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Participant {
+    /// Its name in games and exported data; empty after its data were deleted.
+    pub pseudonym: String,
+    /// Its state.
+    pub status: Status,
+    /// Its slot, or after it has left the one it had; `None` until it begins.
+    pub slot: Option<u32>,
+    /// Number of sessions it opened, which is the number of the newest.
+    pub session: u32,
+    /// When it reached each step, in milliseconds since the Unix epoch, and last when it completed
+    /// the study. Empty until it begins.
+    pub reached_at_ms: Vec<u64>,
+    /// When it completed the study or left it, in milliseconds since the Unix epoch.
+    pub ended_at_ms: Option<u64>,
+    /// Its consent.
+    pub consent: Option<ConsentGiven>,
+    /// Its answers, by step.
+    pub answers: BTreeMap<usize, Vec<ItemAnswer>>,
+    /// Its games, in order.
+    pub games: Vec<PlayedGame>,
+    /// Whether it withdrew and had its data deleted.
+    pub data_deleted: bool,
+}
+
+/// A game of a participant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlayedGame {
+    /// The game.
+    pub placed: PlacedGame,
+    /// How and when it ended, in milliseconds since the Unix epoch.
+    pub ended: Option<(Outcome, u64)>,
+    /// Whether the participant has continued from it.
+    pub continued: bool,
+}
+
+impl Participant {
+    /// The step it is at, from 0; the number of steps once it has completed the study.
+    pub fn step(&self) -> usize {
+        self.reached_at_ms.len().saturating_sub(1)
+    }
+
+    /// Whether it keeps its slot.
+    pub fn holds_slot(&self) -> bool {
+        matches!(self.status, Status::Active | Status::Completed)
+    }
+
+    /// The last game of its step, if there is one.
+    pub(crate) fn current_game(&self) -> Option<&PlayedGame> {
+        let last = self.games.last()?;
+        (last.placed.step == self.step()).then_some(last)
+    }
+
+    fn advance(&mut self, steps: usize, at_ms: u64) {
+        self.reached_at_ms.push(at_ms);
+        if self.step() >= steps {
+            self.end(Status::Completed, at_ms);
+        }
+    }
+
+    fn end(&mut self, status: Status, at_ms: u64) {
+        self.status = status;
+        self.ended_at_ms = Some(at_ms);
+    }
+}
+
+/// The state of a study.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct StudyState {
+    /// Number of steps of every participant.
+    steps: usize,
+    /// By number, from 1.
+    pub(crate) participants: BTreeMap<u32, Participant>,
+    pub(crate) closed: bool,
+}
+
+impl StudyState {
+    pub(crate) fn new(steps: usize) -> Self {
+        Self {
+            steps,
+            participants: BTreeMap::new(),
+            closed: false,
+        }
+    }
+
+    fn active(&mut self, number: u32) -> Option<&mut Participant> {
+        let participant = self.participants.get_mut(&number)?;
+        (participant.status == Status::Active).then_some(participant)
+    }
+
+    pub(crate) fn apply(&mut self, change: &Change) {
+        let steps = self.steps;
+        match change {
+            Change::Added { number, pseudonym } => {
+                let added = || Participant {
+                    pseudonym: pseudonym.clone(),
+                    status: Status::Invited,
+                    slot: None,
+                    session: 0,
+                    reached_at_ms: Vec::new(),
+                    ended_at_ms: None,
+                    consent: None,
+                    answers: BTreeMap::new(),
+                    games: Vec::new(),
+                    data_deleted: false,
+                };
+                self.participants.entry(*number).or_insert_with(added);
+            }
+            Change::Opened {
+                number,
+                slot,
+                at_ms,
+            } => self.open(*number, *slot, *at_ms),
+            Change::Consented { number, consent } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.consent = Some(consent.clone());
+                    participant.advance(steps, consent.at_ms);
+                }
+            }
+            Change::Answered {
+                number,
+                answers,
+                at_ms,
+            } => {
+                if let Some(participant) = self.active(*number) {
+                    let step = participant.step();
+                    participant.answers.insert(step, answers.clone());
+                    participant.advance(steps, *at_ms);
+                }
+            }
+            Change::Placed { number, game } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.games.push(PlayedGame {
+                        placed: game.clone(),
+                        ended: None,
+                        continued: false,
+                    });
+                }
+            }
+            Change::GameEnded {
+                number,
+                outcome,
+                at_ms,
+            } => {
+                let participant = self.participants.get_mut(number);
+                let last = participant.and_then(|it| it.games.last_mut());
+                if let Some(game) = last.filter(|game| game.ended.is_none()) {
+                    game.ended = Some((*outcome, *at_ms));
+                }
+            }
+            Change::Continued {
+                number,
+                step_over,
+                at_ms,
+            } => {
+                if let Some(participant) = self.active(*number) {
+                    if let Some(game) = participant.games.last_mut() {
+                        game.continued = true;
+                    }
+                    if *step_over {
+                        participant.advance(steps, *at_ms);
+                    }
+                }
+            }
+            Change::DroppedOut { number, at_ms } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.end(Status::DroppedOut, *at_ms);
+                }
+            }
+            Change::Withdrew {
+                number,
+                delete_data,
+                at_ms,
+            } => self.withdraw(*number, *delete_data, *at_ms),
+            Change::Removed { number, at_ms } => {
+                if let Some(participant) = self.participants.get_mut(number) {
+                    participant.end(Status::Removed, *at_ms);
+                }
+            }
+            Change::Closed => self.closed = true,
+        }
+    }
+
+    fn open(&mut self, number: u32, slot: Option<u32>, at_ms: u64) {
+        let Some(participant) = self.participants.get_mut(&number) else {
+            return;
+        };
+        match participant.status {
+            Status::Invited if slot.is_some() => {
+                participant.slot = slot;
+                participant.reached_at_ms.push(at_ms);
+            }
+            Status::Active | Status::DroppedOut => {}
+            _ => return,
+        }
+        participant.status = Status::Active;
+        participant.ended_at_ms = None;
+        participant.session += 1;
+    }
+
+    fn withdraw(&mut self, number: u32, delete_data: bool, at_ms: u64) {
+        let Some(participant) = self.participants.get_mut(&number) else {
+            return;
+        };
+        if participant.status != Status::Withdrawn {
+            participant.end(Status::Withdrawn, at_ms);
+        }
+        if delete_data {
+            participant.data_deleted = true;
+            participant.pseudonym.clear();
+            participant.answers.clear();
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Established questionnaires, in English and Italian. The English texts are those of their
+//! publications, item by item. The Italian ones are translations of this project, not validated.
+
+use crate::questionnaire::{Item, ItemKind, Questionnaire};
+
+/// A language of the page and of the templates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    /// English.
+    English,
+    /// Italian.
+    Italian,
+}
+
+impl Language {
+    /// All languages.
+    pub const ALL: [Self; 2] = [Self::English, Self::Italian];
+
+    /// The code, as in BCP 47.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::English => "en",
+            Self::Italian => "it",
+        }
+    }
+
+    /// The language with this code.
+    pub fn from_code(code: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.code() == code)
+    }
+
+    fn choose<'t>(self, english: &'t str, italian: &'t str) -> &'t str {
+        match self {
+            Self::English => english,
+            Self::Italian => italian,
+        }
+    }
+}
+
+/// An established questionnaire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Template {
+    /// The Godspeed questionnaires on how a robot is perceived: 24 semantic differentials of five
+    /// points in five scales (Bartneck, Kulić, Croft and Zoghbi 2009). "Artificial – Lifelike"
+    /// belongs to two of them.
+    Godspeed,
+    /// The six sliders of the NASA Task Load Index on workload (Hart and Staveland 1988), without
+    /// the weighting of the scales ("raw").
+    NasaTlx,
+}
+
+impl Template {
+    /// All templates.
+    pub const ALL: [Self; 2] = [Self::Godspeed, Self::NasaTlx];
+
+    /// The name in settings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Godspeed => "godspeed",
+            Self::NasaTlx => "nasa_tlx",
+        }
+    }
+
+    /// The template with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|template| template.name() == name)
+    }
+
+    /// The publication to cite, and for a translation whose it is.
+    pub fn source(self, language: Language) -> String {
+        let publication = match self {
+            Self::Godspeed => {
+                "C. Bartneck, D. Kulić, E. Croft, S. Zoghbi: Measurement instruments for the \
+                 anthropomorphism, animacy, likeability, perceived intelligence, and perceived \
+                 safety of robots. International Journal of Social Robotics 1(1), 71-81, 2009. \
+                 doi:10.1007/s12369-008-0001-3"
+            }
+            Self::NasaTlx => {
+                "S. G. Hart, L. E. Staveland: Development of NASA-TLX (Task Load Index): results \
+                 of empirical and theoretical research. Advances in Psychology 52, 139-183, 1988. \
+                 doi:10.1016/S0166-4115(08)62386-9. Raw: without weights"
+            }
+        };
+        let translation = match language {
+            Language::English => "",
+            Language::Italian => ". Italian translation by the Chef's Hat project, not validated",
+        };
+        format!("{publication}{translation}")
+    }
+
+    /// The questionnaire, with the template's name as its id. All items are required.
+    pub fn questionnaire(self, language: Language) -> Questionnaire {
+        let (instructions, items) = match self {
+            Self::Godspeed => (
+                language.choose(
+                    "Please rate your impression of the robot on these scales.",
+                    "Valuta la tua impressione del robot su queste scale.",
+                ),
+                godspeed(language),
+            ),
+            Self::NasaTlx => (
+                language.choose(
+                    "Please rate the task you have just done.",
+                    "Valuta il compito che hai appena svolto.",
+                ),
+                nasa_tlx(language),
+            ),
+        };
+        Questionnaire {
+            id: self.name().to_owned(),
+            title: String::new(),
+            instructions: instructions.to_owned(),
+            items,
+            shuffled: false,
+        }
+    }
+}
+
+/// For each item its scale and id, its two words in English, and in Italian.
+const GODSPEED: &str = "\
+anthropomorphism|natural|Fake|Natural|Finto|Naturale
+anthropomorphism|humanlike|Machinelike|Humanlike|Simile a una macchina|Simile a un essere umano
+anthropomorphism|conscious|Unconscious|Conscious|Privo di coscienza|Cosciente
+anthropomorphism|lifelike|Artificial|Lifelike|Artificiale|Simile a un essere vivente
+anthropomorphism|moving_elegantly|Moving rigidly|Moving elegantly|Si muove in modo rigido|Si muove in modo elegante
+animacy|alive|Dead|Alive|Morto|Vivo
+animacy|lively|Stagnant|Lively|Stagnante|Vivace
+animacy|organic|Mechanical|Organic|Meccanico|Organico
+animacy|lifelike_animacy|Artificial|Lifelike|Artificiale|Simile a un essere vivente
+animacy|interactive|Inert|Interactive|Inerte|Interattivo
+animacy|responsive|Apathetic|Responsive|Apatico|Reattivo
+likeability|like|Dislike|Like|Non mi piace|Mi piace
+likeability|friendly|Unfriendly|Friendly|Ostile|Amichevole
+likeability|kind|Unkind|Kind|Scortese|Gentile
+likeability|pleasant|Unpleasant|Pleasant|Sgradevole|Piacevole
+likeability|nice|Awful|Nice|Terribile|Simpatico
+perceived_intelligence|competent|Incompetent|Competent|Incompetente|Competente
+perceived_intelligence|knowledgeable|Ignorant|Knowledgeable|Ignorante|Preparato
+perceived_intelligence|responsible|Irresponsible|Responsible|Irresponsabile|Responsabile
+perceived_intelligence|intelligent|Unintelligent|Intelligent|Non intelligente|Intelligente
+perceived_intelligence|sensible|Foolish|Sensible|Sciocco|Assennato
+perceived_safety|relaxed|Anxious|Relaxed|Ansioso/a|Rilassato/a
+perceived_safety|calm|Agitated|Calm|Agitato/a|Calmo/a
+perceived_safety|surprised|Quiescent|Surprised|Quieto/a|Sorpreso/a";
+
+fn godspeed(language: Language) -> Vec<Item> {
+    let item = |[scale, id, left_en, right_en, left_it, right_it]: [&str; 6]| {
+        // The last scale is about the participant, not about the robot.
+        let text = match scale {
+            "perceived_safety" => language.choose(
+                "Please rate your emotional state.",
+                "Valuta il tuo stato emotivo.",
+            ),
+            _ => "",
+        };
+        Item {
+            id: id.to_owned(),
+            scale: scale.to_owned(),
+            text: text.to_owned(),
+            required: true,
+            kind: ItemKind::SemanticDifferential {
+                points: 5,
+                left: language.choose(left_en, left_it).to_owned(),
+                right: language.choose(right_en, right_it).to_owned(),
+            },
+        }
+    };
+    rows(GODSPEED).map(item).collect()
+}
+
+/// For each item its id, the question in English and in Italian, and the labels of its ends.
+/// Performance runs from "Perfect" to "Failure", so that a high value is always a high load.
+const NASA_TLX: &str = "\
+mental_demand|How mentally demanding was the task?|Quanto è stato impegnativo mentalmente il compito?|Very Low|Very High|Molto basso|Molto alto
+physical_demand|How physically demanding was the task?|Quanto è stato impegnativo fisicamente il compito?|Very Low|Very High|Molto basso|Molto alto
+temporal_demand|How hurried or rushed was the pace of the task?|Quanto è stato frettoloso o incalzante il ritmo del compito?|Very Low|Very High|Molto basso|Molto alto
+performance|How successful were you in accomplishing what you were asked to do?|Con quanto successo hai svolto ciò che ti era stato chiesto?|Perfect|Failure|Perfetto|Fallimento
+effort|How hard did you have to work to accomplish your level of performance?|Quanto impegno hai dovuto metterci per ottenere il tuo livello di prestazione?|Very Low|Very High|Molto basso|Molto alto
+frustration|How insecure, discouraged, irritated, stressed, and annoyed were you?|Quanta insicurezza, scoraggiamento, irritazione, stress e fastidio hai provato?|Very Low|Very High|Molto basso|Molto alto";
+
+fn nasa_tlx(language: Language) -> Vec<Item> {
+    let item = |[id, text_en, text_it, left_en, right_en, left_it, right_it]: [&str; 7]| Item {
+        id: id.to_owned(),
+        scale: String::new(),
+        text: language.choose(text_en, text_it).to_owned(),
+        required: true,
+        kind: ItemKind::Slider {
+            min: 0,
+            max: 100,
+            step: 5,
+            left: language.choose(left_en, left_it).to_owned(),
+            right: language.choose(right_en, right_it).to_owned(),
+        },
+    };
+    rows(NASA_TLX).map(item).collect()
+}
+
+/// The rows of a table above.
+fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [&str; N]> {
+    table.lines().map(|line| {
+        let columns: Vec<&str> = line.split('|').collect();
+        columns.try_into().expect("every row has all columns")
+    })
+}

@@ -1,0 +1,182 @@
+//! What a participant may see of a study. No type here has a place for a condition, a slot, an
+//! identifier that researchers chose, or the labels of other seats, so none of them can be sent by
+//! mistake.
+
+use std::collections::BTreeSet;
+
+use crate::Study;
+use crate::games::Phase;
+use crate::questionnaire::{ItemKind, Questionnaire};
+use crate::settings::Hide;
+use crate::stage::{Consent, ExternalQuestionnaire, Task, Text};
+use crate::state::{Participant, Status};
+use crate::templates::Language;
+
+/// What to show to a participant now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct View {
+    /// Title of the study.
+    pub title: String,
+    /// Language of the page.
+    pub language: Language,
+    /// The participant's pseudonym; empty after its data were deleted.
+    pub pseudonym: String,
+    /// The step, from 0; the number of steps after the last.
+    pub step: usize,
+    /// Number of steps, the same for all participants.
+    pub steps: usize,
+    /// Whether interface traces are recorded.
+    pub traces: bool,
+    /// The content.
+    pub content: Content,
+}
+
+/// The content of a view.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Content {
+    /// A text to agree to.
+    Consent(Consent),
+    /// A questionnaire.
+    Questionnaire(ShownQuestionnaire),
+    /// An external questionnaire, its address complete.
+    External(ExternalQuestionnaire),
+    /// A text to read.
+    Text(Text),
+    /// A game, or practice.
+    Game(ShownGame),
+    /// Nothing more.
+    End(End),
+}
+
+/// A questionnaire, as participants see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShownQuestionnaire {
+    /// Title, or empty.
+    pub title: String,
+    /// Text above the items, or empty.
+    pub instructions: String,
+    /// The items in the order in which to show them.
+    pub items: Vec<ShownItem>,
+}
+
+/// An item, as participants see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShownItem {
+    /// Index of the item in the questionnaire's definition.
+    pub item: usize,
+    /// The question or statement.
+    pub text: String,
+    /// Whether it must be answered.
+    pub required: bool,
+    /// How it is answered.
+    pub kind: ItemKind,
+}
+
+/// A game, as its participant sees it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShownGame {
+    /// Whether it is practice.
+    pub practice: bool,
+    /// Number of the game in this step, from 1.
+    pub game: u32,
+    /// Number of games in this step.
+    pub games: u32,
+    /// Parts of the page that are hidden; empty until there is a room.
+    pub hide: BTreeSet<Hide>,
+    /// Ids of its room and of the game, once there is a room.
+    pub place: Option<([u8; 16], [u8; 16])>,
+    /// Whether the game has ended.
+    pub ended: bool,
+}
+
+/// Why nothing more is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The participant has completed the study.
+    Completed,
+    /// It has withdrawn; its data so far are kept.
+    Withdrawn,
+    /// It has withdrawn, and its data were deleted.
+    DataDeleted,
+    /// It was away for too long.
+    DroppedOut,
+    /// It was removed by the study's owner.
+    Removed,
+}
+
+impl Study {
+    /// What to show to a participant now; `None` if it has not begun or is unknown.
+    pub fn view(&self, number: u32) -> Option<View> {
+        let participant = self.participant(number)?;
+        let content = match participant.status {
+            Status::Invited => return None,
+            Status::Active => self.content(number, participant)?,
+            Status::Completed => Content::End(End::Completed),
+            Status::Withdrawn if participant.data_deleted => Content::End(End::DataDeleted),
+            Status::Withdrawn => Content::End(End::Withdrawn),
+            Status::DroppedOut => Content::End(End::DroppedOut),
+            Status::Removed => Content::End(End::Removed),
+        };
+        let settings = self.settings();
+        Some(View {
+            title: settings.title.clone(),
+            language: settings.language,
+            pseudonym: participant.pseudonym.clone(),
+            step: participant.step(),
+            steps: self.step_count(),
+            traces: settings.traces,
+            content,
+        })
+    }
+
+    fn content(&self, number: u32, participant: &Participant) -> Option<Content> {
+        Some(match self.step_of(participant)?.task {
+            Task::Consent(consent) => Content::Consent(consent.clone()),
+            Task::Questionnaire(questionnaire) => {
+                let seed = self.settings().assignment_seed;
+                let order = questionnaire.order(seed, number, participant.step());
+                Content::Questionnaire(ShownQuestionnaire::of(questionnaire, &order))
+            }
+            Task::External(it) => Content::External(it.filled_in(&participant.pseudonym)),
+            Task::Text(text) => Content::Text(text.clone()),
+            Task::Practice { .. } => Content::Game(self.shown_game(participant, true, 1)),
+            Task::Games { count } => Content::Game(self.shown_game(participant, false, *count)),
+        })
+    }
+
+    fn shown_game(&self, participant: &Participant, practice: bool, games: u32) -> ShownGame {
+        let (game, ended) = match Phase::of(participant) {
+            Phase::Due { .. } => (None, false),
+            Phase::Playing(game) => (Some(&game.placed), false),
+            Phase::Over(game) => (Some(&game.placed), true),
+        };
+        let conditions = &self.settings().conditions;
+        ShownGame {
+            practice,
+            game: participant.games_done() + 1,
+            games,
+            hide: game.map_or_else(BTreeSet::new, |it| conditions[it.condition].hide.clone()),
+            place: game.map(|it| (it.room, it.game)),
+            ended,
+        }
+    }
+}
+
+impl ShownQuestionnaire {
+    fn of(questionnaire: &Questionnaire, order: &[usize]) -> Self {
+        let shown = |&index: &usize| {
+            let item = &questionnaire.items[index];
+            ShownItem {
+                item: index,
+                text: item.text.clone(),
+                required: item.required,
+                kind: item.kind.clone(),
+            }
+        };
+        Self {
+            title: questionnaire.title.clone(),
+            instructions: questionnaire.instructions.clone(),
+            items: order.iter().map(shown).collect(),
+        }
+    }
+}

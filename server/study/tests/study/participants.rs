@@ -1,0 +1,222 @@
+//! Participants: beginning, sessions, steps, dropping out, withdrawing, being removed.
+
+use chefshat_study::testing::{settings, within};
+use chefshat_study::{At, Content, End, Refusal, Status};
+
+use super::support::Lab;
+
+fn status(lab: &Lab, number: u32) -> Status {
+    lab.study.participant(number).unwrap().status
+}
+
+fn slot(lab: &Lab, number: u32) -> Option<u32> {
+    lab.study.participant(number).unwrap().slot
+}
+
+#[test]
+fn a_participant_completes_all_steps() {
+    let mut lab = Lab::new(within(2), 1);
+    assert_eq!((status(&lab, 1), slot(&lab, 1)), (Status::Invited, None));
+    let games = lab.complete(1);
+    assert_eq!(games.len(), 5);
+    let participant = lab.study.participant(1).unwrap();
+    assert_eq!(participant.status, Status::Completed);
+    assert_eq!(participant.reached_at_ms.len(), lab.study.step_count() + 1);
+    assert_eq!(participant.answers.len(), 2);
+    let consent = participant.consent.as_ref().unwrap();
+    assert_eq!(
+        (consent.version.as_str(), consent.language.as_str()),
+        ("1", "en")
+    );
+    // printf 'I take part.' | sha256sum
+    assert_eq!(consent.text_sha256[..4], [0x80, 0xf3, 0x13, 0x13]);
+    assert_eq!(
+        lab.study.view(1).unwrap().content,
+        Content::End(End::Completed)
+    );
+    assert!(lab.folded_again() == lab.study);
+}
+
+#[test]
+fn the_newest_session_wins_and_repeated_commands_change_nothing() {
+    let mut lab = Lab::new(settings(), 1);
+    lab.open(1).unwrap();
+    let first = lab.at(1);
+    lab.open(1).unwrap();
+    assert_eq!(slot(&lab, 1), Some(0));
+    assert_eq!(lab.study.consent(first, 0), Err(Refusal::Superseded));
+    let second = lab.at(1);
+    lab.act(1);
+    assert_eq!(lab.study.consent(second, 0), Err(Refusal::StepOver));
+    assert_eq!(lab.study.consent(lab.at(1), 0), Err(Refusal::StepMismatch));
+    assert_eq!(
+        lab.study.answer(lab.at(1), Vec::new(), 0),
+        Err(Refusal::StepMismatch)
+    );
+    assert_eq!(lab.study.proceed(lab.at(1), 0), Err(Refusal::GameNotOver));
+    let unknown = At {
+        number: 2,
+        ..second
+    };
+    assert_eq!(lab.study.consent(unknown, 0), Err(Refusal::Unknown));
+    lab.complete(1);
+    assert_eq!(lab.study.proceed(lab.at(1), 0), Err(Refusal::Over));
+    // The link still shows the end, without a new session.
+    let sessions = lab.study.participant(1).unwrap().session;
+    lab.open(1).unwrap();
+    assert_eq!(lab.study.participant(1).unwrap().session, sessions);
+}
+
+#[test]
+fn sessions_are_bounded() {
+    let mut lab = Lab::new(settings(), 1);
+    for _ in 0..chefshat_study::MAX_SESSIONS {
+        lab.open(1).unwrap();
+    }
+    assert_eq!(lab.open(1), Err(Refusal::TooManySessions));
+}
+
+#[test]
+fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again() {
+    let mut lab = Lab::new(settings(), 3);
+    lab.open(1).unwrap();
+    lab.act(1);
+    lab.wait(200_000);
+    assert_eq!(status(&lab, 1), Status::Active);
+
+    lab.study.set_connected(1, false, lab.now_ms);
+    lab.wait(59_999);
+    assert_eq!(lab.study.wake_at(), Some(lab.now_ms + 1));
+    assert_eq!(status(&lab, 1), Status::Active);
+    lab.wait(1);
+    assert_eq!(status(&lab, 1), Status::DroppedOut);
+    assert_eq!(lab.study.wake_at(), None);
+    assert!(lab.study.due(1).is_none());
+
+    // Its slot is free: it continues where it was.
+    lab.open(1).unwrap();
+    assert_eq!(
+        (status(&lab, 1), slot(&lab, 1), lab.at(1).step),
+        (Status::Active, Some(0), 1)
+    );
+    assert_eq!(lab.study.participant(1).unwrap().ended_at_ms, None);
+
+    // A restart: nobody is connected, and the time counts from then.
+    lab.study = lab.folded_again();
+    lab.wait(0);
+    lab.wait(60_000);
+    assert_eq!(status(&lab, 1), Status::DroppedOut);
+    lab.open(2).unwrap();
+    assert_eq!(slot(&lab, 2), Some(0));
+    lab.open(1).unwrap();
+    assert_eq!(status(&lab, 1), Status::DroppedOut);
+    assert_eq!(
+        lab.study.view(1).unwrap().content,
+        Content::End(End::DroppedOut)
+    );
+    assert_eq!(lab.study.consent(lab.at(1), 0), Err(Refusal::Over));
+}
+
+#[test]
+fn withdrawing_is_always_possible_and_does_what_it_says() {
+    let mut settings = within(2);
+    settings.participants = 2;
+    let mut lab = Lab::new(settings, 4);
+    lab.complete(1);
+    lab.open(2).unwrap();
+    lab.wait(500);
+    lab.fold(lab.study.close().unwrap());
+    for number in 1..=3 {
+        let withdrew = lab
+            .study
+            .withdraw(number, false, lab.now_ms)
+            .unwrap()
+            .unwrap();
+        lab.fold(withdrew);
+        assert_eq!(status(&lab, number), Status::Withdrawn);
+        assert_eq!(lab.study.withdraw(number, false, lab.now_ms), Ok(None));
+        assert_eq!(
+            lab.study.view(number).unwrap().content,
+            Content::End(End::Withdrawn)
+        );
+    }
+    let kept = lab.study.participant(1).unwrap();
+    assert_eq!((kept.answers.len(), kept.pseudonym.as_str()), (2, "P01"));
+
+    let deleted = lab.study.withdraw(1, true, lab.now_ms).unwrap().unwrap();
+    lab.fold(deleted);
+    assert_eq!(lab.study.withdraw(1, true, lab.now_ms), Ok(None));
+    let participant = lab.study.participant(1).unwrap();
+    assert!(participant.answers.is_empty() && participant.pseudonym.is_empty());
+    assert!(participant.consent.is_some() && participant.games.len() == 5);
+    assert_eq!(
+        lab.study.view(1).unwrap().content,
+        Content::End(End::DataDeleted)
+    );
+
+    // The stored changes lose the data too, and fold to the same study.
+    let stored_again = lab.changes.iter_mut().map(|change| change.forget(1));
+    assert_eq!(stored_again.filter(|changed| *changed).count(), 3);
+    let text = format!("{:?}", lab.changes);
+    assert!(!text.contains("P01") && text.contains("P02") && !text.contains("Number("));
+    assert!(lab.folded_again() == lab.study);
+}
+
+#[test]
+fn a_slot_is_given_again_first() {
+    let mut lab = Lab::new(settings(), 6);
+    (1..=3).for_each(|number| lab.open(number).unwrap());
+    let withdrew = lab.study.withdraw(2, false, 0).unwrap().unwrap();
+    lab.fold(withdrew);
+    let removed = lab.study.remove(1, 0).unwrap().unwrap();
+    lab.fold(removed);
+    assert_eq!(lab.study.remove(1, 0), Ok(None));
+    assert_eq!(lab.study.remove(2, 0), Err(Refusal::Over));
+    assert_eq!(lab.open(1), Ok(()));
+    assert_eq!(
+        lab.study.view(1).unwrap().content,
+        Content::End(End::Removed)
+    );
+    assert!(lab.study.withdraw(1, true, 0).unwrap().is_some());
+    (4..=6).for_each(|number| lab.open(number).unwrap());
+    let slots: Vec<_> = (3..=6).map(|number| slot(&lab, number)).collect();
+    assert_eq!(slots, [Some(2), Some(0), Some(1), Some(3)]);
+}
+
+#[test]
+fn a_full_or_closed_study_accepts_nobody() {
+    let mut settings = settings();
+    settings.participants = 1;
+    settings.closes_at_ms = Some(2_000_000);
+    let mut lab = Lab::new(settings, 3);
+    lab.open(1).unwrap();
+    assert_eq!(lab.open(2), Err(Refusal::Full));
+    assert!(lab.study.view(2).is_none());
+    lab.wait(0);
+    assert_eq!(lab.study.wake_at(), Some(2_000_000));
+    lab.wait(1_000_000);
+    assert!(lab.study.is_closed() && lab.study.close().is_none());
+    assert_eq!(lab.open(2), Err(Refusal::Closed));
+    assert_eq!(lab.study.add(&[String::new()]), Err(Refusal::Closed));
+    // Who has begun continues, also in a new session.
+    lab.complete(1);
+    assert_eq!(status(&lab, 1), Status::Completed);
+}
+
+#[test]
+fn pseudonyms_are_unique_and_follow_from_numbers() {
+    let mut lab = Lab::new(settings(), 1);
+    let names = ["p04", "", "", "Ada"].map(str::to_owned);
+    for change in lab.study.add(&names).unwrap() {
+        lab.fold(change);
+    }
+    let participants = lab.study.participants().values();
+    let pseudonyms: Vec<_> = participants.map(|it| it.pseudonym.as_str()).collect();
+    assert_eq!(pseudonyms, ["P01", "p04", "P03", "P05", "Ada"]);
+    for taken in [&["ada".to_owned()][..], &["Bo".to_owned(), "BO".to_owned()]] {
+        assert!(matches!(lab.study.add(taken), Err(Refusal::NameTaken(_))));
+    }
+    let most = chefshat_study::MAX_PARTICIPANTS as usize;
+    let too_many = lab.study.add(&vec![String::new(); most]);
+    assert_eq!(too_many, Err(Refusal::TooManyParticipants));
+}

@@ -1,0 +1,204 @@
+//! Settings: every check names its field.
+
+use std::collections::BTreeMap;
+
+use chefshat_study::testing::{condition, consent, settings, text, within};
+use chefshat_study::{
+    ExternalQuestionnaire, Factor, Item, ItemKind, Language, Questionnaire, Settings, Stage, Study,
+    Task, Template,
+};
+
+fn check(field: &str, start: Settings, change: impl FnOnce(&mut Settings)) {
+    let mut changed = start;
+    change(&mut changed);
+    let problem = Study::new(changed).expect_err(field);
+    assert_eq!(problem.field, field, "{problem}");
+}
+
+fn item(kind: ItemKind) -> Stage {
+    Stage::Once(Task::Questionnaire(Questionnaire {
+        id: "q".to_owned(),
+        title: String::new(),
+        instructions: String::new(),
+        items: vec![Item {
+            id: "i".to_owned(),
+            scale: String::new(),
+            text: "?".to_owned(),
+            required: false,
+            kind,
+        }],
+        shuffled: false,
+    }))
+}
+
+fn slider(min: i32, max: i32, step: u32) -> Stage {
+    let (left, right) = (String::new(), String::new());
+    item(ItemKind::Slider {
+        min,
+        max,
+        step,
+        left,
+        right,
+    })
+}
+
+fn external(url: &str) -> Stage {
+    let (text, url) = (String::new(), url.to_owned());
+    Stage::Once(Task::External(ExternalQuestionnaire { text, url }))
+}
+
+#[test]
+fn the_settings_of_the_tests_are_valid() {
+    Study::new(settings()).unwrap();
+    (1..=12).for_each(|conditions| drop(Study::new(within(conditions)).unwrap()));
+}
+
+#[test]
+fn a_problem_of_the_design_names_its_field() {
+    let factor = |name: &str| Factor {
+        name: name.to_owned(),
+        levels: vec!["x".to_owned()],
+    };
+    check("title", settings(), |it| it.title.clear());
+    check("title", settings(), |it| it.title = "a\u{7}".to_owned());
+    check("participants", settings(), |it| it.participants = 0);
+    check("participants", settings(), |it| it.participants = 10_001);
+    check("factors", settings(), |it| {
+        it.factors = vec![factor("x"); 9]
+    });
+    check("factors[0].name", settings(), |it| {
+        it.factors[0].name = "a b".to_owned()
+    });
+    check("factors[0].levels", settings(), |it| {
+        it.factors[0].levels.clear()
+    });
+    check("factors[0].levels", settings(), |it| {
+        it.factors[0].levels[1] = "é".to_owned()
+    });
+    check("factors[1].name", within(2), |it| {
+        it.factors = vec![factor("x"), factor("x")]
+    });
+    check("conditions", settings(), |it| it.conditions.clear());
+    check("conditions", within(13), |_| {});
+    check("conditions[1].id", settings(), |it| {
+        it.conditions[1].id = "condition-0".to_owned()
+    });
+    check("conditions[0].id", settings(), |it| {
+        it.conditions[0].id.clear()
+    });
+    check("conditions[0].levels", settings(), |it| {
+        it.conditions[0].levels.clear()
+    });
+    check("conditions[2].levels", settings(), |it| {
+        it.conditions.push(condition(2))
+    });
+    check("conditions[0].levels", within(2), |it| {
+        it.conditions[0].levels = BTreeMap::from([("y".to_owned(), "x".to_owned())]);
+    });
+    check("conditions[0].rules.players", settings(), |it| {
+        it.conditions[0].players = 7
+    });
+    check("conditions[0].participant_seat", settings(), |it| {
+        it.conditions[0].participant_seat = Some(4);
+    });
+    check("conditions[1].seeds", settings(), |it| {
+        it.conditions[1].seeds = vec![[0; 32]; 1001]
+    });
+    check("seeds", settings(), |it| it.seeds.clear());
+    check("block_size", settings(), |it| it.block_size = Some(3));
+    check("block_size", settings(), |it| it.block_size = Some(0));
+    check("block_size", settings(), |it| it.block_size = Some(34));
+    check("block_size", within(3), |it| it.block_size = Some(3));
+    check("drop_out_after_ms", settings(), |it| {
+        it.drop_out_after_ms = 1000
+    });
+}
+
+#[test]
+fn a_problem_of_a_stage_names_its_field() {
+    let games = |count| Stage::Once(Task::Games { count });
+    check("stages", settings(), |it| it.stages.clear());
+    check("stages", settings(), |it| it.stages = vec![games(100); 11]);
+    check("stages", within(12), |it| {
+        it.stages = vec![Stage::PerCondition(vec![text(); 17])]
+    });
+    check("stages[1]", settings(), |it| {
+        it.stages[1] = Stage::Once(consent())
+    });
+    check("stages[0].per_condition.stages[0]", settings(), |it| {
+        it.stages[0] = Stage::PerCondition(vec![consent()]);
+    });
+    check("stages[0].per_condition.stages", settings(), |it| {
+        it.stages[0] = Stage::PerCondition(Vec::new());
+    });
+    check("stages[3]", within(2), |it| it.stages[3] = games(1));
+    check("stages[1].games.count", settings(), |it| {
+        it.stages[1] = games(0)
+    });
+    check("stages[2].questionnaire.id", settings(), |it| {
+        let twice = Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English));
+        it.stages[1] = Stage::Once(twice.clone());
+        it.stages[2] = Stage::Once(twice);
+    });
+    for url in [
+        "http://example.org",
+        "https://",
+        "https:///x",
+        "https://{participant}.example.org",
+        "https://example.org/?c={condition}",
+        "https://example.org/a b",
+        "javascript:alert(1)",
+    ] {
+        let field = "stages[1].external_questionnaire.url";
+        check(field, settings(), |it| it.stages[1] = external(url));
+    }
+    let mut valid = settings();
+    valid.stages[1] = external("https://example.org/?p={participant}&q={participant}");
+    Study::new(valid).unwrap();
+}
+
+#[test]
+fn a_problem_of_an_item_names_its_field() {
+    let labels = |count| vec!["x".to_owned(); count];
+    let likert = |points, count| {
+        item(ItemKind::Likert {
+            points,
+            labels: labels(count),
+        })
+    };
+    let choice = |options: &[&str]| {
+        let options = options.iter().map(|&it| it.to_owned()).collect();
+        item(ItemKind::Choice {
+            options,
+            multiple: true,
+        })
+    };
+    for (field, stage) in [
+        ("points", likert(1, 2)),
+        ("points", likert(12, 2)),
+        ("labels", likert(5, 3)),
+        ("min", slider(-1_000_001, 0, 1)),
+        ("max", slider(0, 0, 1)),
+        ("step", slider(0, 10, 0)),
+        ("step", slider(0, 10, 3)),
+        ("options", choice(&["a"])),
+        ("options[1]", choice(&["a", "a"])),
+        (
+            "max_characters",
+            item(ItemKind::FreeText { max_characters: 0 }),
+        ),
+    ] {
+        let field = format!("stages[1].questionnaire.items[0].{field}");
+        check(&field, settings(), |it| it.stages[1] = stage);
+    }
+    for stage in [
+        likert(5, 2),
+        likert(5, 5),
+        slider(-10, 10, 5),
+        choice(&["a", "b"]),
+    ] {
+        let mut valid = settings();
+        valid.stages[1] = stage;
+        Study::new(valid).unwrap();
+    }
+}

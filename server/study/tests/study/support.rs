@@ -1,0 +1,141 @@
+//! A study that tests move on, with the changes it has folded.
+
+use chefshat_study::{
+    Answer, At, Change, Content, DueGame, ItemAnswer, ItemKind, Outcome, Refusal, Settings, Study,
+};
+
+pub(crate) struct Lab {
+    pub(crate) study: Study,
+    pub(crate) changes: Vec<Change>,
+    pub(crate) now_ms: u64,
+}
+
+impl Lab {
+    /// A study with this number of invited participants.
+    pub(crate) fn new(settings: Settings, invited: usize) -> Self {
+        let mut lab = Self {
+            study: Study::new(settings).unwrap(),
+            changes: Vec::new(),
+            now_ms: 1_000_000,
+        };
+        lab.add(invited);
+        lab
+    }
+
+    pub(crate) fn fold(&mut self, change: Change) {
+        self.study.fold(&change);
+        self.changes.push(change);
+    }
+
+    pub(crate) fn add(&mut self, count: usize) {
+        let added = self.study.add(&vec![String::new(); count]).unwrap();
+        added.into_iter().for_each(|change| self.fold(change));
+    }
+
+    pub(crate) fn open(&mut self, number: u32) -> Result<(), Refusal> {
+        if let Some(opened) = self.study.open(number, self.now_ms)? {
+            self.fold(opened);
+            self.study.set_connected(number, true, self.now_ms);
+        }
+        Ok(())
+    }
+
+    /// Folds what follows by itself.
+    pub(crate) fn wait(&mut self, ms: u64) {
+        self.now_ms += ms;
+        while let Some(change) = self.study.next(self.now_ms) {
+            self.fold(change);
+        }
+    }
+
+    /// Where a participant is.
+    pub(crate) fn at(&self, number: u32) -> At {
+        let participant = self.study.participant(number).unwrap();
+        At {
+            number,
+            session: participant.session,
+            step: participant.step(),
+        }
+    }
+
+    /// A participant does what comes next. Returns the game that it began, if it is one.
+    pub(crate) fn act(&mut self, number: u32) -> Option<DueGame> {
+        let due = self.study.due(number);
+        let (at, now_ms) = (self.at(number), self.now_ms);
+        let change = match self.study.view(number).unwrap().content {
+            Content::Consent(_) => self.study.consent(at, now_ms).unwrap(),
+            Content::Questionnaire(shown) => {
+                let answers = shown.items.iter();
+                let answers = answers.map(|it| answer(it.item, valid(&it.kind))).collect();
+                self.study.answer(at, answers, now_ms).unwrap()
+            }
+            Content::Game(game) if game.place.is_none() => self.place(number),
+            Content::Game(game) if !game.ended => self.ended(number, Outcome::Finished),
+            Content::Game(_) | Content::External(_) | Content::Text(_) => {
+                self.study.proceed(at, now_ms).unwrap()
+            }
+            Content::End(_) => return None,
+        };
+        self.fold(change);
+        due
+    }
+
+    /// The change by which a participant's due game begins.
+    pub(crate) fn place(&self, number: u32) -> Change {
+        // Every game has its own id: there are fewer than 256 changes of a participant in a test.
+        let games = self.study.participant(number).unwrap().games.len() as u8;
+        let game = [games, number as u8].repeat(8).try_into().unwrap();
+        self.study.place(number, [9; 16], game).unwrap()
+    }
+
+    /// The change by which a participant's running game ends.
+    pub(crate) fn ended(&self, number: u32, outcome: Outcome) -> Change {
+        let games = &self.study.participant(number).unwrap().games;
+        let game = games.last().unwrap().placed.game;
+        let ended = self.study.game_ended(number, game, outcome, self.now_ms);
+        ended.unwrap()
+    }
+
+    /// A participant opens its link and does everything to the end. Returns its games.
+    pub(crate) fn complete(&mut self, number: u32) -> Vec<DueGame> {
+        self.open(number).unwrap();
+        let mut games = Vec::new();
+        while self
+            .study
+            .participant(number)
+            .unwrap()
+            .ended_at_ms
+            .is_none()
+        {
+            games.extend(self.act(number));
+        }
+        games
+    }
+
+    /// The same study, from its changes.
+    pub(crate) fn folded_again(&self) -> Study {
+        let mut study = Study::new(self.study.settings().clone()).unwrap();
+        self.changes.iter().for_each(|change| study.fold(change));
+        study
+    }
+}
+
+pub(crate) fn answer(item: usize, value: Answer) -> ItemAnswer {
+    ItemAnswer {
+        item,
+        value,
+        answered_after_ms: None,
+    }
+}
+
+/// A valid answer to an item.
+pub(crate) fn valid(kind: &ItemKind) -> Answer {
+    match kind {
+        ItemKind::Likert { points, .. } | ItemKind::SemanticDifferential { points, .. } => {
+            Answer::Number(*points as i32)
+        }
+        ItemKind::Slider { min, step, .. } => Answer::Number(min + *step as i32),
+        ItemKind::Choice { .. } => Answer::Options(vec![1]),
+        ItemKind::FreeText { .. } => Answer::Text("It was\nfun.".to_owned()),
+    }
+}

@@ -1,0 +1,307 @@
+//! What participants and the organiser change by hand: leaving, replacing, pausing, postponing and
+//! calling again. When each is possible, and its effect on the state. `scheduler` checks the games
+//! that may then be called.
+
+use thiserror::Error;
+
+use super::Tournament;
+use super::change::{Change, Entrant, Former, GameState};
+use super::entry::JoinProblem;
+use super::settings::Format;
+use super::state::{State, TournamentState};
+
+/// Maximum number of changes by hand, which bounds what is stored of them.
+pub const MAX_CHANGES_BY_HAND: u32 = 10_000;
+/// Maximum number of times that a place is taken by somebody else.
+pub const MAX_REPLACEMENTS: usize = 4;
+
+/// Why a change by hand is not possible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum ByHandProblem {
+    /// There is no such participant.
+    #[error("this tournament has no participant with this number")]
+    NoParticipant,
+    /// A filler cannot leave.
+    #[error("a filler only fills up the tables and cannot leave; replace it instead")]
+    Filler,
+    /// The tournament is finished or closed.
+    #[error("the tournament is over")]
+    Over,
+    /// The tournament has not begun, or is over.
+    #[error("the tournament is not being played: start it first, unless it is over")]
+    NotPlaying,
+    /// The place was taken by others too often.
+    #[error("this place was taken by somebody else {MAX_REPLACEMENTS} times, which is the maximum")]
+    TooManyReplacements,
+    /// The new participant cannot join.
+    #[error(transparent)]
+    Join(#[from] JoinProblem),
+    /// There is no such game.
+    #[error("this tournament has not drawn a game with this number")]
+    NoGame,
+    /// The game is being played, or has ended.
+    #[error("the game is being played or has ended")]
+    NotDue,
+    /// The participant does not play the game.
+    #[error("only the organiser and participants of the game can postpone it")]
+    NotInGame,
+    /// The participant has postponed the game too often.
+    #[error("you have postponed this game {0} times, which is the maximum; ask the organiser")]
+    PostponedTooOften(u32),
+    /// Too many changes by hand.
+    #[error("a tournament can be changed by hand at most {MAX_CHANGES_BY_HAND} times")]
+    TooMany,
+}
+
+impl Tournament {
+    /// The participant with this number has left.
+    pub fn is_withdrawn(&self, participant: usize) -> bool {
+        self.state.withdrawn.get(participant) == Some(&true)
+    }
+
+    /// Who had the place of a participant before, in order.
+    pub fn former(&self, participant: usize) -> &[Former] {
+        let former = self.state.former.get(participant);
+        former.map_or(&[], Vec::as_slice)
+    }
+
+    /// Number of changes by hand so far.
+    pub fn changes_by_hand(&self) -> u32 {
+        self.state.by_hand
+    }
+
+    /// Whether no game is called until the tournament is resumed.
+    pub fn is_paused(&self) -> bool {
+        self.state.paused
+    }
+
+    /// The change by which a participant leaves; `None` if it has left.
+    ///
+    /// # Errors
+    /// If it cannot leave.
+    pub fn withdraw(
+        &self,
+        participant: usize,
+        removed: bool,
+    ) -> Result<Option<Change>, ByHandProblem> {
+        let entrant = self.place(participant)?;
+        if entrant.filler {
+            return Err(ByHandProblem::Filler);
+        }
+        let change = Change::Withdrawn {
+            participant,
+            removed,
+        };
+        Ok((!self.is_withdrawn(participant)).then_some(change))
+    }
+
+    /// The change by which somebody else takes the place of a participant.
+    ///
+    /// # Errors
+    /// If the new participant cannot take it.
+    pub fn replace(&self, participant: usize, by: Entrant) -> Result<Change, ByHandProblem> {
+        self.place(participant)?;
+        if self.state.phase == State::Open && self.is_withdrawn(participant) {
+            // The place is free: anybody can join.
+            return Err(ByHandProblem::NoParticipant);
+        }
+        if self.former(participant).len() >= MAX_REPLACEMENTS {
+            return Err(ByHandProblem::TooManyReplacements);
+        }
+        self.admits(&by, Some(participant))?;
+        Ok(Change::Replaced { participant, by })
+    }
+
+    /// The change that pauses or resumes the tournament; `None` if it is paused or not already.
+    ///
+    /// # Errors
+    /// It is not being played.
+    pub fn set_paused(&self, paused: bool) -> Result<Option<Change>, ByHandProblem> {
+        self.being_played()?;
+        let change = if paused {
+            Change::Paused
+        } else {
+            Change::Resumed
+        };
+        Ok((self.state.paused != paused).then_some(change))
+    }
+
+    /// The change that postpones a game; `by` a participant, or the organiser.
+    ///
+    /// # Errors
+    /// It cannot be postponed.
+    pub fn postpone(&self, game: usize, by: Option<usize>) -> Result<Change, ByHandProblem> {
+        self.being_played()?;
+        let found = (self.games().get(game)).ok_or(ByHandProblem::NoGame)?;
+        if let Some(by) = by
+            && (!found.seats.contains(&by) || self.is_withdrawn(by))
+        {
+            return Err(ByHandProblem::NotInGame);
+        }
+        if found.state != GameState::Due {
+            return Err(ByHandProblem::NotDue);
+        }
+        let most = self.state.settings.max_calls;
+        let times = found.postponed.iter().filter(|&&who| who == by).count();
+        if by.is_some() && times >= most as usize {
+            return Err(ByHandProblem::PostponedTooOften(most));
+        }
+        Ok(Change::Postponed { game, by })
+    }
+
+    /// The change that calls a due or void game again, before all others.
+    ///
+    /// # Errors
+    /// It cannot be called.
+    pub fn recall(&self, game: usize) -> Result<Change, ByHandProblem> {
+        self.being_played()?;
+        let found = (self.games().get(game)).ok_or(ByHandProblem::NoGame)?;
+        // Who advanced to the next round of a knockout has been decided.
+        let is_decided =
+            self.state.settings.format == Format::Knockout && found.round < self.state.drawn;
+        match found.state {
+            GameState::Due => Ok(Change::Recalled { game }),
+            GameState::Void if !is_decided => Ok(Change::Recalled { game }),
+            _ => Err(ByHandProblem::NotDue),
+        }
+    }
+
+    /// A participant of a tournament that is not over.
+    fn place(&self, participant: usize) -> Result<&Entrant, ByHandProblem> {
+        if self.state.phase.is_over() {
+            return Err(ByHandProblem::Over);
+        }
+        self.few_changes()?;
+        let entrant = self.state.participants.get(participant);
+        entrant.ok_or(ByHandProblem::NoParticipant)
+    }
+
+    fn being_played(&self) -> Result<(), ByHandProblem> {
+        match self.state.phase {
+            State::Playing => self.few_changes(),
+            State::Open | State::Finished | State::Closed => Err(ByHandProblem::NotPlaying),
+        }
+    }
+
+    fn few_changes(&self) -> Result<(), ByHandProblem> {
+        match self.state.by_hand < MAX_CHANGES_BY_HAND {
+            true => Ok(()),
+            false => Err(ByHandProblem::TooMany),
+        }
+    }
+}
+
+impl TournamentState {
+    pub(super) fn withdraw(&mut self, participant: usize) {
+        if participant >= self.participants.len() {
+            return;
+        }
+        self.by_hand += 1;
+        self.leave_games(participant);
+        self.withdrawn[participant] = true;
+        self.set_physical_of(participant);
+    }
+
+    pub(super) fn replace(&mut self, participant: usize, by: &Entrant) {
+        if participant >= self.participants.len() {
+            return;
+        }
+        self.by_hand += 1;
+        self.leave_games(participant);
+        self.withdrawn[participant] = false;
+        let games = self.sums[participant].games;
+        let entrant = std::mem::replace(&mut self.participants[participant], by.clone());
+        self.former[participant].push(Former { entrant, games });
+        // What the former participant missed is not the new one's.
+        for &(_, index) in &self.due {
+            self.games[index].missing.retain(|&who| who != participant);
+        }
+        self.set_physical_of(participant);
+    }
+
+    /// A participant leaves the games that it is playing, unless it holds the cards of a physical
+    /// table.
+    fn leave_games(&mut self, participant: usize) {
+        if self.participants[participant].at_table {
+            return;
+        }
+        for &index in &self.playing {
+            let game = &mut self.games[index];
+            if game.is_played_by(participant) {
+                game.left.push(participant);
+                self.busy[participant] -= 1;
+            }
+        }
+    }
+
+    pub(super) fn postpone(&mut self, index: usize, by: Option<usize>) {
+        if !self.is_due(index) {
+            return;
+        }
+        self.by_hand += 1;
+        self.leave(index);
+        let game = &mut self.games[index];
+        game.missing.clear();
+        game.postponed.push(by);
+        self.queue(index);
+    }
+
+    pub(super) fn recall(&mut self, index: usize) {
+        if self.is_due(index) {
+            self.leave(index);
+        } else if self
+            .games
+            .get(index)
+            .is_some_and(|game| game.state == GameState::Void)
+        {
+            self.revive(index);
+        } else {
+            return;
+        }
+        self.by_hand += 1;
+        let game = &mut self.games[index];
+        game.state = GameState::Due;
+        game.calls = 0;
+        game.forfeited.clear();
+        game.missing.clear();
+        game.left.clear();
+        game.turn = self.front_turn;
+        self.due.insert((self.front_turn, index));
+        self.front_turn -= 1;
+        self.set_physical(index);
+    }
+
+    /// Makes a void game one that is still to be played.
+    fn revive(&mut self, index: usize) {
+        self.over -= 1;
+        let game = &mut self.games[index];
+        match game.deal.and_then(|deal| self.deals.get_mut(deal as usize)) {
+            // Its deal may be known.
+            Some(0) => game.deal = None,
+            Some(left) => *left += 1,
+            None => {}
+        }
+    }
+
+    fn is_due(&self, index: usize) -> bool {
+        let game = self.games.get(index);
+        game.is_some_and(|game| game.state == GameState::Due)
+    }
+
+    /// Sets of the due games of a participant whether they need a physical table.
+    fn set_physical_of(&mut self, participant: usize) {
+        let due = self.due.iter().map(|&(_, index)| index);
+        let its = due.filter(|&index| self.games[index].seats.contains(&participant));
+        for index in its.collect::<Vec<usize>>() {
+            self.set_physical(index);
+        }
+    }
+
+    /// Sets whether a game needs a physical table: a participant plays at one.
+    pub(super) fn set_physical(&mut self, index: usize) {
+        let mut seats = self.games[index].seats.iter();
+        let is_at_table = |&who: &usize| self.participants[who].at_table && !self.withdrawn[who];
+        let physical = seats.any(is_at_table);
+        self.games[index].physical = physical;
+    }
+}

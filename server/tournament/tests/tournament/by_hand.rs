@@ -1,0 +1,435 @@
+//! Changes by hand: leaving, replacing, pausing, postponing, calling again; and how long a game
+//! waits for those who had to wait themselves.
+
+use chefshat_agents::AgentKind;
+use chefshat_tournament::{
+    ByHandProblem, Change, Ended, Entrant, Format, GameState, JoinProblem, MAX_REPLACEMENTS,
+    Settings, State, Tournament,
+};
+
+use super::support::{
+    begun, end, entrant, follow, joined, play_through, played, played_by_number, settings,
+};
+
+const NO_SHOW_MS: u64 = 1000;
+
+fn fold(tournament: &mut Tournament, change: Change) {
+    tournament.fold(&change);
+}
+
+fn withdraw(tournament: &mut Tournament, who: usize) {
+    let change = tournament.withdraw(who, false).unwrap().unwrap();
+    fold(tournament, change);
+}
+
+fn pause(tournament: &mut Tournament, paused: bool) {
+    let change = tournament.set_paused(paused).unwrap().unwrap();
+    fold(tournament, change);
+}
+
+fn called(changes: &[Change]) -> Vec<(usize, Vec<usize>)> {
+    let games = changes.iter().filter_map(|change| match change {
+        Change::Called { game, forfeited } => Some((*game, forfeited.clone())),
+        _ => None,
+    });
+    games.collect()
+}
+
+/// Ends a game; lower numbers win.
+fn play(tournament: &mut Tournament, game: usize) {
+    let ended = played_by_number(tournament, game);
+    end(tournament, game, ended);
+}
+
+/// A Swiss tournament of one round at two tables, with two games at each.
+fn two_tables(change: impl FnOnce(&mut Settings)) -> Tournament {
+    let mut settings = settings(Format::Swiss);
+    settings.rounds = Some(1);
+    settings.games_per_pairing = 2;
+    change(&mut settings);
+    begun(settings, 8)
+}
+
+#[test]
+fn before_the_start_a_place_becomes_free_with_its_number_and_name() {
+    let mut tournament = joined(settings(Format::Knockout), 4);
+    withdraw(&mut tournament, 1);
+    assert!(tournament.is_withdrawn(1));
+    assert_eq!(tournament.withdraw(1, true), Ok(None), "it has left");
+    assert_eq!(tournament.standings().len(), 3);
+    assert_eq!(tournament.next_number(), 1);
+    let back = tournament.join(entrant("agent 1")).unwrap();
+    fold(&mut tournament, back);
+    assert!(!tournament.is_withdrawn(1) && !tournament.is_present(1));
+    assert_eq!(tournament.next_number(), 4);
+    withdraw(&mut tournament, 3);
+    withdraw(&mut tournament, 0);
+    for change in tournament.begin().unwrap() {
+        fold(&mut tournament, change);
+    }
+    let names: Vec<_> = (tournament.participants().iter())
+        .map(|it| it.name.as_str())
+        .collect();
+    assert_eq!(names, ["Filler 1", "agent 1", "agent 2", "Filler 2"]);
+}
+
+#[test]
+fn those_who_left_before_the_start_are_not_paired() {
+    for format in Format::ALL {
+        let mut tournament = joined(settings(format), 9);
+        for who in [0, 4, 8] {
+            withdraw(&mut tournament, who);
+        }
+        for change in tournament.begin().unwrap() {
+            fold(&mut tournament, change);
+        }
+        let is_out = |who: &usize| [4, 8].contains(who) && format != Format::Knockout;
+        play_through(&mut tournament);
+        assert_eq!(tournament.state(), State::Finished);
+        assert_eq!(tournament.games().len(), tournament.games_expected());
+        let seats = tournament.games().iter().flat_map(|game| &game.seats);
+        assert!(!seats.into_iter().any(is_out), "{format:?}");
+        let expected = if format == Format::Knockout { 8 } else { 6 };
+        assert_eq!(tournament.standings().len(), expected, "{format:?}");
+    }
+}
+
+#[test]
+fn who_leaves_forfeits_what_comes_without_being_waited_for() {
+    let mut tournament = two_tables(|_| {});
+    follow(&mut tournament, 0);
+    let leaver = tournament.games()[0].seats[0];
+    withdraw(&mut tournament, leaver);
+    assert_eq!(tournament.games()[0].left, [leaver]);
+    assert!(!tournament.games()[0].is_played_by(leaver));
+    // The substitute plays the game to its end; it counts for the participant.
+    end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+    assert_eq!(called(&follow(&mut tournament, 0)), [(1, vec![leaver])]);
+    play(&mut tournament, 1);
+    let standings = tournament.standings();
+    let line = standings.iter().find(|line| line.participant == leaver);
+    let line = line.unwrap();
+    assert_eq!((line.games, line.forfeited, line.score), (2, 1, 5));
+}
+
+#[test]
+fn a_game_that_could_not_start_is_called_again_without_those_who_left() {
+    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    follow(&mut tournament, 0);
+    let (leaver, other) = (
+        tournament.games()[0].seats[0],
+        tournament.games()[0].seats[1],
+    );
+    withdraw(&mut tournament, leaver);
+    // The other had not taken its seat when the room was closed; that is not its fault.
+    let missing = vec![leaver, other];
+    end(&mut tournament, 0, Ended::NeverStarted { missing });
+    assert_eq!(tournament.games()[0].state, GameState::Due);
+    // The second game at the table comes first.
+    assert_eq!(called(&follow(&mut tournament, 0)), [(1, vec![leaver])]);
+    end(&mut tournament, 1, played(&[1, 2, 3, 4]));
+    assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![leaver])]);
+}
+
+#[test]
+fn who_left_does_not_advance() {
+    let mut tournament = begun(settings(Format::Knockout), 8);
+    follow(&mut tournament, 0);
+    let best = *tournament.games()[0].seats.iter().min().unwrap();
+    withdraw(&mut tournament, best);
+    for game in [0, 1] {
+        play(&mut tournament, game);
+    }
+    follow(&mut tournament, 0);
+    let finalists = &tournament.games()[2].seats;
+    assert!(!finalists.contains(&best), "{finalists:?}");
+    // If nobody else can, they do.
+    let mut tournament = begun(settings(Format::Knockout), 8);
+    follow(&mut tournament, 0);
+    let seats = tournament.games()[0].seats.clone();
+    seats[1..]
+        .iter()
+        .for_each(|&who| withdraw(&mut tournament, who));
+    for game in [0, 1] {
+        play(&mut tournament, game);
+    }
+    let changes = follow(&mut tournament, 0);
+    let [(2, forfeited)] = &called(&changes)[..] else {
+        panic!("{changes:?}");
+    };
+    assert_eq!(forfeited.len(), 1);
+}
+
+#[test]
+fn a_paused_tournament_calls_nothing_and_waits_anew_afterwards() {
+    let mut tournament = two_tables(|_| {});
+    let away = tournament.games()[0].seats[0];
+    tournament.set_present(away, false);
+    assert_eq!(called(&follow(&mut tournament, 0)), [(2, vec![])]);
+    pause(&mut tournament, true);
+    assert_eq!(tournament.set_paused(true), Ok(None));
+    assert_eq!(follow(&mut tournament, 5 * NO_SHOW_MS), []);
+    assert_eq!(tournament.wake_at(), None);
+    end(&mut tournament, 2, played(&[1, 2, 3, 4]));
+    assert_eq!(follow(&mut tournament, 6 * NO_SHOW_MS), []);
+    pause(&mut tournament, false);
+    assert_eq!(
+        called(&follow(&mut tournament, 7 * NO_SHOW_MS)),
+        [(3, vec![])]
+    );
+    assert_eq!(tournament.wake_at(), Some(8 * NO_SHOW_MS));
+}
+
+#[test]
+fn a_postponed_game_goes_to_the_end_of_the_queue_and_costs_no_call() {
+    let mut tournament = two_tables(|settings| settings.max_parallel = 1);
+    let who = tournament.games()[2].seats[0];
+    assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![])]);
+    assert_eq!(tournament.postpone(0, None), Err(ByHandProblem::NotDue));
+    let stranger = tournament.games()[0].seats[0];
+    assert_eq!(
+        tournament.postpone(2, Some(stranger)),
+        Err(ByHandProblem::NotInGame)
+    );
+    for _ in 0..2 {
+        let change = tournament.postpone(2, Some(who)).unwrap();
+        fold(&mut tournament, change);
+    }
+    assert_eq!(
+        tournament.postpone(2, Some(who)),
+        Err(ByHandProblem::PostponedTooOften(2))
+    );
+    let mut order = vec![];
+    while tournament.state() == State::Playing {
+        let game = tournament.playing().next().unwrap();
+        order.push(game);
+        end(&mut tournament, game, played(&[1, 2, 3, 4]));
+        follow(&mut tournament, 0);
+    }
+    assert_eq!(order, [0, 1, 3, 2]);
+    assert_eq!(tournament.games()[2].calls, 1);
+}
+
+#[test]
+fn postponing_restarts_the_wait_for_the_absent() {
+    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    let away = tournament.games()[0].seats[0];
+    tournament.set_present(away, false);
+    follow(&mut tournament, 0);
+    for game in [0, 1] {
+        let change = tournament.postpone(game, None).unwrap();
+        fold(&mut tournament, change);
+    }
+    assert_eq!(follow(&mut tournament, NO_SHOW_MS - 1), []);
+    assert_eq!(follow(&mut tournament, 2 * NO_SHOW_MS - 2), []);
+    let changes = follow(&mut tournament, 2 * NO_SHOW_MS - 1);
+    assert_eq!(called(&changes), [(0, vec![away])]);
+}
+
+#[test]
+fn a_void_game_can_be_called_again_before_all_others() {
+    let mut tournament = two_tables(|settings| {
+        settings.max_calls = 1;
+        settings.max_parallel = 1;
+    });
+    follow(&mut tournament, 0);
+    end(&mut tournament, 0, Ended::Aborted);
+    assert_eq!(tournament.games()[0].state, GameState::Void);
+    follow(&mut tournament, 0);
+    let change = tournament.recall(0).unwrap();
+    fold(&mut tournament, change);
+    let change = tournament.recall(3).unwrap();
+    fold(&mut tournament, change);
+    assert_eq!(
+        (tournament.games_over(), tournament.games()[0].calls),
+        (0, 0)
+    );
+    let mut order = vec![];
+    while tournament.state() == State::Playing {
+        let game = tournament.playing().next().unwrap();
+        order.push(game);
+        let counted = end(&mut tournament, game, played(&[1, 2, 3, 4]));
+        assert!(matches!(counted, Change::Counted { .. }));
+        follow(&mut tournament, 0);
+    }
+    assert_eq!(order, [1, 3, 0, 2]);
+    assert_eq!(tournament.recall(0), Err(ByHandProblem::NotPlaying));
+}
+
+#[test]
+fn a_void_game_of_an_earlier_round_of_a_knockout_stays_void() {
+    let mut tournament = begun(
+        Settings {
+            max_calls: 1,
+            ..settings(Format::Knockout)
+        },
+        8,
+    );
+    follow(&mut tournament, 0);
+    end(&mut tournament, 0, Ended::Aborted);
+    assert!(tournament.recall(0).is_ok());
+    end(&mut tournament, 1, played(&[1, 2, 3, 4]));
+    follow(&mut tournament, 0);
+    assert_eq!(tournament.recall(0), Err(ByHandProblem::NotDue));
+}
+
+#[test]
+fn whoever_takes_a_place_has_its_results_and_is_waited_for() {
+    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    follow(&mut tournament, 0);
+    let place = tournament.games()[0].seats[0];
+    withdraw(&mut tournament, place);
+    end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+    let change = tournament.replace(place, entrant("Bo")).unwrap();
+    fold(&mut tournament, change);
+    assert_eq!(tournament.participants()[place].name, "Bo");
+    let [former] = tournament.former(place) else {
+        panic!("one former participant");
+    };
+    assert_eq!((former.games, former.entrant.built_in), (1, None));
+    assert_eq!(called(&follow(&mut tournament, 0)), [], "Bo is not there");
+    tournament.set_present(place, true);
+    assert_eq!(called(&follow(&mut tournament, 0)), [(1, vec![])]);
+    assert_eq!(
+        tournament.replace(place, entrant("Filler 7")),
+        Err(ByHandProblem::Join(JoinProblem::NameReserved))
+    );
+    let taken = tournament.participants()[(place + 1) % 8].name.clone();
+    assert_eq!(
+        tournament.replace(place, entrant(&taken)),
+        Err(ByHandProblem::Join(JoinProblem::NameTaken))
+    );
+    for _ in 1..MAX_REPLACEMENTS {
+        let change = tournament.replace(place, entrant("Bo")).unwrap();
+        fold(&mut tournament, change);
+    }
+    assert_eq!(
+        tournament.replace(place, entrant("Bo")),
+        Err(ByHandProblem::TooManyReplacements)
+    );
+}
+
+#[test]
+fn a_built_in_agent_plays_on_at_once_and_somebody_can_take_the_place_of_a_filler() {
+    let mut tournament = begun(settings(Format::Knockout), 3);
+    let filler = 3;
+    assert_eq!(
+        tournament.withdraw(filler, true),
+        Err(ByHandProblem::Filler)
+    );
+    tournament.set_present(0, false);
+    assert_eq!(called(&follow(&mut tournament, 0)), []);
+    let by = Entrant {
+        built_in: Some(AgentKind::Greedy.into()),
+        ..entrant("greedy")
+    };
+    for change in [
+        tournament.replace(0, by),
+        tournament.replace(filler, entrant("Late")),
+    ] {
+        fold(&mut tournament, change.unwrap());
+    }
+    assert_eq!(tournament.games_expected(), 1);
+    tournament.set_present(filler, true);
+    assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![])]);
+}
+
+#[test]
+fn nothing_changes_by_hand_before_the_start_or_after_the_end() {
+    let mut tournament = joined(settings(Format::Swiss), 4);
+    assert_eq!(tournament.set_paused(true), Err(ByHandProblem::NotPlaying));
+    assert_eq!(tournament.recall(0), Err(ByHandProblem::NotPlaying));
+    assert_eq!(
+        tournament.withdraw(4, false),
+        Err(ByHandProblem::NoParticipant)
+    );
+    for change in tournament.begin().unwrap() {
+        fold(&mut tournament, change);
+    }
+    assert_eq!(tournament.postpone(99, None), Err(ByHandProblem::NoGame));
+    play_through(&mut tournament);
+    assert_eq!(tournament.withdraw(0, false), Err(ByHandProblem::Over));
+    let someone = entrant("someone");
+    assert_eq!(tournament.replace(0, someone), Err(ByHandProblem::Over));
+}
+
+#[test]
+fn names_of_fillers_are_reserved() {
+    let tournament = joined(settings(Format::Swiss), 2);
+    for name in ["Filler 1", "filler 2", "FILLER12", "Filler", " f-iller_3"] {
+        let refused = tournament.join(entrant(name));
+        assert_eq!(refused, Err(JoinProblem::NameReserved), "{name}");
+    }
+    for name in ["Filler X", "Fill 1", "Phil Filler 1"] {
+        assert!(tournament.join(entrant(name)).is_ok(), "{name}");
+    }
+}
+
+#[test]
+fn a_finalist_is_waited_for_as_long_as_it_waited_for_the_final() {
+    for (table_took_ms, patience_ms) in [(500, NO_SHOW_MS), (90_000, 90_000), (9_000_000, 600_000)]
+    {
+        let mut tournament = begun(settings(Format::Knockout), 8);
+        follow(&mut tournament, 0);
+        play(&mut tournament, 0);
+        follow(&mut tournament, 0);
+        // It waits for a while, then looks away from its screen.
+        let finalist = *tournament.games()[0].seats.iter().min().unwrap();
+        tournament.set_present(finalist, false);
+        let now = table_took_ms;
+        play(&mut tournament, 1);
+        assert_eq!(called(&follow(&mut tournament, now)), []);
+        assert_eq!(tournament.wake_at(), Some(now + patience_ms));
+        assert_eq!(follow(&mut tournament, now + patience_ms - 1), []);
+        let missing = vec![finalist];
+        let change = Change::Rescheduled { game: 2, missing };
+        assert_eq!(follow(&mut tournament, now + patience_ms), [change]);
+        // The second call is an ordinary one.
+        let later = now + patience_ms + NO_SHOW_MS;
+        assert_eq!(tournament.wake_at(), Some(later));
+    }
+}
+
+#[test]
+fn who_was_away_when_its_last_game_ended_is_not_waited_for_longer() {
+    let mut tournament = begun(settings(Format::Knockout), 8);
+    follow(&mut tournament, 0);
+    let finalist = *tournament.games()[0].seats.iter().min().unwrap();
+    tournament.set_present(finalist, false);
+    play(&mut tournament, 0);
+    follow(&mut tournament, 0);
+    play(&mut tournament, 1);
+    follow(&mut tournament, 90_000);
+    assert_eq!(tournament.wake_at(), Some(90_000 + NO_SHOW_MS));
+}
+
+#[test]
+fn who_has_not_played_stands_behind_who_has() {
+    let mut settings = settings(Format::Knockout);
+    settings.max_calls = 1;
+    let mut tournament = begun(settings, 8);
+    let absent: Vec<usize> = tournament.games()[0].seats[1..].to_vec();
+    absent
+        .iter()
+        .for_each(|&who| tournament.set_present(who, false));
+    follow(&mut tournament, 0);
+    play(&mut tournament, 1);
+    follow(&mut tournament, NO_SHOW_MS);
+    end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+    follow(&mut tournament, 2 * NO_SHOW_MS);
+    follow(&mut tournament, 3 * NO_SHOW_MS);
+    let finalists = tournament.games()[2].seats.clone();
+    play(&mut tournament, 2);
+    let ranked: Vec<usize> = (tournament.standings().iter())
+        .map(|line| line.participant)
+        .collect();
+    assert!(
+        finalists.iter().any(|who| absent.contains(who)),
+        "by forfeits"
+    );
+    let mut last = ranked[5..].to_vec();
+    last.sort_unstable();
+    let mut expected = absent;
+    expected.sort_unstable();
+    assert_eq!(last, expected);
+}
