@@ -6,19 +6,50 @@ import { TournamentGameSchema, TournamentGameState } from "../src/gen/chefshat/v
 import { startLanguage } from "../src/i18n";
 import { clockOf } from "../src/tournaments/Countdown";
 import { nextOf } from "../src/tournaments/OwnPlace";
-import { forgetPlace, heldPlace, linkToPlace, placeFromLink } from "../src/tournaments/place";
+import {
+  decidePlace,
+  forgetPlace,
+  type HeldPlace,
+  heldPlace,
+  linkToPlace,
+  placeFromLink,
+} from "../src/tournaments/place";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 
 beforeAll(startLanguage);
 beforeEach(() => forgetPlace(ID));
 
+const BO: HeldPlace = { ticket: "ab".repeat(48), participant: 3, name: "Bo & Çem" };
+const ADA: HeldPlace = { ticket: "cd".repeat(48), participant: 1, name: "Ada" };
+const open = (held: HeldPlace) => {
+  const { pathname, hash } = new URL(linkToPlace(ID, held));
+  history.replaceState(null, "", pathname + hash);
+};
+
 test("a link brings a place to another device and leaves the address", () => {
-  const held = { ticket: "ab".repeat(48), participant: 3, name: "Bo & Çem" };
-  history.replaceState(null, "", new URL(linkToPlace(ID, held)).pathname + new URL(linkToPlace(ID, held)).hash);
-  placeFromLink(ID);
-  expect(heldPlace(ID)).toEqual(held);
+  open(BO);
+  expect(placeFromLink(ID)).toBeNull();
+  expect(heldPlace(ID)).toEqual(BO);
   expect(location.hash).toBe("");
+  // Opened again, there is nothing to ask.
+  open(BO);
+  expect(placeFromLink(ID)).toBeNull();
+  expect(location.hash).toBe("");
+});
+
+test.each([
+  ["stays without an answer", undefined, ADA, true],
+  ["stays if the person wants it to", null, ADA, false],
+  ["is replaced if the person wants it to be", BO, BO, false],
+] as const)("the place that this device already has %s", (_, chosen, expected, stillInAddress) => {
+  open(ADA);
+  placeFromLink(ID);
+  open(BO);
+  expect(placeFromLink(ID)).toEqual(BO);
+  if (chosen !== undefined) decidePlace(ID, chosen);
+  expect(heldPlace(ID)).toEqual(expected);
+  expect(location.hash !== "").toBe(stillInAddress);
 });
 
 test.each(["", "#place=", "#place=%5B1%5D", "#place=%", "#table=x"])(

@@ -57,6 +57,8 @@ const show = (table: TableState, decision?: OpenDecision, plans = true) => {
 const button = (id: string) => root.querySelector<HTMLButtonElement>(`[data-action="${id}"]`);
 const click = (id: string) => act(() => button(id)?.click());
 const pick = (face: number) => act(() => root.querySelector<HTMLElement>(`[data-card="${face}"]`)?.click());
+const press = (key: string) =>
+  act(() => void document.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true })));
 const note = () => root.querySelector('[role="note"]')?.textContent;
 const wait = () => act(() => void vi.advanceTimersByTime(60_000));
 
@@ -88,6 +90,23 @@ test("it can be taken back until it is sent", async () => {
   // The cards stay picked.
   await click("play");
   expect(answers).toEqual([[action(EIGHTS), undefined]]);
+});
+
+test.each([
+  ["other cards are picked", () => pick(3)],
+  ["its cards are put back", () => press("Backspace")],
+])("when %s, the former play is not sent", async (_, change) => {
+  const three: Move = { kind: "play", face: 3, quantity: 1, jokers: 0 };
+  await show(table({ board: playedCards(9, 1, 0, false) }));
+  await pick(8);
+  await click("plan-play");
+  expect(button("unplan")).not.toBeNull();
+  await change();
+  expect(button("unplan")).toBeNull();
+  const eight: Move = { kind: "play", face: 8, quantity: 1, jokers: 0 };
+  await show(table({ board: playedCards(9, 1, 0, false) }), turn(eight, three, PASS));
+  await wait();
+  expect(answers).toEqual([]);
 });
 
 test.each([

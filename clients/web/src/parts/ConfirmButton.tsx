@@ -16,6 +16,11 @@ interface ConfirmButtonProps {
   confirm?: string;
   /** How prominent the button is at first; quiet by default. */
   look?: ButtonLook;
+  /**
+   * Whom or what the action is about, as the question names it. If it changes while the question is
+   * shown, the action is refused.
+   */
+  subject?: string;
   /** One that resolves to false may be confirmed again. */
   act: () => Promise<unknown>;
   /** The consequence, shown with the confirmation. */
@@ -23,8 +28,11 @@ interface ConfirmButtonProps {
 }
 
 /** The button. */
-export function ConfirmButton({ label, confirm = label, look = "quiet", act, children }: ConfirmButtonProps) {
+export function ConfirmButton(props: ConfirmButtonProps) {
+  const { label, confirm = label, look = "quiet", subject = "", act, children } = props;
   const [asked, setAsked] = useState(false);
+  const askedAbout = useRef(subject);
+  const changed = asked && askedAbout.current !== subject;
   const { busy, fault, run, reset } = useAttempt();
   const whole = useRef<HTMLDivElement>(null);
   const before = useRef(asked);
@@ -33,6 +41,10 @@ export function ConfirmButton({ label, confirm = label, look = "quiet", act, chi
     before.current = asked;
     whole.current?.querySelector<HTMLElement>(asked ? '[data-part="question"]' : "button")?.focus();
   }, [asked]);
+  const ask = () => {
+    askedAbout.current = subject;
+    setAsked(true);
+  };
   const cancel = () => {
     setAsked(false);
     reset();
@@ -42,17 +54,19 @@ export function ConfirmButton({ label, confirm = label, look = "quiet", act, chi
       {asked ? (
         <>
           <span data-part="question" tabIndex={-1}>
-            {children}
+            {changed ? t().common.changedMeanwhile(askedAbout.current, subject) : children}
           </span>
-          <Button busy={busy} onClick={() => run(act)}>
-            {confirm}
-          </Button>
+          {!changed && (
+            <Button busy={busy} onClick={() => run(act)}>
+              {confirm}
+            </Button>
+          )}
           <Button look="quiet" disabled={busy} onClick={cancel}>
             {t().common.cancel}
           </Button>
         </>
       ) : (
-        <Button look={look} onClick={() => setAsked(true)}>
+        <Button look={look} onClick={ask}>
           {label}
         </Button>
       )}

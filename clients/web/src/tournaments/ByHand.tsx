@@ -18,7 +18,17 @@ import { SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import css from "./ByHand.module.css";
 import { type LiveTournament, useGames } from "./following";
-import { callGame, postponeGame, removeParticipant, replaceByAgent, replaceByPerson, setPaused } from "./hosting";
+import {
+  callGame,
+  dismissPlaceLink,
+  placeLinks,
+  postponeGame,
+  removeParticipant,
+  replaceByAgent,
+  replaceByPerson,
+  setPaused,
+} from "./hosting";
+import { type HeldPlace, linkToPlace } from "./place";
 import { joinedIn, nameOf } from "./structure";
 
 /** Pauses or resumes the tournament, and says what that means. */
@@ -48,18 +58,15 @@ export function Pause({ tournament }: { tournament: Tournament }) {
 export function ManageParticipants({ tournament, agents }: { tournament: Tournament; agents: readonly string[] }) {
   const words = t().organise.own.people;
   const listed = joinedIn(tournament);
-  // Stays after the participant has changed.
-  const [link, setLink] = useState<{ name: string; address: string } | null>(null);
+  const [links, setLinks] = useState(() => placeLinks(tournament.tournamentId));
+  const renew = () => setLinks(placeLinks(tournament.tournamentId));
   if (listed.length === 0) return null;
   return (
-    <details class={css.part} data-part="manage-participants">
+    <details class={css.part} data-part="manage-participants" open={links.length > 0 || undefined}>
       <summary>{words.title}</summary>
-      {link && (
-        <Notice kind="good">
-          {words.linkFor(link.name)}
-          <CopyLine label={words.link} text={link.address} />
-        </Notice>
-      )}
+      {links.map((held) => (
+        <PlaceLink key={held.ticket} {...{ tournament, held, renew }} />
+      ))}
       <ul class={css.list}>
         {listed.map(({ participant, withdrawn, filler, former }) => (
           <li key={participant}>
@@ -75,16 +82,8 @@ export function ManageParticipants({ tournament, agents }: { tournament: Tournam
                 {words.change}
                 <span class="visually-hidden"> {nameOf(tournament, participant)}</span>
               </summary>
-              {!withdrawn && !filler && (
-                <ConfirmButton
-                  label={words.remove}
-                  confirm={words.removeDo}
-                  act={() => removeParticipant(tournament.tournamentId, participant).then(() => false)}
-                >
-                  {tournament.state === TournamentState.OPEN ? words.removeOpen : words.removePlaying}
-                </ConfirmButton>
-              )}
-              <Replace {...{ tournament, participant, agents, onLink: setLink }} />
+              {!withdrawn && !filler && <Remove {...{ tournament, participant, renew }} />}
+              <Replace key={nameOf(tournament, participant)} {...{ tournament, participant, agents, renew }} />
             </details>
           </li>
         ))}
@@ -93,15 +92,57 @@ export function ManageParticipants({ tournament, agents }: { tournament: Tournam
   );
 }
 
-interface ReplaceProps {
+interface PlaceLinkProps {
+  tournament: Tournament;
+  held: HeldPlace;
+  renew: () => void;
+}
+
+/** The link of a person who replaces another one, until the organiser has passed it on. */
+function PlaceLink({ tournament: { tournamentId }, held, renew }: PlaceLinkProps) {
+  const words = t().organise.own.people;
+  const dismiss = () => {
+    dismissPlaceLink(tournamentId, held.ticket);
+    renew();
+  };
+  return (
+    <Notice kind="good">
+      {words.linkFor(held.name)}
+      <CopyLine label={words.link} text={linkToPlace(tournamentId, held)} />
+      <Button look="quiet" onClick={dismiss}>
+        {words.linkSent}
+        <span class="visually-hidden"> ({held.name})</span>
+      </Button>
+    </Notice>
+  );
+}
+
+interface ChangeProps {
   tournament: Tournament;
   participant: number;
-  agents: readonly string[];
-  onLink: (link: { name: string; address: string }) => void;
+  /** After a change, the links to pass on may be others. */
+  renew: () => void;
+}
+
+/** Removes a participant, by the name that the question showed. */
+function Remove({ tournament, participant, renew }: ChangeProps) {
+  const { tournamentId, state } = tournament;
+  const words = t().organise.own.people;
+  const name = nameOf(tournament, participant);
+  const remove = async () => {
+    await removeParticipant(tournamentId, participant);
+    renew();
+    return false;
+  };
+  return (
+    <ConfirmButton label={words.remove} confirm={words.removeDo} subject={name} act={remove}>
+      {state === TournamentState.OPEN ? words.removeOpen(name) : words.removePlaying(name)}
+    </ConfirmButton>
+  );
 }
 
 /** Gives the place of a participant to a built-in agent or to another person. */
-function Replace({ tournament, participant, agents, onLink }: ReplaceProps) {
+function Replace({ tournament, participant, agents, renew }: ChangeProps & { agents: readonly string[] }) {
   const words = t().organise.own.people;
   const { tournamentId } = tournament;
   const [by, setBy] = useState("");
@@ -113,8 +154,9 @@ function Replace({ tournament, participant, agents, onLink }: ReplaceProps) {
     setTried(true);
     if (by === "" && name.trim() === "") return;
     run(async () => {
-      if (by === "") onLink({ name: name.trim(), address: await replaceByPerson(tournamentId, participant, name) });
+      if (by === "") await replaceByPerson(tournamentId, participant, name);
       else await replaceByAgent(tournamentId, participant, by);
+      renew();
       setName("");
       setTried(false);
       return false;

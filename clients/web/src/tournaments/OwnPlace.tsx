@@ -1,7 +1,9 @@
-// What a participant can do about its own place: postpone a game that is due, leave the tournament.
+// What a participant can do about its own place: postpone a game that is due, leave the tournament,
+// and choose between the place of this device and another one that a link brings.
 
 import { type TournamentGame, TournamentGameState, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import joinCss from "../lobby/Join.module.css";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
@@ -55,6 +57,29 @@ function Postpone({ held, live }: Omit<OwnPlaceProps, "onLeft">) {
       </Button>
       {fault && <Notice kind="fault">{fault}</Notice>}
     </>
+  );
+}
+
+interface WhichPlaceProps {
+  held: HeldPlace;
+  brought: HeldPlace;
+  /** The place from the link, or null to stay with the own one. */
+  decide: (chosen: HeldPlace | null) => void;
+}
+
+/** Asks which place to use when a link brings one to a device that already has another. */
+export function WhichPlace({ held, brought, decide }: WhichPlaceProps) {
+  const words = t().tournaments.part.which;
+  return (
+    <section class={`sheet ${joinCss.page}`} data-part="which-place">
+      <h1>{words.title}</h1>
+      <p>{words.text(held.name, brought.name)}</p>
+      <p class="soft">{words.lost(held.name)}</p>
+      <Button look="main" onClick={() => decide(null)}>
+        {words.stay(held.name)}
+      </Button>
+      <Button onClick={() => decide(brought)}>{words.take(brought.name)}</Button>
+    </section>
   );
 }
 

@@ -2,7 +2,7 @@
 // organiser starts it here. With ?wall it is shown as a wall view.
 
 import type { ComponentChildren } from "preact";
-import { useMemo, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { hidden, useHiding } from "../experiment/hiding";
@@ -28,8 +28,9 @@ import {
 import { hostedTournament } from "./hosting";
 import { JoinTournament } from "./JoinTournament";
 import { Organiser } from "./Organiser";
+import { WhichPlace } from "./OwnPlace";
 import { Participation } from "./Participation";
-import { type HeldPlace, heldPlace, placeFromLink, takePlace } from "./place";
+import { decidePlace, type HeldPlace, heldPlace, placeFromLink, takePlace } from "./place";
 import { Rounds } from "./Rounds";
 import { Confidence, Standings } from "./Standings";
 import { isEnded, participantOf } from "./structure";
@@ -40,8 +41,17 @@ import { dealsWords, inShort, playWords, TournamentStateChip } from "./words";
 /** The page. */
 export function TournamentPage({ route }: PageProps<"tournament">) {
   // Before anything is requested: a private tournament is shown only to those who have a place.
-  useMemo(() => placeFromLink(route.tournamentId), [route.tournamentId]);
-  const followed = useTournament(route.tournamentId);
+  const { tournamentId } = route;
+  const [brought, setBrought] = useState(() => placeFromLink(tournamentId));
+  const followed = useTournament(tournamentId);
+  const held = brought && heldPlace(tournamentId);
+  if (brought && held) {
+    const decide = (chosen: HeldPlace | null) => {
+      decidePlace(tournamentId, chosen);
+      setBrought(null);
+    };
+    return <WhichPlace {...{ held, brought, decide }} />;
+  }
   return followed ? <Followed followed={followed} /> : null;
 }
 

@@ -9,19 +9,47 @@ import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
-import { linkToPlace } from "./place";
+import { asPlace, type HeldPlace } from "./place";
 
 /** The secrets of a tournament that this device created. */
 export interface HostedTournament {
   joinCode: string;
   ownerToken: string;
+  /** Places given to other people, whose links are still to be passed on. */
+  links?: HeldPlace[];
 }
 
 /** The secrets of a tournament, if this device created it. */
 export function hostedTournament(tournamentId: string): HostedTournament | null {
-  return recallObject(`organised.${tournamentId}`, ({ joinCode, ownerToken }) =>
-    typeof joinCode === "string" && typeof ownerToken === "string" ? { joinCode, ownerToken } : null,
+  return recallObject(`organised.${tournamentId}`, ({ joinCode, ownerToken, links }) =>
+    typeof joinCode === "string" && typeof ownerToken === "string"
+      ? { joinCode, ownerToken, links: Array.isArray(links) ? links.flatMap((one) => asPlace(one) ?? []) : [] }
+      : null,
   );
+}
+
+function keepHosted(tournamentId: string, hosted: HostedTournament): void {
+  remember(`organised.${tournamentId}`, JSON.stringify(hosted));
+}
+
+/** The places whose links the organiser has still to pass on. */
+export function placeLinks(tournamentId: string): readonly HeldPlace[] {
+  return hostedTournament(tournamentId)?.links ?? [];
+}
+
+/** Forgets a link that has been passed on. */
+export function dismissPlaceLink(tournamentId: string, ticket: string): void {
+  keepLinks(tournamentId, (links) => links.filter((held) => held.ticket !== ticket));
+}
+
+/** The links to a place lead nowhere any more: somebody else has it, or nobody. */
+function dropLinksTo(tournamentId: string, participant: number): void {
+  keepLinks(tournamentId, (links) => links.filter((held) => held.participant !== participant));
+}
+
+function keepLinks(tournamentId: string, change: (links: HeldPlace[]) => HeldPlace[]): void {
+  const hosted = hostedTournament(tournamentId);
+  if (hosted) keepHosted(tournamentId, { ...hosted, links: change(hosted.links ?? []) });
 }
 
 /** Creates a tournament and stores its secrets; returns its id. */
@@ -31,8 +59,7 @@ export async function createTournament(settings: MessageInitShape<typeof Tournam
     { timeoutMs: CALL_LIMIT_MS },
   );
   if (!tournament) throw new Error("the server did not say which tournament it is");
-  const hosted: HostedTournament = { joinCode, ownerToken };
-  remember(`organised.${tournament.tournamentId}`, JSON.stringify(hosted));
+  keepHosted(tournament.tournamentId, { joinCode, ownerToken });
   keepSecret(ownerToken, tournament.settings?.policy);
   return tournament.tournamentId;
 }
@@ -57,16 +84,21 @@ export async function setPaused(tournamentId: string, paused: boolean): Promise<
 /** Removes a participant of a tournament that this device created. */
 export async function removeParticipant(tournamentId: string, participant: number): Promise<void> {
   await tournamentApi.removeParticipant({ ...ownership(tournamentId), participant }, { timeoutMs: CALL_LIMIT_MS });
+  dropLinksTo(tournamentId, participant);
 }
 
 /** Gives the place of a participant to a built-in agent. */
 export async function replaceByAgent(tournamentId: string, participant: number, builtInAgent: string): Promise<void> {
   const request = { ...ownership(tournamentId), participant, builtInAgent };
   await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+  dropLinksTo(tournamentId, participant);
 }
 
-/** Gives the place of a participant to somebody else. Returns the address to send to that person. */
-export async function replaceByPerson(tournamentId: string, participant: number, name: string): Promise<string> {
+/**
+ * Gives the place of a participant to somebody else. The link for that person stays on this device
+ * until it is dismissed: nobody else has the ticket.
+ */
+export async function replaceByPerson(tournamentId: string, participant: number, name: string): Promise<void> {
   const request = {
     ...ownership(tournamentId),
     participant,
@@ -75,7 +107,8 @@ export async function replaceByPerson(tournamentId: string, participant: number,
     requestId: crypto.getRandomValues(new Uint8Array(32)),
   };
   const { ticket } = await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
-  return linkToPlace(tournamentId, { ticket, participant, name: name.trim() });
+  dropLinksTo(tournamentId, participant);
+  keepLinks(tournamentId, (links) => [...links, { ticket, participant, name: name.trim() }]);
 }
 
 /** Postpones a game of a tournament that this device created. */

@@ -17,11 +17,15 @@ export interface HeldPlace {
 
 /** This device's place in a tournament, if any. */
 export function heldPlace(tournamentId: string): HeldPlace | null {
-  return recallObject(`tournament.${tournamentId}`, ({ ticket, participant, name }) =>
-    typeof ticket === "string" && typeof participant === "number" && typeof name === "string"
-      ? { ticket, participant, name }
-      : null,
-  );
+  return recallObject(`tournament.${tournamentId}`, asPlace);
+}
+
+/** A value as a place, if it is one. */
+export function asPlace(value: unknown): HeldPlace | null {
+  const { ticket, participant, name }: Partial<Record<keyof HeldPlace, unknown>> = { ...(value as object) };
+  return typeof ticket === "string" && typeof participant === "number" && typeof name === "string"
+    ? { ticket, participant, name }
+    : null;
 }
 
 /** Deletes this device's place in a tournament. */
@@ -51,23 +55,40 @@ export function linkToPlace(tournamentId: string, { ticket, participant, name }:
   return `${location.origin}${pathOf({ page: "tournament", tournamentId })}#${MARK}${place}`;
 }
 
-/** Stores the place that the address brings, if any, and removes it from the address. */
-export function placeFromLink(tournamentId: string): void {
+/**
+ * Stores the place that the address brings, if any. If this device has another place in the
+ * tournament, it is returned instead, and stays in the address until `decidePlace`: taking it
+ * would lose the other.
+ */
+export function placeFromLink(tournamentId: string): HeldPlace | null {
   const [given] = location.hash
     .replace(/^#/, "")
     .split("&")
     .filter((part) => part.startsWith(MARK));
-  if (!given) return;
+  if (!given) return null;
+  const brought = parsed(given.slice(MARK.length));
+  const held = heldPlace(tournamentId);
+  if (brought && held && held.ticket !== brought.ticket) return brought;
+  decidePlace(tournamentId, brought);
+  return null;
+}
+
+/** Removes the place that the address brings from the address; stores the chosen one, if any. */
+export function decidePlace(tournamentId: string, chosen: HeldPlace | null): void {
   history.replaceState(history.state, "", location.pathname + location.search);
+  if (!chosen) return;
+  remember(`tournament.${tournamentId}`, JSON.stringify(chosen));
+  // Whether it is needed is not known yet.
+  keepSecret(chosen.ticket, { visibility: Visibility.PRIVATE });
+}
+
+/** The place in a link; null if the link was cut. */
+function parsed(text: string): HeldPlace | null {
   try {
-    const [ticket, participant, name]: unknown[] = JSON.parse(decodeURIComponent(given.slice(MARK.length)));
-    if (typeof ticket !== "string" || typeof participant !== "number" || typeof name !== "string") return;
-    const held: HeldPlace = { ticket, participant, name };
-    remember(`tournament.${tournamentId}`, JSON.stringify(held));
-    // Whether it is needed is not known yet.
-    keepSecret(ticket, { visibility: Visibility.PRIVATE });
+    const [ticket, participant, name]: unknown[] = JSON.parse(decodeURIComponent(text));
+    return asPlace({ ticket, participant, name });
   } catch {
-    // The link was cut; the page shows the tournament.
+    return null;
   }
 }
 

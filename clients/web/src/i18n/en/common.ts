@@ -75,6 +75,8 @@ export const common = {
   seat: (seat: number) => `Seat ${seat + 1}`,
   close: "Close",
   cancel: "Cancel",
+  changedMeanwhile: (before: string, now: string) =>
+    `Nothing was done: ${now} has taken the place of ${before} in the meantime.`,
   back: "Back",
   copy: "Copy",
   copied: "Copied",

@@ -126,8 +126,9 @@ export const organise = {
       former: (names: string) => `before: ${names}`,
       remove: "Remove…",
       removeDo: "Remove now",
-      removeOpen: "The place becomes free. Anyone who has the code can join again.",
-      removePlaying: "A substitute plays the running game to its end; the other games are forfeited.",
+      removeOpen: (name: string) => `Remove ${name}? The place becomes free. Anyone who has the code can join again.`,
+      removePlaying: (name: string) =>
+        `Remove ${name}? A substitute plays the running game to its end; the other games are forfeited.`,
       replace: "Give the place to",
       somebody: "another person",
       agent: (name: string) => `the agent “${name}”`,
@@ -135,6 +136,7 @@ export const organise = {
       replaceDo: "Replace",
       linkFor: (name: string) => `Send this link only to ${name}; it contains the place.`,
       link: "Link",
+      linkSent: "I have passed it on",
     },
     games: {
       title: "Change games",

@@ -152,5 +152,14 @@ export const tournaments = {
     back: "Back to the standings",
     place: (round: number, table: number) => `round ${round}, table ${table}`,
     toGame: "Go to my game",
+    which: {
+      title: "Which place do you want to use?",
+      text: (held: string, brought: string) =>
+        `On this device, ${held} is taking part in this tournament. The link brings the place of ${brought}.`,
+      lost: (held: string) =>
+        `A device plays for one participant. If you use the link here, this device loses the place of ${held}.`,
+      stay: (held: string) => `Continue as ${held}`,
+      take: (brought: string) => `Take part as ${brought}`,
+    },
   },
 };

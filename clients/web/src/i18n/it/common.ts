@@ -75,6 +75,7 @@ export const common: Texts["common"] = {
   seat: (seat) => `Posto ${seat + 1}`,
   close: "Chiudi",
   cancel: "Annulla",
+  changedMeanwhile: (before, now) => `Non è stato fatto nulla: nel frattempo ${now} ha preso il posto di ${before}.`,
   back: "Indietro",
   copy: "Copia",
   copied: "Copiato",

@@ -129,8 +129,9 @@ export const organise: Texts["organise"] = {
       former: (names) => `prima: ${names}`,
       remove: "Escludi…",
       removeDo: "Escludi ora",
-      removeOpen: "Il posto torna libero. Chi ha il codice può iscriversi di nuovo.",
-      removePlaying: "Un sostituto finisce la partita in corso; le altre contano come assenze.",
+      removeOpen: (name) => `Escludere ${name}? Il posto torna libero. Chi ha il codice può iscriversi di nuovo.`,
+      removePlaying: (name) =>
+        `Escludere ${name}? Un sostituto finisce la partita in corso; le altre contano come assenze.`,
       replace: "Dai il posto a",
       somebody: "un’altra persona",
       agent: (name) => `l’agente «${name}»`,
@@ -138,6 +139,7 @@ export const organise: Texts["organise"] = {
       replaceDo: "Sostituisci",
       linkFor: (name) => `Manda questo link solo a ${name}: contiene il posto.`,
       link: "Link",
+      linkSent: "L’ho consegnato",
     },
     games: {
       title: "Modifica le partite",

@@ -153,5 +153,14 @@ export const tournaments: Texts["tournaments"] = {
     back: "Torna alla classifica",
     place: (round, table) => `turno ${round}, tavolo ${table}`,
     toGame: "Vai alla mia partita",
+    which: {
+      title: "Quale posto vuoi usare?",
+      text: (held, brought) =>
+        `Su questo dispositivo ${held} partecipa già a questo torneo. Il link porta il posto di ${brought}.`,
+      lost: (held) =>
+        `Un dispositivo gioca per un solo partecipante. Se usi il link qui, questo dispositivo perde il posto di ${held}.`,
+      stay: (held) => `Continua come ${held}`,
+      take: (brought) => `Partecipa come ${brought}`,
+    },
   },
 };

@@ -96,9 +96,13 @@ export function useDeciding(use: DecidingUse): Deciding {
     picked: NOTHING,
   });
   const picked = phase !== undefined && choice.id === phase ? choice.picked : NOTHING;
-  const setPicked = (picked: Picked) => setChoice({ id: phase, picked });
   const [remark, setRemark] = useState("");
   const [plan, setPlan] = useState<Plan | undefined>(undefined);
+  // Other cards mean another play: the one chosen before is not sent.
+  const setPicked = (next: Picked) => {
+    if (next !== picked) setPlan(undefined);
+    setChoice({ id: phase, picked: next });
+  };
 
   // A given card has left the hand, although the table's hand keeps it until the exchange is
   // complete.
