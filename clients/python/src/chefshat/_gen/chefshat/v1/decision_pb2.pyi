@@ -228,7 +228,9 @@ Global___Observation: _TypeAlias = Observation  # noqa: Y015
 @_typing.final
 class DecisionRequest(_message.Message):
     """Asks a seat for a decision; only that seat receives it. Answer with the index of any bit set in
-    `action_mask`.
+    `action_mask`, or with `default_action`. On a new stream the open decision is requested again,
+    under the same number: repeat an answer that was not acknowledged, because it may have been
+    accepted.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

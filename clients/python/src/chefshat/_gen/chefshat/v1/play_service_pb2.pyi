@@ -118,7 +118,9 @@ class Attach(_message.Message):
     `request_id`, which is 0. Games in progress are attached immediately.
     """
     request_id: _builtins.int
-    """Chosen by the client, echoed in Attached, Entered and Refused."""
+    """Chosen by the client, echoed in Attached, Entered and Refused. Handles tell seats apart too, so
+    all may be 0.
+    """
     from_sequence: _builtins.int
     """Number of the first event to send; 0 and 1: all. After a lost connection: the number of the
     last event received, plus one.
@@ -203,7 +205,7 @@ class SeatCommand(_message.Message):
     RESUME_FIELD_NUMBER: _builtins.int
     DETACH_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
-    """Handle of the seat on this stream; ignored for `attach`."""
+    """Handle of the seat on this stream, as in its updates; ignored for `attach`."""
     @_builtins.property
     def attach(self) -> Global___Attach:
         """Attach a seat to the stream."""
@@ -430,7 +432,10 @@ Global___Detached: _TypeAlias = Detached  # noqa: Y015
 
 @_typing.final
 class Refused(_message.Message):
-    """A command was refused. The stream and its other seats are unaffected."""
+    """A command was refused. The stream and its other seats are unaffected. A seat whose Attach is
+    refused has no further updates. Repeating the command on a new stream is worthwhile only if
+    `code` is one that is worth repeating for a call (proto/README.md, Errors).
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -583,7 +588,7 @@ class PlayResponse(_message.Message):
     UPDATES_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def updates(self) -> _containers.RepeatedCompositeFieldContainer[Global___SeatUpdate]:
-        """The updates, in order."""
+        """The updates, in order. The encoded message is smaller than 4 MiB, also after a long absence."""
 
     def __init__(
         self,

@@ -58,11 +58,12 @@ class PlayServiceServicer(object):
 
     def Play(self, request_iterator, context):
         """One stream for an agent process: any number of seats in any number of games. Half-close to
-        leave; the stream then ends. The server sends response headers immediately, before the first
-        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
-        (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
-        and attach again.
+        leave; the stream then ends with OK. The server sends response headers immediately, before the
+        first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
+        DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
+        UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
+        unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
+        half-closed.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -35,11 +35,12 @@ class PlayServiceStub:
     def __new__(cls, channel: _aio.Channel) -> PlayServiceAsyncStub: ...
     Play: _grpc.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]
     """One stream for an agent process: any number of seats in any number of games. Half-close to
-    leave; the stream then ends. The server sends response headers immediately, before the first
-    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
-    (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
-    and attach again.
+    leave; the stream then ends with OK. The server sends response headers immediately, before the
+    first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
+    DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
+    UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
+    unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
+    half-closed.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
@@ -60,11 +61,12 @@ class PlayServiceAsyncStub(PlayServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     Play: _aio.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]  # type: ignore[assignment]
     """One stream for an agent process: any number of seats in any number of games. Half-close to
-    leave; the stream then ends. The server sends response headers immediately, before the first
-    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
-    (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
-    and attach again.
+    leave; the stream then ends with OK. The server sends response headers immediately, before the
+    first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
+    DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
+    UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
+    unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
+    half-closed.
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
@@ -88,11 +90,12 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayResponse], _abc.AsyncIterator[_play_service_pb2.PlayResponse]]:
         """One stream for an agent process: any number of seats in any number of games. Half-close to
-        leave; the stream then ends. The server sends response headers immediately, before the first
-        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with DEADLINE_EXCEEDED
-        (STREAM_SILENT) if nothing is sent within 10 s of its start, or with UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
-        and attach again.
+        leave; the stream then ends with OK. The server sends response headers immediately, before the
+        first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
+        DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
+        UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
+        unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
+        half-closed.
         """
 
     @_abc_1.abstractmethod
