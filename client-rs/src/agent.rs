@@ -44,8 +44,9 @@ pub trait Agent: Send {
     /// Called for every event of the game, once and in order, also across lost connections.
     fn on_event(&mut self, _event: &v1::GameEvent) {}
 
-    /// Called when the game waits for another of the others, or for none. Only for seats that receive
-    /// events at once.
+    /// Called when the game waits for a different seat among the others, or for none of them (no
+    /// `seat`), and with none when a new connection begins. Only for seats that receive events at
+    /// once.
     fn on_awaited(&mut self, _awaited: &v1::Awaited) {}
 
     /// Called with the result of an answer.

@@ -8,6 +8,7 @@ use crate::connection::{self, ConnectOptions, Connection, MAX_RESPONSE_BYTES};
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
 use crate::v1::act_request::Command;
+use crate::v1::instrument_service_client::InstrumentServiceClient;
 use crate::v1::play_service_client::PlayServiceClient;
 use crate::v1::record_service_client::RecordServiceClient;
 use crate::v1::room_service_client::RoomServiceClient;
@@ -84,9 +85,13 @@ impl Client {
     /// # Errors
     /// `FACES_OUT_OF_RANGE`.
     pub async fn action_table(&self, faces: u32) -> Result<v1::GetActionTableResponse, Error> {
-        let mut service = ServerServiceClient::new(self.channel());
+        let service = ServerServiceClient::new(self.channel());
         let request = v1::GetActionTableRequest { faces };
-        Ok(service.get_action_table(request).await?.into_inner())
+        repeated(|| {
+            let mut service = service.clone();
+            async move { service.get_action_table(request).await }
+        })
+        .await
     }
 
     /// Creates a room. The response has the join code for its participants and the token that
@@ -149,8 +154,12 @@ impl Client {
         &self,
         request: v1::ListRoomsRequest,
     ) -> Result<v1::ListRoomsResponse, Error> {
-        let mut service = RoomServiceClient::new(self.channel());
-        Ok(service.list_rooms(request).await?.into_inner())
+        let service = RoomServiceClient::new(self.channel());
+        repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.list_rooms(request).await }
+        })
+        .await
     }
 
     /// Takes a seat. The response has the ticket to play on it. If the response is lost, the call
@@ -216,9 +225,13 @@ impl Client {
         &self,
         request: v1::ListRecordsRequest,
     ) -> Result<v1::ListRecordsResponse, Error> {
-        let mut service =
+        let service =
             RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
-        Ok(service.list_records(request).await?.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.list_records(request).await }
+        })
+        .await
     }
 
     /// The record of a game that has ended, line by line.
@@ -241,6 +254,16 @@ impl Client {
             lines.extend(part.lines);
         }
         Ok(lines)
+    }
+
+    /// Puts a marker into the record of a room. Nobody but the owner of the room learns of it.
+    ///
+    /// # Errors
+    /// `MARKER_REFUSED`, `OWNER_TOKEN_WRONG`, `ROOM_UNKNOWN`, `GAME_OVER`, `TOO_MANY_MARKERS`.
+    pub async fn add_marker(&self, request: v1::AddMarkerRequest) -> Result<v1::Marker, Error> {
+        let mut service = InstrumentServiceClient::new(self.channel());
+        let response = service.add_marker(request).await?.into_inner();
+        response.marker.ok_or_else(|| Error::incomplete("marker"))
     }
 
     /// Sends an expression of affect for a seat, at any time.

@@ -8,6 +8,7 @@
 mod agent;
 mod backoff;
 mod client;
+mod clock;
 mod connection;
 mod error;
 mod mask;
@@ -28,6 +29,7 @@ pub use agent::{ActionId, Agent};
 pub use backoff::{Backoff, FIRST_DELAY, GIVE_UP_AFTER, MAX_DELAY};
 pub use chefshat_proto::v1;
 pub use client::Client;
+pub use clock::ServerClock;
 pub use connection::{ConnectOptions, Connection};
 pub use error::{Error, PlayError};
 pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal};

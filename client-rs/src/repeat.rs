@@ -1,5 +1,6 @@
 //! Repeats requests whose response was lost, or whose room or tournament is just changing servers.
-//! They change nothing, or their id tells the server that they are the same.
+//! They change nothing, or their id tells the server that they are the same. `GetServerInfo` is not
+//! repeated: it tells at once whether the server answers. The Python SDK repeats the same calls.
 
 use std::time::Duration;
 
@@ -70,6 +71,29 @@ mod tests {
     use tonic_types::{ErrorDetails, StatusExt as _};
 
     use super::*;
+
+    #[test]
+    fn every_call_that_only_reads_is_repeated() {
+        let sources = [
+            include_str!("client.rs"),
+            include_str!("tournaments.rs"),
+            include_str!("tournaments/by_hand.rs"),
+            include_str!("table.rs"),
+        ];
+        let lines: Vec<&str> = sources.iter().flat_map(|source| source.lines()).collect();
+        let mut repeated = Vec::new();
+        for (index, line) in lines.iter().enumerate() {
+            let names = [".get_", ".list_"].map(|start| line.split_once(start));
+            if names.iter().all(Option::is_none) || !line.contains(".await") {
+                continue;
+            }
+            match lines[index - 2].trim_end().ends_with("repeated(|| {") {
+                true => repeated.push(*line),
+                false => assert!(line.contains(".get_server_info("), "{line}"),
+            }
+        }
+        assert_eq!(repeated.len(), 11, "{repeated:#?}");
+    }
 
     #[tokio::test]
     async fn a_lost_connection_is_tried_again_and_a_refusal_is_not() {

@@ -40,6 +40,8 @@ pub(crate) struct SeatSession<A> {
     owed: Owed,
     /// A substitute plays for the attached seat.
     substituted: bool,
+    /// The agent knows of somebody whom the game waits for.
+    awaits: bool,
     answers: u64,
     ending: Option<Ending>,
     outcome: Option<Result<Outcome, PlayError>>,
@@ -60,6 +62,7 @@ impl<A: Agent> SeatSession<A> {
             answered: None,
             owed: Owed::Nothing,
             substituted: false,
+            awaits: false,
             answers: 0,
             ending: None,
             outcome: None,
@@ -96,6 +99,10 @@ impl<A: Agent> SeatSession<A> {
 
     pub(crate) fn attached(&mut self, attached: v1::Attached) {
         self.agent.on_attached(&attached);
+        // Unless the server says so again, the game does not wait for whom it waited for before.
+        if self.awaits {
+            self.awaited(&v1::Awaited::default());
+        }
         self.live_from = attached.next_sequence;
         self.seat = attached.seat;
         self.room_id = attached.room_id;
@@ -127,6 +134,7 @@ impl<A: Agent> SeatSession<A> {
 
     /// Passes on whom the game waits for.
     pub(crate) fn awaited(&mut self, awaited: &v1::Awaited) {
+        self.awaits = awaited.seat.is_some();
         self.agent.on_awaited(awaited);
     }
 

@@ -39,6 +39,9 @@ impl Agent for Scripted {
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.log_line(format!("event {}", event.sequence));
     }
+    fn on_awaited(&mut self, awaited: &v1::Awaited) {
+        self.log_line(format!("awaited {:?}", awaited.seat));
+    }
     fn on_result(&mut self, result: &v1::AnswerResult) {
         self.log_line(format!("result {}", result.status().as_str_name()));
     }
@@ -88,6 +91,13 @@ impl Harness {
     /// Connects and attaches (handle, request id, next event). Returns the requested attachments as
     /// (request id, first event).
     fn connect(&mut self, attached: &[(u32, u32, u64)]) -> Vec<(u32, u64)> {
+        let asked = self.attach(attached);
+        self.clear();
+        asked
+    }
+
+    /// The same, and keeps the logs.
+    fn attach(&mut self, attached: &[(u32, u32, u64)]) -> Vec<(u32, u64)> {
         let mut asked = Vec::new();
         for request in self.session.attach() {
             for command in request.commands {
@@ -111,7 +121,6 @@ impl Harness {
             (handle, Update::Attached(attached))
         });
         assert_eq!(self.receive(updates.collect()), Vec::<String>::new());
-        self.clear();
         asked
     }
 
@@ -317,6 +326,30 @@ fn an_acknowledged_answer_is_not_stored() {
     harness.session.disconnected();
     harness.connect(&[(0, 1, 1)]);
     assert_eq!(harness.receive(vec![(0, decision(1))]), ["0:1=6"]);
+}
+
+#[test]
+fn after_a_lost_connection_nobody_is_awaited_until_the_server_says_so() {
+    let mut harness = Harness::seated(&[]);
+    let awaited = |seat| {
+        Update::Awaited(v1::Awaited {
+            seat,
+            ..v1::Awaited::default()
+        })
+    };
+    harness.receive(vec![(0, awaited(Some(2)))]);
+    harness.clear();
+    for _ in 0..2 {
+        harness.session.disconnected();
+        harness.attach(&[(0, 1, 1)]);
+    }
+    let attached = harness.log(0);
+    assert_eq!(attached.len(), 3, "{attached:?}");
+    assert!(attached[0].starts_with("attached"), "{attached:?}");
+    assert_eq!(attached[1], "awaited None", "once");
+    harness.clear();
+    harness.receive(vec![(0, awaited(Some(2)))]);
+    assert_eq!(harness.log(0), ["awaited Some(2)"]);
 }
 
 #[test]

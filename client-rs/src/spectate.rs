@@ -16,7 +16,8 @@ use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 pub enum Watched {
     /// An event of the game.
     Event(Box<v1::GameEvent>),
-    /// Whom the game waits for, after the events so far.
+    /// Whom the game waits for, after the events so far; nobody when a new connection begins, until
+    /// the server says it.
     Awaited(v1::Awaited),
 }
 
@@ -30,6 +31,8 @@ pub struct Spectator {
     outage: Outage,
     stream: Option<(Streaming<v1::SpectatorServiceWatchResponse>, Instant)>,
     ready: VecDeque<Watched>,
+    /// The last [`Watched::Awaited`] had a seat.
+    awaits: bool,
     room: Option<v1::Room>,
     ended: bool,
 }
@@ -45,6 +48,7 @@ impl Spectator {
             outage: Outage::default(),
             stream: None,
             ready: VecDeque::new(),
+            awaits: false,
             room: None,
             ended: false,
         }
@@ -125,6 +129,11 @@ impl Spectator {
             };
             let stream = self.client.watch(request).await?.into_inner();
             self.stream = Some((stream, Instant::now()));
+            if self.awaits {
+                self.awaits = false;
+                let nobody = v1::Awaited::default();
+                self.ready.push_back(Watched::Awaited(nobody));
+            }
         }
         match &mut self.stream {
             Some((stream, _)) => stream.message().await,
@@ -143,8 +152,10 @@ impl Spectator {
                 self.ready.push_back(Watched::Event(Box::new(event)));
             }
         }
-        let awaited = response.awaited.into_iter().last();
-        self.ready.extend(awaited.map(Watched::Awaited));
+        if let Some(awaited) = response.awaited.into_iter().last() {
+            self.awaits = awaited.seat.is_some();
+            self.ready.push_back(Watched::Awaited(awaited));
+        }
     }
 
     async fn lost(&mut self, status: Status) -> Result<(), Error> {

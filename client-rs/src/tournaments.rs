@@ -66,8 +66,11 @@ impl Client {
         &self,
         request: v1::ListTournamentsRequest,
     ) -> Result<v1::ListTournamentsResponse, Error> {
-        let response = service(self).list_tournaments(request).await?;
-        Ok(response.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.list_tournaments(request).await }
+        })
+        .await
     }
 
     /// Joins a tournament, which the join code identifies. The response has the ticket for
@@ -125,8 +128,11 @@ impl Client {
             owner_token: owner_token.into(),
             game,
         };
-        let response = service(self).get_physical_table(request).await?;
-        Ok(response.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.get_physical_table(request).await }
+        })
+        .await
     }
 
     /// Starts a tournament.
@@ -204,8 +210,11 @@ impl Client {
         &self,
         request: v1::GetLeaderboardRequest,
     ) -> Result<v1::GetLeaderboardResponse, Error> {
-        let response = service(self).get_leaderboard(request).await?;
-        Ok(response.into_inner())
+        repeated(|| {
+            let (mut service, request) = (service(self), request);
+            async move { service.get_leaderboard(request).await }
+        })
+        .await
     }
 
     /// Follows a tournament. Connects when the first report is requested.

@@ -39,9 +39,12 @@ impl RoomClock {
 
 /// The time of day, milliseconds since the Unix epoch.
 pub fn since_epoch_ms() -> u64 {
+    u64::try_from(since_epoch().as_millis()).unwrap_or(u64::MAX)
+}
+
+/// The time of day since the Unix epoch; zero if the system clock is set before it.
+pub fn since_epoch() -> Duration {
     SystemTime::now()
         .duration_since(UNIX_EPOCH)
-        .map_or(0, |time| {
-            u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
-        })
+        .unwrap_or_default()
 }

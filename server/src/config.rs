@@ -11,6 +11,7 @@ use crate::access::AccessSettings;
 use crate::limits::Shares;
 use crate::proxies::TrustedProxies;
 use crate::tls::TlsFiles;
+use crate::webhooks::WebhookSettings;
 
 /// Largest message a client may send, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
@@ -89,12 +90,29 @@ pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 pub const MAX_TOURNAMENTS: usize = 256;
 /// Messages that may wait for one tournament.
 pub const TOURNAMENT_MAILBOX: usize = 256;
+/// Most studies.
+pub const MAX_STUDIES: usize = 256;
+/// Messages that may wait for one study.
+pub const STUDY_MAILBOX: usize = 256;
+/// Largest request about a study, bytes.
+pub const MAX_STUDY_MESSAGE_BYTES: usize = 1024 * 1024;
+/// Most participants that one request adds to a study.
+pub const MAX_STUDY_ADDED: usize = 1_000;
+/// Most participants in one message to a follower of a study.
+pub const MAX_STUDY_PARTICIPANTS_SENT: usize = 200;
+/// Most bytes in one message of the data of a study.
+pub const STUDY_EXPORT_CHUNK: usize = 64 * 1024;
+/// Most streams that follow studies, and of participants.
+pub const MAX_STUDY_STREAMS: usize = 4_096;
 /// Most calls to games that may wait for one stream; a further one ends the stream.
 pub const MAX_CALLS_WAITING: usize = 4_096;
 /// How long a tournament stays open if nobody joins or starts it.
 pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// How far ahead the start of a tournament may be set.
 pub const MAX_START_AHEAD: Duration = Duration::from_secs(366 * 24 * 3_600);
+/// Most participants of one caller who withdraw from a tournament before it begins, so that nobody
+/// fills its journal by joining and withdrawing.
+pub const MAX_EARLY_WITHDRAWALS_OF_CALLER: u32 = 20;
 /// How long a tournament stays paused.
 pub const TOURNAMENT_PAUSE: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// Pause before rooms for games of a tournament are tried again after a failure.
@@ -183,6 +201,8 @@ pub struct ServerConfig {
     pub client_endpoint: Option<String>,
     /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
+    /// Where webhooks go; `None`: there are none.
+    pub webhooks: Option<WebhookSettings>,
 }
 
 impl Default for ServerConfig {
@@ -207,6 +227,7 @@ impl Default for ServerConfig {
             trusted_proxies: TrustedProxies::default(),
             client_endpoint: None,
             allowed_origins: Vec::new(),
+            webhooks: None,
         }
     }
 }

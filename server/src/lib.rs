@@ -1,4 +1,4 @@
-//! The Chef's Hat game server as a library: tasks of rooms and tournaments, stores, gRPC services
+//! The Chef's Hat game server as a library: tasks of rooms, tournaments and studies, stores, gRPC services
 //! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
 //! command line is `chefshat`, in `server/cli`.
 
@@ -24,8 +24,10 @@ pub mod scrape;
 pub mod serve;
 pub mod signing;
 pub mod store;
+pub mod studies;
 mod threads;
 pub mod tls;
 pub mod tournaments;
 pub mod web;
+pub mod webhooks;
 pub mod wire;

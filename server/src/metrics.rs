@@ -125,6 +125,21 @@ impl SearchOutcome {
     }
 }
 
+/// What became of a webhook.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WebhookOutcome {
+    /// Received.
+    Delivered,
+    /// Given up after all attempts.
+    Failed,
+    /// Dropped, because too many waited.
+    Dropped,
+}
+
+impl WebhookOutcome {
+    const LABELS: [&str; 3] = ["delivered", "failed", "dropped"];
+}
+
 /// What a stream is for.
 #[derive(Debug, Clone, Copy)]
 pub enum StreamKind {
@@ -161,6 +176,7 @@ pub struct Metrics {
     games_ended: [Counter; 2],
     /// Refused requests, by reason.
     refusals: Family<[(&'static str, String); 1], Counter>,
+    webhooks: [Counter; 3],
     vector_decisions: Counter,
     vector_games: Gauge,
     outboxes: Mutex<Vec<Weak<Outbox>>>,
@@ -225,6 +241,13 @@ impl Default for Metrics {
                 ["finished", "aborted"],
             ),
             refusals: plain(all, "refusals", "Refused requests"),
+            webhooks: labelled(
+                all,
+                "webhooks",
+                "Webhooks, when they are settled",
+                "outcome",
+                WebhookOutcome::LABELS,
+            ),
             vector_decisions: plain(all, "vector_decisions", "Decisions of vector games"),
             vector_games: plain(all, "vector_games", "Games of open vector streams"),
             outboxes: Mutex::default(),
@@ -324,6 +347,17 @@ impl Metrics {
     /// Counts a search.
     pub fn searched(&self, outcome: SearchOutcome) {
         self.searches[outcome as usize].inc();
+    }
+
+    /// Counts a webhook.
+    pub fn webhook(&self, outcome: WebhookOutcome) {
+        self.webhooks[outcome as usize].inc();
+    }
+
+    /// Number of webhooks with this outcome.
+    #[cfg(test)]
+    pub fn webhooks(&self, outcome: WebhookOutcome) -> u64 {
+        self.webhooks[outcome as usize].get()
     }
 
     /// Counts an illegal action.

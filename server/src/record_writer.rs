@@ -8,7 +8,7 @@ use tracing::{error, info};
 
 use crate::convert;
 use crate::limits::{Background, Key};
-use crate::store::Store;
+use crate::store::{Store, StoredGame};
 use chefshat_room::ids::Id;
 
 /// Writes records to the folder of records of a data directory.
@@ -62,6 +62,15 @@ impl RecordWriter {
                 return;
             }
         };
+        if let StoredGame::Hosted(header, ..) = &stored
+            && header.study.is_some()
+        {
+            // Its record is in the database alone, from which a participant's data can be deleted.
+            if let Err(error) = self.store.mark_record_written(game).await {
+                error!(%game, %error, "a game of a study was not marked as needing no record file");
+            }
+            return;
+        }
         let writing = self.background.run(move || {
             let lines = convert::lines_of(&stored);
             let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());

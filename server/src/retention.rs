@@ -15,6 +15,7 @@ use crate::clock::since_epoch_ms;
 use crate::config::KeepGames;
 use crate::rooms::Rooms;
 use crate::store::{DiskUsage, Keep, StoreError};
+use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 
 /// Games that are deleted in one commit: rooms wait for it.
@@ -68,12 +69,18 @@ pub struct Usage {
 pub struct Retention {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    studies: Arc<Studies>,
 }
 
 impl Retention {
-    /// For the games of these rooms, except for those of tournaments that are not over.
-    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>) -> Self {
-        Self { rooms, tournaments }
+    /// For the games of these rooms, except for those of tournaments that are not over and those of
+    /// studies.
+    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>, studies: Arc<Studies>) -> Self {
+        Self {
+            rooms,
+            tournaments,
+            studies,
+        }
     }
 
     /// How much is stored.
@@ -100,6 +107,7 @@ impl Retention {
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
         let mut pruned = Pruned::default();
+        let of_studies = self.studies.games();
         let mut after = 0;
         loop {
             let store = self.rooms.store();
@@ -107,7 +115,7 @@ impl Retention {
             let Some((last, _)) = found.last() else { break };
             after = *last;
             let games: Vec<_> = (found.into_iter())
-                .filter(|(_, game)| !self.tournaments.needs(*game))
+                .filter(|(_, game)| !self.tournaments.needs(*game) && !of_studies.contains(game))
                 .collect();
             if games.is_empty() {
                 continue;

@@ -113,6 +113,7 @@ fn queues(rooms: &Rooms, to: &mut Encoder<'_, '_>) -> fmt::Result {
         ("outbox", rooms.metrics().outbox_depths()),
         ("mailbox", rooms.mailbox_depths()),
         ("writer", vec![rooms.store().queue_depth()]),
+        ("webhook", vec![rooms.webhooks().waiting()]),
     ];
     let total = |depths: &Vec<usize>| depths.iter().sum();
     let help = "Entries of all queues of a kind";

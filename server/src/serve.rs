@@ -34,7 +34,7 @@ use crate::cluster::{
 };
 use crate::config::{
     DRAIN_LIMIT, HAND_OVER_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES,
-    MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
+    MAX_STREAMS_PER_CONNECTION, MAX_STUDY_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
 };
 use crate::connections::{self, Connections, Limits, Listener};
 use crate::forwarded::ForwardedLayer;
@@ -47,6 +47,7 @@ use crate::rooms::Rooms;
 use crate::scrape;
 use crate::store::cluster::{ClusterStore, NodeInfo};
 use crate::store::{Store, StoreError};
+use crate::studies::Studies;
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
@@ -103,6 +104,7 @@ pub struct Server {
     store: Arc<dyn Store>,
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    studies: Arc<Studies>,
     access: Arc<Access>,
     tls: Option<Arc<Tls>>,
     peers: Option<PeerPort>,
@@ -135,6 +137,7 @@ impl Server {
         let mut server = Self::new(config, store, directory, None)?;
         server.games = server.rooms.restore().await?;
         server.tournaments.restore().await?;
+        server.studies.restore().await?;
         Ok(server)
     }
 
@@ -192,6 +195,7 @@ impl Server {
             tracker.clone(),
         )?;
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
+        let studies = Studies::new(Arc::clone(&rooms), tracker.clone());
         scrape::add_state(&rooms, &tournaments);
         let limits = Limits {
             max_connections: config.max_connections,
@@ -205,6 +209,7 @@ impl Server {
             store,
             rooms,
             tournaments,
+            studies,
             access: Arc::new(access),
             tls,
             peers: None,
@@ -275,6 +280,7 @@ impl Server {
             store,
             rooms,
             tournaments,
+            studies,
             access,
             tls,
             peers,
@@ -292,7 +298,11 @@ impl Server {
                 .run_until_cancelled_owned(Arc::clone(&connections).close_stalled()),
         );
         if let Some(keep) = config.keep_games {
-            let retention = Retention::new(Arc::clone(&rooms), Arc::clone(&tournaments));
+            let retention = Retention::new(
+                Arc::clone(&rooms),
+                Arc::clone(&tournaments),
+                Arc::clone(&studies),
+            );
             tracker.spawn(
                 closing
                     .clone()
@@ -305,7 +315,7 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         let routes = routes(
             &rooms,
-            &tournaments,
+            (&tournaments, &studies),
             &calls,
             &connections,
             &config,
@@ -324,6 +334,7 @@ impl Server {
                 .clone()
                 .run_until_cancelled_owned(Arc::clone(&access).follow()),
         );
+        tracker.spawn(rooms.webhooks().clone().deliver(closing.clone()));
         if let Some(tls) = tls {
             tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
         }
@@ -431,8 +442,10 @@ impl Server {
             }
             // Games that end from here on count when the server is restarted.
             tournaments.stop();
+            studies.stop();
             rooms.shut_down(config.grace).await;
             tournaments.end();
+            studies.end();
             closing.cancel();
         };
         let ended_or_drained = async {
@@ -447,7 +460,8 @@ impl Server {
             failure = store.failed() => return Err(ServeError::Store(failure)),
         }
         tournaments.end();
-        drop((rooms, tournaments));
+        studies.end();
+        drop((rooms, tournaments, studies));
         tracker.close();
         if is_node {
             // The database may be away, for which a node does not wait.
@@ -489,7 +503,7 @@ fn from_peer(mut request: http::Request<Body>) -> http::Request<Body> {
 
 fn routes(
     rooms: &Arc<Rooms>,
-    tournaments: &Arc<Tournaments>,
+    (tournaments, studies): (&Arc<Tournaments>, &Arc<Studies>),
     calls: &Arc<CallLimits>,
     connections: &Arc<Connections>,
     config: &ServerConfig,
@@ -499,15 +513,24 @@ fn routes(
     use crate::wire::service::spectator_service_server::SpectatorServiceServer;
     use v1::admin_service_server::AdminServiceServer;
     use v1::analysis_service_server::AnalysisServiceServer;
+    use v1::instrument_service_server::InstrumentServiceServer;
+    use v1::participation_service_server::ParticipationServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
+    use v1::study_service_server::StudyServiceServer;
     use v1::table_service_server::TableServiceServer;
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
     let recorded = grpc::Recorded::new(reach.clone(), config.access.records);
-    let retention = Retention::new(Arc::clone(rooms), Arc::clone(tournaments));
+    let retention = Retention::new(
+        Arc::clone(rooms),
+        Arc::clone(tournaments),
+        Arc::clone(studies),
+    );
+    let study_calls =
+        grpc::StudyCalls::new(Arc::clone(studies), Arc::clone(calls), closing.clone());
     let admin = grpc::AdminCalls::new(reach.clone(), Arc::clone(connections), retention);
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
@@ -529,6 +552,14 @@ fn routes(
         .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
+        StudyServiceServer::new(study_calls.clone())
+            .max_decoding_message_size(MAX_STUDY_MESSAGE_BYTES),
+    )
+    .add_service(
+        ParticipationServiceServer::new(study_calls)
+            .max_decoding_message_size(MAX_STUDY_MESSAGE_BYTES),
+    )
+    .add_service(
         RoomServiceServer::new(grpc::RoomCalls::new(
             Arc::clone(rooms),
             recorded.clone(),
@@ -542,7 +573,11 @@ fn routes(
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        TableServiceServer::new(grpc::TableCalls::new(reach))
+        TableServiceServer::new(grpc::TableCalls::new(reach.clone()))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        InstrumentServiceServer::new(grpc::Instruments::new(reach.clone()))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
@@ -559,7 +594,7 @@ fn routes(
     .add_service(AnalysisServiceServer::new(analyses).max_decoding_message_size(MAX_MESSAGE_BYTES))
     .add_service(AdminServiceServer::new(admin).max_decoding_message_size(MAX_MESSAGE_BYTES))
     .add_service(
-        ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), calls, config))
+        ServerServiceServer::new(grpc::Info::new(reach, calls, config))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     );
     Ok(routes)

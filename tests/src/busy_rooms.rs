@@ -121,8 +121,9 @@ impl BusyRooms {
             .await
             .is_err()
         {
-            let now = self.progress.borrow();
-            panic!("rooms stand still: {before:?} decisions became {now:?}");
+            let now = self.progress.borrow().clone();
+            let unexpected = self.ledger.all_unexpected();
+            panic!("rooms stand still: {before:?} decisions became {now:?}; {unexpected:#?}");
         }
     }
 
@@ -156,14 +157,7 @@ impl Room {
             let Some((game, tickets)) = self.open(&host).await else {
                 continue;
             };
-            for outcome in self.play(&client, tickets).await {
-                match outcome.map(|outcome| outcome.ending) {
-                    Ok(Ending::Finished(_)) => {}
-                    other => self
-                        .ledger
-                        .unexpected(format!("{game} ended with {other:?}")),
-                }
-            }
+            self.play(&client, &game, tickets).await;
             games.push(game);
         }
         games
@@ -211,11 +205,7 @@ impl Room {
         Some((room.game_id, tickets))
     }
 
-    async fn play(
-        &mut self,
-        client: &Client,
-        tickets: Vec<String>,
-    ) -> Vec<Result<Outcome, PlayError>> {
+    async fn play(&mut self, client: &Client, game: &str, tickets: Vec<String>) {
         let options = PlayOptions {
             delivery: self.kind.delivery,
             backoff: self.kind.backoff.clone(),
@@ -232,15 +222,30 @@ impl Room {
             };
             seats.push((ticket, self.ledger.wrap(agent)));
         }
-        if self.kind.one_stream {
-            return client.play_many_with(seats, &options).await;
-        }
         let mut playing = JoinSet::new();
-        for (ticket, agent) in seats {
+        let streams = match self.kind.one_stream {
+            true => vec![seats],
+            false => seats.into_iter().map(|seat| vec![seat]).collect(),
+        };
+        for seats in streams {
             let (client, options) = (client.clone(), options.clone());
-            playing.spawn(async move { client.play_with(ticket, agent, &options).await });
+            playing.spawn(async move { client.play_many_with(seats, &options).await });
         }
-        playing.join_all().await
+        // The others wait for a seat that nobody plays any more.
+        while let Some(outcomes) = playing.join_next().await {
+            for outcome in outcomes.expect("playing does not panic") {
+                self.note(game, outcome);
+            }
+        }
+    }
+
+    fn note(&self, game: &str, outcome: Result<Outcome, PlayError>) {
+        match outcome.map(|outcome| outcome.ending) {
+            Ok(Ending::Finished(_)) => {}
+            other => self
+                .ledger
+                .unexpected(format!("{game} ended with {other:?}")),
+        }
     }
 }
 

@@ -70,12 +70,17 @@ impl Ledger {
         self.unexpected.lock().expect("no panic").push(what);
     }
 
+    /// What must not happen and did.
+    pub fn all_unexpected(&self) -> Vec<String> {
+        self.unexpected.lock().expect("no panic").clone()
+    }
+
     /// Checks that nothing unexpected happened.
     ///
     /// # Panics
     /// Something unexpected happened.
     pub fn assert_nothing_unexpected(&self) {
-        let unexpected = self.unexpected.lock().expect("no panic");
+        let unexpected = self.all_unexpected();
         assert!(unexpected.is_empty(), "{unexpected:#?}");
     }
 

@@ -61,6 +61,13 @@ impl ServerService for Guarded {
     ) -> Result<Response<v1::GetActionTableResponse>, Status> {
         Err(Status::unimplemented("not in this play"))
     }
+
+    async fn get_clock(
+        &self,
+        _request: Request<v1::GetClockRequest>,
+    ) -> Result<Response<v1::GetClockResponse>, Status> {
+        Err(Status::unimplemented("not in this play"))
+    }
 }
 
 /// A server with TLS that wants a token, and the certificate that vouches for it.

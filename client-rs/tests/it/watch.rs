@@ -62,7 +62,11 @@ async fn whom_the_game_waits_for_comes_between_the_events() {
         with(vec![1], vec![awaited(Some(2)), awaited(Some(0))]),
         with(vec![2], vec![]),
         with(vec![], vec![awaited(None)]),
+        with(vec![3], vec![awaited(Some(1))]),
+        Err(Status::unavailable("lost")),
     ]);
+    // Nobody is awaited at first on the next connection.
+    fake.watch(vec![part([4])]);
     let client = fake.start().await;
     let mut spectator = client.spectate("room", 0).with_backoff(quick());
     let mut watched = Vec::new();
@@ -73,7 +77,21 @@ async fn whom_the_game_waits_for_comes_between_the_events() {
         });
     }
     let nobody = (0, Some(None));
-    assert_eq!(watched, [(1, None), (0, Some(Some(0))), (2, None), nobody]);
+    let waiting = (0, Some(Some(0)));
+    let again = (0, Some(Some(1)));
+    assert_eq!(
+        watched,
+        [
+            (1, None),
+            waiting,
+            (2, None),
+            nobody,
+            (3, None),
+            again,
+            nobody,
+            (4, None)
+        ]
+    );
 }
 
 #[tokio::test]

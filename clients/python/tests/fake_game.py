@@ -55,6 +55,7 @@ class FakeGame:
         self.changed = threading.Condition(self.lock)
         self.questions = questions
         self.join_code = f"CODE{number}"
+        self.markers: list[pb.Marker] = []
         self.room = pb.Room(
             room_id=f"{number:032x}", game_id=f"{number + 4096:032x}", name=request.name, state=pb.ROOM_STATE_WAITING
         )

@@ -2,6 +2,7 @@
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent import futures
 from pathlib import Path
@@ -14,6 +15,7 @@ from fake_vector import ToyVector
 from refusing import Context, Guard, refuse
 
 from chefshat import pb
+from chefshat._gen.chefshat.v1 import instrument_service_pb2_grpc as instrument_grpc
 from chefshat._gen.chefshat.v1 import play_service_pb2_grpc as play_grpc
 from chefshat._gen.chefshat.v1 import record_service_pb2_grpc as record_grpc
 from chefshat._gen.chefshat.v1 import room_service_pb2_grpc as room_grpc
@@ -24,6 +26,8 @@ from chefshat._gen.chefshat.v1 import vector_service_pb2_grpc as vector_grpc
 
 # Maximum size of a message, bytes, as on the real server.
 MAX_MESSAGE_BYTES = 64 * 1024
+#: How far the clock is ahead of this machine's, seconds.
+CLOCK_AHEAD_S = 1000
 #: A certificate for this machine, which is its own authority.
 TLS = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "tls"
 
@@ -33,6 +37,7 @@ class FakeServer(
     room_grpc.RoomServiceServicer,
     server_grpc.ServerServiceServicer,
     record_grpc.RecordServiceServicer,
+    instrument_grpc.InstrumentServiceServicer,
 ):
     """The fake server; a context manager.
 
@@ -46,6 +51,7 @@ class FakeServer(
         self.games: list[FakeGame] = []
         self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
+        self.broke_markers = False
         self.questions = QUESTIONS
         self.fault: Callable[[FakeGame, FakeSeat, pb.Answer], str] = lambda game, seat, answer: ""
         self.guard = Guard(token)
@@ -60,6 +66,7 @@ class FakeServer(
         room_grpc.add_RoomServiceServicer_to_server(self, self._server)
         server_grpc.add_ServerServiceServicer_to_server(self, self._server)
         record_grpc.add_RecordServiceServicer_to_server(self, self._server)
+        instrument_grpc.add_InstrumentServiceServicer_to_server(self, self._server)
         spectator_grpc.add_SpectatorServiceServicer_to_server(_Spectators(self), self._server)
         self.tournaments = FakeTournaments(self._tournament_game)
         tournament_grpc.add_TournamentServiceServicer_to_server(self.tournaments, self._server)
@@ -150,6 +157,50 @@ class FakeServer(
         """Returns the right number of texts; only the first one is correct."""
         space = pb.ActionSpace(id="chefshat-11", size=SIZE, turn_actions=200)
         return pb.GetActionTableResponse(action_space=space, texts=["C1;Q1;J0", *["?"] * (SIZE - 1)])
+
+    def GetClock(self, request: pb.GetClockRequest, context: Context) -> pb.GetClockResponse:
+        """The time of day, `CLOCK_AHEAD_S` ahead of the true one. All rooms were created at the true start of 1970."""
+        now = round(time.time() * 1e6)
+        ahead = CLOCK_AHEAD_S * 1_000_000
+        response = pb.GetClockResponse(received_at_us=now + ahead, sent_at_us=now + ahead)
+        if request.room_id:
+            game_id = self.game(request.room_id, context).room.game_id
+            clock = pb.RoomClock(game_id=game_id, created_at_ms=CLOCK_AHEAD_S * 1000, received_us=now, sent_us=now)
+            response.room.CopyFrom(clock)
+        return response
+
+    # Markers.
+
+    def AddMarker(self, request: pb.AddMarkerRequest, context: Context) -> pb.AddMarkerResponse:
+        """Adds a marker. Without a moment it marks the start of the room."""
+        game = self._owned(request.room_id, request.owner_token, context)
+        with game.lock:
+            marker = pb.Marker(number=len(game.markers) + 1, label=request.label, elapsed_us=request.elapsed_us)
+            game.markers.append(marker)
+            game.changed.notify_all()
+        return pb.AddMarkerResponse(marker=marker)
+
+    def FollowMarkers(self, request: pb.FollowMarkersRequest, context: Context) -> Iterator[pb.FollowMarkersResponse]:
+        """Streams the markers, each in a message; breaks after the first, once."""
+        game = self._owned(request.room_id, request.owner_token, context)
+        sent = max(request.from_number - 1, 0)
+        while context.is_active():
+            with game.lock:
+                if len(game.markers) <= sent and not game.over:
+                    game.changed.wait(timeout=0.2)
+                markers, over = game.markers[sent:], game.over
+            yield pb.FollowMarkersResponse(markers=markers[:1])
+            sent += len(markers[:1])
+            if sent == 1 and not self.broke_markers:
+                self.broke_markers = True
+                context.abort(grpc.StatusCode.UNAVAILABLE, "the stream was broken on purpose")
+            if over and sent == len(game.markers):
+                return
+
+    def _owned(self, room_id: str, owner_token: str, context: Context) -> FakeGame:
+        if owner_token != "owner":
+            refuse(context, grpc.StatusCode.PERMISSION_DENIED, "OWNER_TOKEN_WRONG", "not the token of this room's creator")
+        return self.game(room_id, context)
 
     def ListRecords(self, request: pb.ListRecordsRequest, context: Context) -> pb.ListRecordsResponse:
         """Pages of two games of rooms with a name, finished or not."""

@@ -28,7 +28,7 @@ from chefshat.local_server import BINARY
 pytestmark = pytest.mark.server
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "datasets.md"
-TABLES = ["decisions", "expressions"]
+TABLES = ["decisions", "expressions", "markers"]
 # Simulated games, and their agents.
 GAMES = 6
 AGENTS = ["greedy", "random_unmasked", "random", "random"]
@@ -144,7 +144,7 @@ def export(binary: Path, records: Path, folder: Path) -> None:
     assert run(binary, "export", records, "--out", folder / "gym", "--layout", "chefshatgym")["games"] == exported["games"]
     for name in ["dataset", "gym"]:
         sums = (folder / name / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-        assert len(sums) > exported["games"] if name == "gym" else len(sums) == 7
+        assert len(sums) > exported["games"] if name == "gym" else len(sums) == 10
         for line in sums:
             digest, path = line.split("  ")
             assert hashlib.sha256((folder / name / path).read_bytes()).hexdigest() == digest
@@ -161,7 +161,7 @@ def binary() -> Path:
 
 @pytest.fixture(scope="module")
 def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Games hosted by a real server: one with expressions, one with invalid attempts."""
+    """Games hosted by a real server: one with expressions and a marker, one with invalid attempts."""
     data_dir = tmp_path_factory.mktemp("data")
     records = data_dir / "records"
     rules = pb.RuleSet(target_shifts=2)
@@ -169,6 +169,7 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
         seats = [None, "random", "greedy", "random"]
         room = client.create_room("talk", rules=rules, policy=pb.RoomPolicy(hints=True), seats=seats)
         ticket = client.join_room(room.join_code, "Talkative").ticket
+        client.add_marker(room.room.room_id, room.owner_token, "EEG on")
         client.play(Talkative(client, ticket), ticket)
         policy = pb.RoomPolicy(max_invalid_attempts=3)
         room = client.create_room("stubborn", rules=rules, policy=policy, seats=seats)
@@ -193,7 +194,7 @@ def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset
 @pytest.mark.parametrize("table", TABLES)
 def test_every_column_has_its_documented_type(hosted: Dataset, table: str) -> None:
     columns = documented_columns(table)
-    assert len(columns) == {"decisions": 59, "expressions": 15}[table]
+    assert len(columns) == {"decisions": 63, "expressions": 20, "markers": 6}[table]
     schema = pyarrow.parquet.read_schema(hosted.parquet(table))
     in_polars = polars.read_parquet(hosted.parquet(table))
     in_pandas = pandas.read_parquet(hosted.parquet(table), dtype_backend="pyarrow")

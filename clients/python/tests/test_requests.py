@@ -1,11 +1,13 @@
 """Calls that are repeated when their response was lost, or their room is just changing servers."""
 
 import asyncio
+from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import grpc
 import pytest
-from google.protobuf import any_pb2
+from google.protobuf import any_pb2, descriptor_pool
+from google.protobuf.message import Message
 from google.rpc import error_details_pb2, status_pb2
 
 from chefshat import ChefsHatError, pb, requests
@@ -41,7 +43,7 @@ class Method:
         self.errors = list(errors)
         self.ids: list[bytes] = []
 
-    def __call__(self, request: pb.JoinRoomRequest | pb.GetRoomRequest | pb.LeaveRoomRequest) -> str:
+    def __call__(self, request: Message) -> str:
         """Fails or returns."""
         self.ids.append(getattr(request, "request_id", b""))
         if self.errors:
@@ -87,6 +89,77 @@ def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(request_: pb.Jo
     with pytest.raises(ChefsHatError, match="OWNER_UNREACHABLE"):
         requests.called(method, request_)
     assert len(method.ids) == attempts
+
+
+class Lines:
+    """A call with two responses that fails with each error in turn: None stands for a success."""
+
+    def __init__(self, *errors: grpc.RpcError | None, after: int = 0) -> None:
+        self.errors = list(errors)
+        self.after = after
+        self.calls = 0
+        self.cancelled = 0
+
+    def __call__(self, request: pb.GetRecordRequest) -> "Lines":
+        """Calls."""
+        self.calls += 1
+        return self
+
+    def __iter__(self) -> Iterator[int]:
+        """The responses."""
+        error = self.errors.pop(0)
+        for number in range(2):
+            if error is not None and number == self.after:
+                raise error
+            yield number
+
+    async def __aiter__(self) -> AsyncIterator[int]:
+        """The same, asynchronously."""
+        for number in self:
+            yield number
+
+    def cancel(self) -> None:
+        """Ends the call."""
+        self.cancelled += 1
+
+
+def read(call: Lines, *, asynchronous: bool) -> list[int]:
+    """Reads all responses."""
+    request = pb.GetRecordRequest()
+
+    async def gather() -> list[int]:
+        return [number async for number in requests.async_streamed(call, request)]
+
+    return asyncio.run(gather()) if asynchronous else list(requests.streamed(call, request))
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_a_record_is_requested_again_until_its_first_lines(*, asynchronous: bool) -> None:
+    call = Lines(Lost(), Unreachable(), None)
+    assert read(call, asynchronous=asynchronous) == [0, 1]
+    assert call.calls == call.cancelled == 3
+    # Afterwards, lines would come twice.
+    call = Lines(Lost(), after=1)
+    with pytest.raises(ChefsHatError):
+        read(call, asynchronous=asynchronous)
+    assert call.calls == 1
+
+
+@pytest.mark.parametrize("service", ["ServerService", "RoomService", "RecordService", "TournamentService"])
+def test_every_call_that_only_reads_or_has_an_id_is_repeated(service: str) -> None:
+    reading, repeatable = ({request.DESCRIPTOR.name for request in table} for table in (requests.READING, requests.REPEATABLE))
+    for method in descriptor_pool.Default().FindServiceByName(f"chefshat.v1.{service}").methods:
+        request = method.input_type
+        reads = method.name.startswith(("Get", "List")) and method.name != "GetServerInfo"
+        assert (request.name in reading) == reads, method.name
+        assert (request.name in repeatable) == ("request_id" in request.fields_by_name), method.name
+
+
+def test_a_replacement_by_a_built_in_agent_is_not_repeated() -> None:
+    method = Method(Lost())
+    with pytest.raises(ChefsHatError):
+        requests.called(method, pb.ReplaceParticipantRequest(built_in_agent="greedy"))
+    assert method.ids == [b""]
 
 
 def test_a_change_that_may_have_been_made_is_not_repeated() -> None:

@@ -36,6 +36,18 @@ def test_the_agent_learns_whom_the_game_waits_for(stage: Stage) -> None:
     assert stage.log[-3:] == [("event", 1), ("awaited", 0), ("awaited", None)]
 
 
+def test_after_a_lost_connection_nobody_is_awaited_until_the_server_says_so(stage: Stage) -> None:
+    stage.receive(pb.SeatUpdate(awaited=pb.Awaited(seat=2)))
+    for nobody in ([("awaited", None)], []):
+        stage.session.lost()
+        stage.connect()
+        stage.log.clear()
+        stage.receive(attached())
+        assert stage.log == [("attached", 0), *nobody]
+    stage.receive(pb.SeatUpdate(awaited=pb.Awaited(seat=2)))
+    assert stage.log[-1] == ("awaited", 2)
+
+
 def test_every_seat_has_its_own_entropy() -> None:
     session = PlaySession({ticket: Scribe() for ticket in "tuv"})
     session.connected()

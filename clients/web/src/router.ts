@@ -16,6 +16,11 @@ export type Route =
   | { page: "tournaments" }
   | { page: "newTournament" }
   | { page: "tournament"; tournamentId: string }
+  | { page: "results"; tournamentId: string }
+  | { page: "study"; link: string }
+  | { page: "studies" }
+  | { page: "newStudy" }
+  | { page: "ownStudy"; studyId: string }
   | { page: "leaderboard" }
   | { page: "person"; name: string }
   | { page: "tutorial" }
@@ -27,6 +32,8 @@ export function routeOf(path: string): Route {
   const parts = path.split("/").filter((part) => part !== "");
   const [first, second, third] = parts.map(decoded);
   if (parts.length === 3 && first === "rooms" && third === "table") return { page: "attend", roomId: second ?? "" };
+  if (parts.length === 3 && first === "tournaments" && third === "results")
+    return { page: "results", tournamentId: second ?? "" };
   if (parts.length > 2) return { page: "unknown" };
   if (second === undefined) {
     switch (first) {
@@ -38,6 +45,8 @@ export function routeOf(path: string): Route {
         return { page: "join", code: "" };
       case "tournaments":
         return { page: "tournaments" };
+      case "studies":
+        return { page: "studies" };
       case "leaderboard":
         return { page: "leaderboard" };
       case "tutorial":
@@ -59,6 +68,10 @@ export function routeOf(path: string): Route {
       return { page: "replay", gameId: second };
     case "tournaments":
       return second === "new" ? { page: "newTournament" } : { page: "tournament", tournamentId: second };
+    case "study":
+      return { page: "study", link: second };
+    case "studies":
+      return second === "new" ? { page: "newStudy" } : { page: "ownStudy", studyId: second };
     case "people":
       return { page: "person", name: second };
     default:
@@ -85,8 +98,16 @@ export function pathOf(route: Route): string {
       return "/tournaments/new";
     case "tournament":
       return `/tournaments/${encodeURIComponent(route.tournamentId)}`;
+    case "results":
+      return `/tournaments/${encodeURIComponent(route.tournamentId)}/results`;
     case "person":
       return `/people/${encodeURIComponent(route.name)}`;
+    case "study":
+      return `/study/${encodeURIComponent(route.link)}`;
+    case "newStudy":
+      return "/studies/new";
+    case "ownStudy":
+      return `/studies/${encodeURIComponent(route.studyId)}`;
     case "unknown":
       return "/";
     default:

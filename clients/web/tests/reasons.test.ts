@@ -19,6 +19,12 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SEATS_REFUSED",
     "SETTINGS_REFUSED",
   ],
+  "the page of a study shows the newest step, or drops the traces": [
+    "STEP_MISMATCH",
+    "STEP_OVER",
+    "TOO_MANY_TRACES",
+    "TRACES_REFUSED",
+  ],
   "the page repeats the request": ["FOLLOWER_TOO_SLOW", "SPECTATOR_TOO_SLOW"],
   "the page sends no such value": [
     "COMMAND_MISSING",
@@ -45,6 +51,8 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "CLIENT_TOO_SLOW",
     "CLIENT_UNKNOWN",
     "FACES_OUT_OF_RANGE",
+    "MARKER_REFUSED",
+    "TOO_MANY_MARKERS",
     "GAME_KNOWN",
     "HANDLE_UNKNOWN",
     "ILLEGAL_ACTION",

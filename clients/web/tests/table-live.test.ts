@@ -13,6 +13,7 @@ import { DecisionSource } from "../src/gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { Role, SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
+import { en } from "../src/i18n/en";
 import { maskOf } from "../src/table/model/actions";
 import { awaitedSeconds } from "../src/table/model/awaited";
 import { applyUpdate, type LiveState, startLive } from "../src/table/model/live";
@@ -131,6 +132,13 @@ describe("whom the game waits for", () => {
     if (!away) throw new Error("nobody is awaited");
     expect(away).toMatchObject({ seat: 2, receivedAtMs: 1000 });
     expect([1000, 1400, 1401, 99_000].map((nowMs) => awaitedSeconds(away, nowMs))).toEqual([13, 12, 12, 0]);
+  });
+
+  test("does not count down for a seat that is away where nobody may know how long", () => {
+    const unknown = told(start(), awaited({ seat: 2, away: true, waitedMs: 8000 })).awaited;
+    if (!unknown) throw new Error("nobody is awaited");
+    expect(awaitedSeconds(unknown, 2000)).toBeUndefined();
+    expect(en.table.now.awaitedAway("Ada", undefined)).toBe("Waiting for Ada (away)");
   });
 
   test("counts up for a seat that is connected, once that is worth saying", () => {

@@ -14,7 +14,7 @@ use super::numbers::counted;
 use super::{CommandError, progress};
 
 const HELP: &str = "\
-The directory contains the tables `decisions` and `expressions` in every requested format, a dataset card (README.md) and SHA256SUMS. \
+The directory contains the tables `decisions`, `expressions` and `markers` in every requested format, a dataset card (README.md) and SHA256SUMS. \
 It is written atomically. Every record is replayed first; a damaged one fails the export unless --skip-damaged is given.
 
 Examples:
@@ -171,6 +171,7 @@ impl Export {
             "finished": exported.finished,
             "decisions": exported.decisions,
             "expressions": exported.expressions,
+            "markers": exported.markers,
             "filtered": exported.filtered,
             "left_out": left_out,
             "files": files,

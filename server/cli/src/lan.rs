@@ -3,7 +3,9 @@
 
 use std::io::{self, IsTerminal as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::path::Path;
 
+use anstyle::{Ansi256Color, Style};
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
@@ -13,11 +15,20 @@ const FAR_AWAY: [IpAddr; 2] = [
     IpAddr::V6(Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1)),
 ];
 const ANY_PORT: u16 = 9;
+/// Files that Docker and Podman put into a container.
+const IN_CONTAINERS: [&str; 2] = ["/.dockerenv", "/run/.containerenv"];
+/// A variable that Kubernetes sets in a container.
+const IN_PODS: &str = "KUBERNETES_SERVICE_HOST";
+/// White on black, which a terminal's theme does not change: a QR code needs both.
+const WHITE_ON_BLACK: Style = Style::new()
+    .fg_color(Some(anstyle::Color::Ansi256(Ansi256Color(231))))
+    .bg_color(Some(anstyle::Color::Ansi256(Ansi256Color(16))));
 
 /// Prints where a browser of the network finds the page, if the server listens on every address of
-/// the machine; with a QR code if a person sees it.
+/// the machine; with a QR code if a person sees it. A container does not know the addresses at
+/// which its machine is reached.
 pub(super) fn print_addresses(listening_on: SocketAddr, scheme: &str) {
-    if !listening_on.ip().is_unspecified() {
+    if !listening_on.ip().is_unspecified() || is_container() {
         return;
     }
     let urls = urls(listening_on, scheme, &own_addresses());
@@ -31,7 +42,11 @@ pub(super) fn print_addresses(listening_on: SocketAddr, scheme: &str) {
     }
 }
 
-/// The addresses of this machine on the way to the internet.
+fn is_container() -> bool {
+    IN_CONTAINERS.iter().any(|file| Path::new(file).exists()) || std::env::var_os(IN_PODS).is_some()
+}
+
+/// The addresses of this machine on the way to the internet. None without a route there.
 fn own_addresses() -> Vec<IpAddr> {
     let own = FAR_AWAY.iter().filter_map(|far| {
         let any = match far {
@@ -58,14 +73,17 @@ fn urls(listening_on: SocketAddr, scheme: &str, own: &[IpAddr]) -> Vec<String> {
         .collect()
 }
 
-/// A QR code in characters of half a line, light on dark. `None` if the text is too long.
+/// A QR code in characters of half a line, white on black. `None` if the text is too long.
 fn qr_code(text: &str) -> Option<String> {
     let code = QrCode::new(text).ok()?;
     let mut image = code.render::<Dense1x2>();
-    // Terminals are dark: what they draw is the light part of the code.
+    // What is drawn is the light part of the code.
     image.dark_color(Dense1x2::Light);
     image.light_color(Dense1x2::Dark);
-    Some(image.build())
+    let image = image.build();
+    let lines = image.lines();
+    let coloured = lines.map(|line| format!("{WHITE_ON_BLACK}{line}{WHITE_ON_BLACK:#}"));
+    Some(coloured.collect::<Vec<_>>().join("\n"))
 }
 
 #[cfg(test)]
@@ -92,7 +110,10 @@ mod tests {
     #[test]
     fn the_qr_code_is_a_square_with_a_margin() {
         let code = qr_code("http://192.168.1.5:50051").expect("a short text");
-        let lines: Vec<&str> = code.lines().collect();
+        let (colours, reset) = ("\u{1b}[38;5;231m\u{1b}[48;5;16m", "\u{1b}[0m");
+        let cells = |line| str::strip_prefix(line, colours)?.strip_suffix(reset);
+        let lines: Option<Vec<&str>> = code.lines().map(cells).collect();
+        let lines = lines.expect("every line sets both colours");
         let columns = lines[0].chars().count();
         assert_eq!(lines.len(), columns.div_ceil(2), "\n{code}");
         assert!(lines.iter().all(|line| line.chars().count() == columns));

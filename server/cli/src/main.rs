@@ -40,6 +40,7 @@ mod rules_args;
 mod secret_file;
 mod serve;
 mod simulate;
+mod study;
 mod table;
 mod threads;
 mod token;
@@ -102,6 +103,8 @@ enum Command {
     Table(table::TableCommand),
     /// Create, join and follow tournaments, and show their results.
     Tournament(tournament::TournamentCommand),
+    /// Run studies with people: conditions, participants, questionnaires, data.
+    Study(study::StudyCommand),
     /// Show the ratings of a server's participants.
     Leaderboard(leaderboard::Leaderboard),
     /// List, download and import records of finished games.
@@ -177,6 +180,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Room(command) => in_runtime(command.run()),
         Command::Table(command) => in_runtime(command.run()),
         Command::Tournament(command) => in_runtime(command.run()),
+        Command::Study(command) => in_runtime(command.run()),
         Command::Leaderboard(command) => in_runtime(command.run()),
         Command::Records(command) => in_runtime(command.run()),
         Command::Export(command) => command.run(),

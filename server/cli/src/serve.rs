@@ -28,6 +28,7 @@ use chefshat_server::signing::key_or_new;
 use chefshat_server::store::{MemoryStore, PostgresOptions, SqliteStore, Store};
 use chefshat_server::tls::TlsFiles;
 use chefshat_server::web;
+use chefshat_server::webhooks::WebhookSettings;
 
 /// The settings of a server. Each has a flag, an environment variable, a key in the file of
 /// `--config` and a default; see `config.rs`.
@@ -143,11 +144,49 @@ pub(super) struct Settings {
     /// meets the present certificate; what it does on the old one continues. 0 means never.
     #[arg(long, env = "CHEFSHAT_CONNECTION_AGE", default_value_t = 43_200)]
     connection_age: u64,
+    /// Address, http or https, that receives a signed POST request when a room is created, a game ends,
+    /// or a tournament starts or ends (see docs/instruments.md).
+    #[arg(long, env = "CHEFSHAT_WEBHOOK", value_name = "URL")]
+    webhook: Option<String>,
+    /// File with the secret that signs webhooks, 16 bytes or more; spaces around it do not count.
+    #[arg(long, env = "CHEFSHAT_WEBHOOK_SECRET_FILE", value_name = "FILE")]
+    webhook_secret_file: Option<PathBuf>,
+    /// File with the authorities that certify the receiver of webhooks, PEM. Default: the system's.
+    #[arg(long, env = "CHEFSHAT_WEBHOOK_CA", value_name = "FILE")]
+    webhook_ca: Option<PathBuf>,
     #[command(flatten)]
     node: NodeSettings,
 }
 
+/// The fewest bytes of a secret for webhooks.
+const MIN_WEBHOOK_SECRET: usize = 16;
+
 impl Settings {
+    /// Where webhooks go, if anywhere.
+    ///
+    /// # Errors
+    /// A flag is missing, or a file cannot be used.
+    fn webhooks(&self) -> Result<Option<WebhookSettings>, CommandError> {
+        let (url, file) = match (&self.webhook, &self.webhook_secret_file) {
+            (Some(url), Some(file)) => (url, file),
+            (None, None) if self.webhook_ca.is_none() => return Ok(None),
+            _ => return Err("--webhook and --webhook-secret-file must be given together".into()),
+        };
+        let secret = std::fs::read(file)
+            .map_err(|error| format!("cannot read {}: {error}", file.display()))?;
+        let secret = secret.trim_ascii();
+        if secret.len() < MIN_WEBHOOK_SECRET {
+            return Err(format!(
+                "the secret in {} is too short: `openssl rand -hex 32` makes one",
+                file.display()
+            )
+            .into());
+        }
+        let settings = WebhookSettings::new(url, secret, self.webhook_ca.as_deref())
+            .map_err(|error| error.to_string())?;
+        Ok(Some(settings))
+    }
+
     /// The files for TLS, if connections are encrypted. Warns if others may read along.
     ///
     /// # Errors
@@ -243,6 +282,7 @@ impl Serve {
             None => None,
         };
         let tls = settings.tls(&address)?;
+        let webhooks = settings.webhooks()?;
         let scheme = if tls.is_some() { "https" } else { "http" };
         let (access, mode) = settings.access(data_dir.as_ref(), &address)?;
         // Pages of other names must not reach a server that trusts everybody on this machine.
@@ -292,6 +332,7 @@ impl Serve {
             tls,
             grace: Duration::from_secs(settings.grace),
             allowed_origins: without_empty(settings.allowed_origins),
+            webhooks,
             ..ServerConfig::default()
         };
         let server = match storage {

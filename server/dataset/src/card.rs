@@ -6,7 +6,7 @@ use super::column::markdown;
 use super::export::{Export, Exported, Layout};
 use super::formats::{Format, file_name};
 use super::sheet;
-use super::{TABLES_VERSION, decisions, expressions};
+use super::{TABLES_VERSION, decisions, expressions, markers};
 use chefshat_record::jsonl::FORMAT_VERSION;
 
 /// Name of the file.
@@ -77,9 +77,14 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
     match export.layout {
         Layout::Tables => {
             let format = preferred(&export.formats);
-            for (table, default) in [(decisions::TABLE, true), (expressions::TABLE, false)] {
+            for (table, rows) in [
+                (decisions::TABLE, exported.decisions),
+                (expressions::TABLE, exported.expressions),
+                (markers::TABLE, exported.markers),
+            ] {
+                let default = table == decisions::TABLE;
                 // Hubs cannot infer types without rows.
-                if !default && exported.expressions == 0 && format != Format::Parquet {
+                if !default && rows == 0 && format != Format::Parquet {
                     continue;
                 }
                 let _ = write!(
@@ -145,6 +150,7 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
     );
     if export.layout == Layout::Tables {
         let _ = writeln!(text, "| expressions | {} |", exported.expressions);
+        let _ = writeln!(text, "| markers | {} |", exported.markers);
         let _ = writeln!(text, "| columns version | {TABLES_VERSION} |");
     }
     let _ = write!(
@@ -164,12 +170,15 @@ fn columns(text: &mut String) {
         text,
         "\n## Table `{}`\n\nOne row per decision, in order of games and decisions.\n\n{}\
          \n## Table `{}`\n\nOne row per expression of a player, in the same order.\n\n{}\
+         \n## Table `{}`\n\nOne row per marker of an instrument or the researcher, in the same order.\n\n{}\
          \nThe types are Arrow's. F is the number of faces (11 in the standard game). In CSV, lists and structs are JSON and\n\
          null is an empty cell; in CSV and JSON Lines, binary is hexadecimal and times are RFC 3339.\n",
         decisions::TABLE,
         markdown(&decisions::columns()),
         expressions::TABLE,
-        markdown(&expressions::columns())
+        markdown(&expressions::columns()),
+        markers::TABLE,
+        markdown(&markers::columns())
     );
 }
 

@@ -142,6 +142,24 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         row.game.players.into()
     }),
     Column::new(
+        "study",
+        Type::Text,
+        "Name of the study, for researchers; null for a game outside of studies.",
+        |row| row.game.study.as_ref().map(|it| &it.name).into(),
+    ),
+    Column::new(
+        "condition",
+        Type::Text,
+        "The condition of the study; null for a game outside of studies.",
+        |row| row.game.study.as_ref().map(|it| &it.condition).into(),
+    ),
+    Column::new(
+        "participant",
+        Type::Text,
+        "Pseudonym of the participant of the study who played the game, at whatever seat the row is; null for a game outside of studies.",
+        |row| row.game.study.as_ref().map(|it| &it.participant).into(),
+    ),
+    Column::new(
         "number",
         Type::Uint64,
         "Number of the decision in its game, from 1, over all seats.",
@@ -476,6 +494,12 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         Type::Text,
         "Public key of the server that signed the record, as `chefshat key show` prints it; null if unsigned.",
         |row| row.game.signed_by.as_deref().into(),
+    ),
+    Column::new(
+        "shown_kind",
+        Type::Text,
+        "What everybody else saw, `robot` or `agent`, where a person played the seat as that (Wizard of Oz); null for all others, and where `agent` is.",
+        |row| row.player().and_then(|player| player.shown_kind).into(),
     ),
 ];
 

@@ -10,7 +10,7 @@ use super::game::GameInfo;
 /// The layout of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
-    /// Two tables of all games.
+    /// Tables of all games.
     Tables,
     /// One CSV file per game, in the columns of the reference implementation.
     ChefsHatGym,
@@ -68,6 +68,8 @@ pub struct Exported {
     pub decisions: u64,
     /// Expressions (counted only for tables).
     pub expressions: u64,
+    /// Markers (counted only for tables).
+    pub markers: u64,
     /// Games excluded by the filter.
     pub filtered: u64,
     /// Damaged records and duplicate games.

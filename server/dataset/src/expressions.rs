@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use chefshat_proto::v1::{Expression, ExpressionSource};
+use chefshat_proto::v1::{Expression, ExpressionSource, GazeFrame, GazePoint, expression::About};
 
 use super::column::{Column, ColumnInfo, Type, Value};
 use super::game::{GameInfo, SeatInfo};
@@ -123,7 +123,7 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
     Column::new(
         "source",
         Type::Text,
-        "Source: `face`, `voice`, `self_report` or `model`; null if not stated.",
+        "Source: `face`, `voice`, `self_report`, `model` or `wizard` (a person who played the seat as another kind); null if not stated.",
         |row| expression_source(&row.expression).into(),
     ),
     Column::new(
@@ -147,11 +147,67 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
                 .map_or(Value::Null, |at| Value::Time(moment_us(at)))
         },
     ),
+    Column::new(
+        "about_seat",
+        Type::Uint8,
+        "The seat that it is about; null if none.",
+        |row| match row.expression.about {
+            Some(About::AboutSeat(seat)) => seat.into(),
+            _ => Value::Null,
+        },
+    ),
+    Column::new(
+        "gaze_x",
+        Type::Float32,
+        "The point that the participant looked at, from the left edge (0) to the right edge (1) of the frame; null if not stated.",
+        |row| gaze(&row.expression).map(|gaze| gaze.x).into(),
+    ),
+    Column::new(
+        "gaze_y",
+        Type::Float32,
+        "The same from the top edge (0) to the bottom edge (1).",
+        |row| gaze(&row.expression).map(|gaze| gaze.y).into(),
+    ),
+    Column::new(
+        "gaze_frame",
+        Type::Text,
+        "What the coordinates belong to: `screen`, `camera` or `table`; null if not stated.",
+        |row| gaze_frame(&row.expression).into(),
+    ),
+    Column::new(
+        "shown_kind",
+        Type::Text,
+        "What everybody else saw, `robot` or `agent`, where a person played the seat as that (Wizard of Oz); null for all others.",
+        |row| {
+            row.player
+                .as_ref()
+                .and_then(|player| player.shown_kind)
+                .into()
+        },
+    ),
 ];
 
 /// Names, types and descriptions of the columns.
 pub(super) fn columns() -> Vec<ColumnInfo> {
     COLUMNS.iter().map(Column::info).collect()
+}
+
+/// The point of gaze of an expression, if it is about one.
+fn gaze(expression: &Expression) -> Option<&GazePoint> {
+    match &expression.about {
+        Some(About::Gaze(gaze)) => Some(gaze),
+        _ => None,
+    }
+}
+
+/// What the coordinates of a point of gaze belong to, if stated.
+fn gaze_frame(expression: &Expression) -> Option<&'static str> {
+    match gaze(expression)?.frame() {
+        GazeFrame::Unspecified => None,
+        GazeFrame::Screen => Some("screen"),
+        GazeFrame::Camera => Some("camera"),
+        GazeFrame::Table => Some("table"),
+    }
 }
 
 /// The source of an expression, if stated.
@@ -162,6 +218,7 @@ fn expression_source(expression: &Expression) -> Option<&'static str> {
         ExpressionSource::Voice => Some("voice"),
         ExpressionSource::SelfReport => Some("self_report"),
         ExpressionSource::Model => Some("model"),
+        ExpressionSource::Wizard => Some("wizard"),
     }
 }
 

@@ -30,6 +30,8 @@ pub(super) struct GameInfo {
     /// Size of the action space.
     pub(super) actions: u16,
     pub(super) server_version: String,
+    /// Where it belongs in a study.
+    pub(super) study: Option<v1::StudyRecord>,
     /// The public key of the record's signature, which the replay verifies.
     pub(super) signed_by: Option<String>,
     /// The participants at the start of the game, by seat.
@@ -41,6 +43,8 @@ pub(super) struct GameInfo {
 pub(super) struct SeatInfo {
     pub(super) name: String,
     pub(super) kind: &'static str,
+    /// As what it was shown, if a person played the seat as another kind.
+    pub(super) shown_kind: Option<&'static str>,
     pub(super) built_in: Option<String>,
 }
 
@@ -51,7 +55,25 @@ impl SeatInfo {
         Self {
             name: name.to_owned(),
             kind: built_in.map_or_else(|| kind_name(kind), |_| "built_in"),
+            shown_kind: None,
             built_in: built_in.map(str::to_owned),
+        }
+    }
+
+    /// A participant of a seat that a person plays as this kind.
+    pub(super) fn wizard(name: &str, shown: v1::ParticipantKind) -> Self {
+        Self {
+            shown_kind: Some(kind_name(shown)),
+            ..Self::new(name, v1::ParticipantKind::Human, "")
+        }
+    }
+
+    fn of(seat: &v1::Participant) -> Self {
+        match seat.shown_kind() {
+            v1::ParticipantKind::Unspecified => {
+                Self::new(&seat.name, seat.kind(), &seat.built_in_agent)
+            }
+            shown => Self::wizard(&seat.name, shown),
         }
     }
 }
@@ -120,11 +142,10 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
         actions: rule_set.actions().size(),
         rule_set,
         server_version: header.server_version.clone(),
+        study: header.study.clone(),
         signed_by,
-        seats: header
-            .seats
-            .iter()
-            .map(|seat| SeatInfo::new(&seat.name, seat.kind(), &seat.built_in_agent))
+        seats: (header.seats.iter())
+            .map(SeatInfo::of)
             .map(Arc::new)
             .collect(),
     })

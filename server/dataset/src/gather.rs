@@ -12,6 +12,7 @@ use chefshat_proto::v1::{self, DecisionKind, DecisionSource, game_event::Kind, r
 use super::decisions::{DecisionRow, RECORDED, Rewards};
 use super::expressions::{ExpressionRow, LatestExpression};
 use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
+use super::markers::MarkerRow;
 use chefshat_record::replay::{Moment, ReplayError, walk};
 
 /// The rows of one game.
@@ -20,6 +21,7 @@ pub(super) struct GameRows {
     pub(super) game: Arc<GameInfo>,
     pub(super) decisions: Vec<DecisionRow>,
     pub(super) expressions: Vec<ExpressionRow>,
+    pub(super) markers: Vec<MarkerRow>,
 }
 
 /// Verifies a record and gathers its rows.
@@ -70,6 +72,7 @@ impl Gatherer {
                 game,
                 decisions: Vec::new(),
                 expressions: Vec::new(),
+                markers: Vec::new(),
             },
             shift_from: 0,
             last_turn: BySeat::filled(players, None),
@@ -89,7 +92,12 @@ impl Gatherer {
             }
             Line::Event(event) => match &event.kind {
                 Some(Kind::Seated(seated)) => {
-                    let info = SeatInfo::new(&seated.name, seated.kind(), "");
+                    // The record says it of the last participant of the seat; it holds for all.
+                    let seats = self.rows.game.seats.get(seated.seat as usize);
+                    let info = match seats.and_then(|seat| seat.shown_kind) {
+                        Some(_) => SeatInfo::wizard(&seated.name, seated.kind()),
+                        None => SeatInfo::new(&seated.name, seated.kind(), ""),
+                    };
                     self.set_participant(seated.seat, Some(info));
                 }
                 Some(Kind::Vacated(vacated)) => self.set_participant(vacated.seat, None),
@@ -125,6 +133,11 @@ impl Gatherer {
                     false,
                 );
             }
+            Line::Marker(marker) => self.rows.markers.push(MarkerRow {
+                game: Arc::clone(&self.rows.game),
+                decisions_before: self.rows.decisions.len() as u64,
+                marker: marker.clone(),
+            }),
             Line::Header(_) | Line::Footer(_) => {}
         }
     }

@@ -1,4 +1,4 @@
-//! Datasets from records: typed tables of decisions and expressions as Parquet, CSV and JSON Lines
+//! Datasets from records: typed tables of decisions, expressions and markers as Parquet, CSV and JSON Lines
 //! with a dataset card, or the columns of the reference implementation.
 
 mod card;
@@ -12,6 +12,7 @@ mod folder;
 mod formats;
 mod game;
 mod gather;
+mod markers;
 mod parquet;
 mod python;
 mod row;
@@ -37,4 +38,9 @@ pub fn decision_columns() -> Vec<ColumnInfo> {
 /// The columns of the table of expressions.
 pub fn expression_columns() -> Vec<ColumnInfo> {
     expressions::columns()
+}
+
+/// The columns of the table of markers.
+pub fn marker_columns() -> Vec<ColumnInfo> {
+    markers::columns()
 }

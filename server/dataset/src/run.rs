@@ -15,6 +15,7 @@ use super::folder::{FolderError, NewFolder};
 use super::formats::Table;
 use super::game::{GameInfo, checked_info};
 use super::gather::{GameRows, gather};
+use super::markers::{self, MarkerRow};
 use super::sheet::{self, Sheet};
 use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
@@ -164,6 +165,7 @@ impl Exported {
             Game::Rows(rows) => {
                 self.decisions += rows.decisions.len() as u64;
                 self.expressions += rows.expressions.len() as u64;
+                self.markers += rows.markers.len() as u64;
             }
             Game::Sheet(_, sheet) => self.decisions += sheet.decisions,
         }
@@ -196,6 +198,7 @@ enum Sink<'a> {
     Tables {
         decisions: Table<DecisionRow>,
         expressions: Table<ExpressionRow>,
+        markers: Table<MarkerRow>,
     },
     Sheets {
         folder: &'a Path,
@@ -219,6 +222,7 @@ impl<'a> Sink<'a> {
                     expressions::COLUMNS,
                     &export.formats,
                 )?,
+                markers: Table::create(folder, markers::TABLE, markers::COLUMNS, &export.formats)?,
             },
             Layout::ChefsHatGym => Sink::Sheets {
                 folder,
@@ -233,11 +237,13 @@ impl<'a> Sink<'a> {
                 Sink::Tables {
                     decisions,
                     expressions,
+                    markers,
                 },
                 Game::Rows(rows),
             ) => {
                 decisions.write(&rows.decisions)?;
-                expressions.write(&rows.expressions)
+                expressions.write(&rows.expressions)?;
+                markers.write(&rows.markers)
             }
             (Sink::Sheets { folder, files }, Game::Sheet(info, sheet)) => {
                 let path = format!("{}/{}", info.game_id, sheet::FILE_NAME);
@@ -253,9 +259,11 @@ impl<'a> Sink<'a> {
             Sink::Tables {
                 decisions,
                 expressions,
+                markers,
             } => {
                 let mut files = decisions.finish()?;
                 files.extend(expressions.finish()?);
+                files.extend(markers.finish()?);
                 Ok(files)
             }
             Sink::Sheets { files, .. } => Ok(files),

@@ -192,7 +192,7 @@ impl Collector {
             }
             // An aborted game may have no decision after the point.
             Line::Footer(_) if self.decisions == point => self.at_point = moment.game.cloned(),
-            Line::PrivateExpression(_) | Line::Footer(_) => {}
+            Line::PrivateExpression(_) | Line::Marker(_) | Line::Footer(_) => {}
         }
     }
 }

@@ -120,6 +120,9 @@ pub enum Unrated {
     /// A recorded player was imitated.
     #[error("a recorded player took part")]
     RecordedPlayer,
+    /// A person played as a robot or an agent.
+    #[error("a person played as another kind of participant")]
+    Wizard,
 }
 
 impl Unrated {
@@ -131,6 +134,7 @@ impl Unrated {
             Self::Hinted => "hinted",
             Self::SameParticipant => "same_participant",
             Self::RecordedPlayer => "recorded_player",
+            Self::Wizard => "wizard",
         }
     }
 }
@@ -188,7 +192,12 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
         tournament_id: header.tournament_id.clone(),
         ended_at_ms: header.created_at_ms.saturating_add(gathered.elapsed_ms),
         shifts: gathered.shifts,
-        unrated: unrated(header.origin(), &seats),
+        unrated: unrated(header.origin(), &seats).or_else(|| {
+            let mut seats = header.seats.iter();
+            seats
+                .any(|seat| seat.shown_kind() != ParticipantKind::Unspecified)
+                .then_some(Unrated::Wizard)
+        }),
         seats,
     })
 }

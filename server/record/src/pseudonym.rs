@@ -99,6 +99,12 @@ impl Pseudonym {
         lines.retain_mut(|line| match &mut line.line {
             Some(Line::Header(header)) => {
                 out.names += self.in_seats(&mut header.seats);
+                if let Some(study) =
+                    (header.study.as_mut()).filter(|it| it.participant == self.name)
+                {
+                    study.participant.clone_from(&self.pseudonym);
+                    out.names += 1;
+                }
                 true
             }
             Some(Line::Decision(decision)) => {
@@ -134,6 +140,7 @@ impl Pseudonym {
                 out.expressions += u64::from(drop);
                 !drop
             }
+            Some(Line::Marker(_)) => true,
             Some(Line::Footer(footer)) => {
                 footer.events = footer.events.saturating_sub(dropped_events);
                 true

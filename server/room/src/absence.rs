@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use chefshat_engine::{Decision, DecisionKind, Seat};
+use chefshat_engine::{Decision, DecisionKind, Event, Seat};
 
 use super::{Core, OpenDecision, State};
 use crate::journal::Fill;
@@ -19,51 +19,91 @@ pub struct Awaited {
     pub decision: u64,
     /// Whether the seat is not connected.
     pub away: bool,
-    /// When the decision was opened.
+    /// Whether its absence ends the decision, because somebody waits.
+    pub absence_counts: bool,
+    /// When the decision was opened; in a silence, when that began.
     pub since: Duration,
-    /// When the server decides for it, as things stand.
-    pub until: Duration,
+    /// When the server decides for it, as things stand. `None` in a silence, which would show.
+    pub until: Option<Duration>,
+}
+
+impl Awaited {
+    /// What a subscriber must be told when it changes. In between, clocks count.
+    pub fn key(&self) -> (Seat, u64, bool, bool) {
+        (self.seat, self.decision, self.away, self.absence_counts)
+    }
 }
 
 impl Core {
-    /// Whom of the participants the game waits for, as everybody may know. A silent decision shows
-    /// as the one that follows when it is declined.
+    /// Whom of the participants the game waits for, as everybody may know. In a silence, the answer
+    /// depends only on what everybody has seen: not on which decision is open, nor since when.
     pub fn awaited_in_public(&self) -> Option<Awaited> {
         let waits = self.state == State::Playing && !self.is_paused();
-        let open = self.awaited().filter(|_| waits)?;
-        if !open.is_silent() {
-            return Some(self.show(open));
+        let open = self.open.as_ref().filter(|_| waits)?;
+        if self.next_taken_over().is_some() {
+            return None;
         }
-        let decision = self.decision_once_declined()?;
-        let seat = &self.seats[decision.seat.index()];
-        let next = OpenDecision {
-            decision,
-            id: seat.decisions + 1,
-            start: None,
-            ..open.clone()
-        };
-        (!self.is_automatic(decision.seat)).then(|| self.show(&next))
-    }
-
-    fn show(&self, open: &OpenDecision) -> Awaited {
-        let seat = open.decision.seat;
-        Awaited {
+        let shown = |decision: u64, seat: Seat, since, until| Awaited {
             seat,
-            decision: open.id,
+            decision,
             away: self.seats[seat.index()].connection.is_none(),
-            since: open.released,
-            until: self.runs_out_at(open),
-        }
+            absence_counts: self.absence_counts(seat),
+            since,
+            until,
+        };
+        let Some(silent_since) = self.silent_since else {
+            let open = self.awaited().filter(|open| !open.is_silent())?;
+            let (since, until) = (open.released, self.runs_out_at(open));
+            return Some(shown(open.id, open.decision.seat, since, Some(until)));
+        };
+        let first = self.first_in_silence()?;
+        let number = match first == open.decision {
+            true => open.id,
+            false => self.seats[first.seat.index()].decisions + 1,
+        };
+        Some(shown(number, first.seat, silent_since, None))
     }
 
-    /// The decision that follows if the open one, a silent one, is declined.
-    fn decision_once_declined(&self) -> Option<Decision> {
+    /// The first decision of a participant in a silence, if no special action is declared. Who
+    /// gives is known from the roles.
+    fn first_in_silence(&self) -> Option<Decision> {
         let Some(RoomGame::Dealt(game)) = &self.game else {
             return None;
         };
-        let mut game = game.clone();
-        game.apply(self.default_action()?, |_| {}).ok()?;
-        (game.decision()).filter(|next| next.kind != DecisionKind::SpecialAction)
+        let decision = game.decision()?;
+        let is_shown = |decision: Decision| {
+            decision.kind != DecisionKind::SpecialAction && !self.is_automatic(decision.seat)
+        };
+        if is_shown(decision) {
+            return Some(decision);
+        }
+        let (mut game, mut last) = (game.clone(), decision);
+        while last.kind != DecisionKind::Turn {
+            let mut news = false;
+            let action = game.default_action()?;
+            game.apply(action, |_| news = true).ok()?;
+            // The first turn follows from the cards, so that nobody knows it before the exchange.
+            last = game.decision().filter(|_| !news)?;
+            if is_shown(last) {
+                return Some(last);
+            }
+        }
+        None
+    }
+
+    /// Notes whether what a decision, or the start of the game, brought is the start of a silence
+    /// or its end. `shows`: whether everybody learns of the decision even if no event follows.
+    pub(super) fn note_silence(&mut self, at: Duration, events: &[Event], shows: bool) {
+        let rules = &self.header.rules;
+        let offered = rules.special_actions() && rules.jokers() >= 2;
+        let declared = |event: &Event| matches!(event, Event::SpecialActionDeclared { .. });
+        match events.last() {
+            Some(Event::RolesAssigned { .. }) if offered && !events.iter().any(declared) => {
+                self.silent_since = Some(at);
+            }
+            None if !shows => {}
+            _ => self.silent_since = None,
+        }
     }
 
     /// When the clock of a decision starts, as far as it is known.
@@ -83,6 +123,14 @@ impl Core {
         }
     }
 
+    /// Whether the absence of a seat would end a decision of it now.
+    fn absence_counts(&self, seat: Seat) -> bool {
+        let state = &self.seats[seat.index()];
+        let kind = state.participant.as_ref().map(|it| it.kind);
+        let time = self.header.policy.absence_time_of(kind);
+        state.connection.is_none() && time.is_some() && self.holds_others_up(seat)
+    }
+
     /// The absence of a seat from its decision: since when, and how long the game waits for it.
     /// `None` if it is connected, and where an absence changes nothing: at silent decisions, which
     /// would show, and in games without an absence time.
@@ -97,8 +145,8 @@ impl Core {
         Some(since..since + time.saturating_sub(open.absent))
     }
 
-    /// Whether somebody waits for a seat that is away: the other games of its tournament, or another
-    /// participant who is here.
+    /// Whether somebody waits for a seat that is away: the other games of its tournament, or
+    /// another participant who is here.
     fn holds_others_up(&self, seat: Seat) -> bool {
         let mut others = self.all_seats().filter(|other| *other != seat);
         self.header.tournament.is_some()

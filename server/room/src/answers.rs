@@ -73,6 +73,9 @@ pub enum ExpressError {
     /// The game is over.
     #[error("the game is over")]
     GameOver,
+    /// It is about a seat that the room does not have.
+    #[error("the room has no seat with this number")]
+    NoSuchSeat,
     /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
     TooMany,

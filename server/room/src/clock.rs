@@ -1,6 +1,7 @@
 //! The passing of time: deadlines and banks, default decisions, substitution, the decisions of
 //! built-in agents, and seats that are not attached in time.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
@@ -10,7 +11,7 @@ use super::{
     BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_ANNOTATION_BYTES_PER_GAME, MAX_HANDOVER, MAX_IDLE,
     OpenDecision, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST, State,
 };
-use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
+use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source, StudyGame};
 use crate::policy::AbortPolicy;
 
 impl Core {
@@ -267,8 +268,10 @@ impl Core {
     fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
         self.all_seats().filter_map(|seat| {
             let state = &self.seats[seat.index()];
-            // A participant of a tournament keeps its seat, whenever it arrives.
+            // A participant of a tournament or study keeps its seat, whenever it arrives.
+            let of_study = |game: &Arc<StudyGame>| game.seat == seat;
             let held = self.header.tournament.is_none()
+                && !self.header.study.as_ref().is_some_and(of_study)
                 && !state.ever_attached
                 && matches!(state.fill, Fill::Open { .. });
             (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
@@ -319,12 +322,13 @@ impl Core {
         self.advance(now);
     }
 
-    /// Takes the default decision for a seat whose time is up. A seat that is away or late too often
-    /// gets a substitute, but never for a silent decision, which the substitution would reveal.
+    /// Takes the default decision for a seat whose time is up. A seat that was away for its absence
+    /// time or late too often gets a substitute, but never for a silent decision, which the
+    /// substitution would reveal.
     pub(super) fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let (seat, silent) = (open.decision.seat, open.is_silent());
-        let absent = self.absence(open).is_some();
+        let absent = (self.absence(open)).is_some_and(|absence| absence.end <= now);
         let time = now.saturating_sub(open.start.unwrap_or(open.released));
         // The timer fires later by the grace; a late answer may come at any time before.
         let without_grace = time.saturating_sub(self.seats[seat.index()].grace);

@@ -8,8 +8,9 @@ use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 use super::{
     Answered, Core, LastAnswer, MAX_GAME_CHANGES, MAX_REPORTS, OpenDecision, Search, State, Verdict,
 };
-use crate::journal::{Change, Decided, Source};
+use crate::journal::{Change, Decided, Marker, Source};
 use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
+
 use crate::table::{PhysicalTable, RoomGame, micros};
 
 impl Core {
@@ -86,6 +87,10 @@ impl Core {
                         .push(at, RoomEvent::Expressed(*seat, expression.clone()));
                 }
             }
+            Change::Marked(marked) => self.markers.push(Marker {
+                received: at,
+                marked: (**marked).clone(),
+            }),
             // A server that takes a room over says so without knowing whether its game was over.
             Change::ServerRestarted if self.state.is_over() => {}
             Change::ServerRestarted => self.restart(at),
@@ -120,6 +125,7 @@ impl Core {
         if let Some(open) = &mut self.open {
             open.reopen(at);
         }
+        self.silent_since = self.silent_since.map(|_| at);
         self.log.push(at, RoomEvent::ServerRestarted);
     }
 
@@ -151,6 +157,7 @@ impl Core {
         };
         self.game = Some(RoomGame::Dealt(Box::new(game)));
         self.reseed();
+        self.note_silence(at, &events, true);
         self.events = events;
         self.log_events(at, Source::Agent, 0);
     }
@@ -161,6 +168,8 @@ impl Core {
         // nor in how far delayed spectators see.
         let offered = self.open.as_ref().is_some_and(OpenDecision::is_silent);
         let declined = offered && Some(decided.action) == self.default_action();
+        // Neither does a gift of a built-in agent show before all gifts are given.
+        let shows = !declined && !self.is_automatic(decided.seat);
         let mut events = std::mem::take(&mut self.events);
         let game = self.game.as_mut();
         let ruling = match game.expect("a decision is taken in a game that has started") {
@@ -171,6 +180,9 @@ impl Core {
             }
             RoomGame::Physical(table) => Some(table.decide(at, number, decided)),
         };
+        if ruling.is_none() {
+            self.note_silence(at, &events, shows);
+        }
         self.events = events;
         let seat = &mut self.seats[decided.seat.index()];
         seat.bank_left = Duration::from_millis(decided.bank_left_ms.into());

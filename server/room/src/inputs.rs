@@ -1,5 +1,5 @@
-//! Inputs of participants: join, attach, leave, retire, answer, express, return. Each input is checked
-//! against the state; an invalid one is refused and changes nothing.
+//! Inputs of participants: join, attach, leave, retire, answer, express, return. Each input is
+//! checked against the state; an invalid one is refused and changes nothing.
 
 use std::time::Duration;
 
@@ -178,13 +178,18 @@ impl Core {
 
     /// Gives up a seat whose participant has left the tournament. Its ticket ends, and a substitute
     /// plays from now on; while somebody decides about a special action, from then on, because the
-    /// time of that decision would reveal whose it is. A game that has not started is aborted. Does
-    /// nothing if nobody can join the seat.
-    pub fn retire(&mut self, now: Duration, seat: Seat) {
-        let state = &mut self.seats[seat.index()];
+    /// time of that decision would reveal whose it is. Its connection is lost. A game that has not
+    /// started is aborted. Does nothing if nobody can join the seat. `handed`: as for
+    /// [`Core::lost`].
+    pub fn retire(&mut self, now: Duration, seat: Seat, handed: Option<Duration>) {
+        let state = &self.seats[seat.index()];
         if !matches!(state.fill, Fill::Open { .. }) || state.retired {
             return;
         }
+        if let Some(connection) = state.connection {
+            self.lost(now, seat, connection, handed);
+        }
+        let state = &mut self.seats[seat.index()];
         match self.state {
             State::Waiting => self.abort(now, AbortReason::NeverStarted),
             State::Playing => {
@@ -195,7 +200,7 @@ impl Core {
         }
     }
 
-    /// Accepts an expression of a seat, as an encoded message.
+    /// Accepts an expression of a seat, as an encoded message, which may be about a seat.
     ///
     /// # Errors
     /// The expression is refused.
@@ -204,10 +209,16 @@ impl Core {
         now: Duration,
         seat: Seat,
         record_only: bool,
+        about: Option<u32>,
         expression: Box<[u8]>,
     ) -> Result<(), ExpressError> {
         if self.state.is_over() {
             return Err(ExpressError::GameOver);
+        }
+        let exists =
+            |seat: u32| usize::try_from(seat).is_ok_and(|seat: usize| seat < self.seats.len());
+        if about.is_some_and(|seat| !exists(seat)) {
+            return Err(ExpressError::NoSuchSeat);
         }
         if self.seats[seat.index()].expressions >= MAX_EXPRESSIONS_PER_SEAT {
             return Err(ExpressError::TooMany);

@@ -1,7 +1,7 @@
 //! A stored game: its header and its changes. Events and records follow from folding the changes
 //! again. Each store has its own encoding of these values.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -78,6 +78,49 @@ pub struct TournamentGame {
     pub series: Option<Id>,
 }
 
+/// The study a game belongs to. Nothing of it reaches the game's participants.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudyGame {
+    /// The study.
+    pub study: Id,
+    /// Name of the study for researchers.
+    pub name: String,
+    /// Id of the condition.
+    pub condition: String,
+    /// The condition's level of each factor.
+    pub levels: BTreeMap<String, String>,
+    /// Number of the participant, from 1.
+    pub number: u32,
+    /// Pseudonym of the participant.
+    pub participant: String,
+    /// Number of the session in which the participant began the game, from 1.
+    pub session: u32,
+    /// The step in which it is played, from 0.
+    pub step: u32,
+    /// Whether it is practice.
+    pub practice: bool,
+    /// Index of its seed in the preregistered list; `None` for practice.
+    pub seed_index: Option<u32>,
+    /// The participant's seat.
+    pub seat: Seat,
+    /// Attempt at this game, from 1.
+    pub attempt: u32,
+    /// What everybody but the study's owner learns about the seats.
+    pub labels: SeatLabels,
+}
+
+/// What is shown of the participants of a room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SeatLabels {
+    /// Names and kinds.
+    #[default]
+    AsTheyAre,
+    /// Kinds, and whether a seat is connected: "Agent 1".
+    Kinds,
+    /// Neither: "Player 1".
+    Players,
+}
+
 /// Everything about a game that is fixed before it starts.
 #[derive(Debug, Clone)]
 pub struct GameHeader {
@@ -95,6 +138,9 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
+    /// Open seats that a person plays as the kind that they are reserved for (Wizard of Oz). Nothing
+    /// depends on it but the record.
+    pub wizards: BTreeSet<usize>,
     /// Display names of built-in agents, by seat, if set.
     pub display_names: BTreeMap<usize, String>,
     /// Recorded players, by seat.
@@ -113,9 +159,16 @@ pub struct GameHeader {
     pub tournament: Option<TournamentGame>,
     /// The ticket of the physical table, hashed; `None`: the server deals the cards.
     pub table: Option<SecretHash>,
+    /// The study it belongs to, if any.
+    pub study: Option<Arc<StudyGame>>,
 }
 
 impl GameHeader {
+    /// What is shown of its participants, other than in its record.
+    pub fn labels(&self) -> SeatLabels {
+        (self.study.as_ref()).map_or(SeatLabels::AsTheyAre, |game| game.labels)
+    }
+
     /// The series of games with the same deals.
     pub fn series(&self) -> Option<Id> {
         self.tournament.and_then(|game| game.series)
@@ -221,12 +274,32 @@ pub enum Change {
         /// The message `chefshat.v1.Expression`, encoded.
         expression: Box<[u8]>,
     },
+    /// The owner marked a moment.
+    Marked(Box<Marked>),
     /// The game ended without a result.
     Aborted(AbortReason),
     /// The server was restarted; all connections were lost.
     ServerRestarted,
     /// Something was reported from the physical table.
     Reported(Box<Reported>),
+}
+
+/// A moment that the owner of the room marked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Marked {
+    /// What the marker says.
+    pub label: String,
+    /// The time since the room was created.
+    pub moment: Duration,
+}
+
+/// A marker of a room.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Marker {
+    /// Time since the room was created, when the marker was received.
+    pub received: Duration,
+    /// What it marks.
+    pub marked: Marked,
 }
 
 /// Something reported from the physical table.

@@ -15,6 +15,7 @@ mod inputs;
 pub mod journal;
 mod limits;
 pub mod log;
+mod markers;
 mod physical;
 pub mod policy;
 mod revive;
@@ -39,12 +40,15 @@ pub use answers::{
     ReportVerdict, SeatStanding, Verdict,
 };
 
+pub use journal::Marker;
 pub use limits::{
-    BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
-    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_GATEWAY_DELAY,
-    MAX_HANDOVER, MAX_HINTS, MAX_IDLE, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME,
-    SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED,
+    BUILT_IN_BUDGET, JOIN_HOLD, MARKERS_AT_ONCE, MARKERS_PER_SECOND, MAX_ANNOTATION_BYTES,
+    MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT,
+    MAX_GAME_CHANGES, MAX_GATEWAY_DELAY, MAX_HANDOVER, MAX_HINTS, MAX_IDLE, MAX_MARKER_AHEAD,
+    MAX_MARKERS, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME, SEARCH_PATIENCE,
+    SEARCH_PATIENCE_UNATTENDED,
 };
+pub use markers::MarkError;
 pub use revive::BadJournal;
 pub use search::SearchRequest;
 pub use table::{Made, PhysicalTable};
@@ -89,6 +93,10 @@ pub struct Core {
     game: Option<RoomGame>,
     entropy: Vec<Vec<u8>>,
     open: Option<OpenDecision>,
+    /// Since when everybody knows that the game waits, in a silence: the start of a Shift, in
+    /// which nobody may know whether somebody decides about a special action. It lasts from the
+    /// roles to the first gift of a participant, or to the next event of the game.
+    silent_since: Option<Duration>,
     log: Log,
     /// Length of the log before the first deal.
     log_before_deal: usize,
@@ -97,6 +105,9 @@ pub struct Core {
     log_after_decision: Vec<u32>,
     changes: u64,
     decisions: u64,
+    markers: Vec<Marker>,
+    /// When there is space for another marker after a burst of them.
+    marker_free_at: Duration,
     /// When the server was last restarted.
     restarted: Option<Duration>,
     /// Changes that have been folded but not yet passed to the store.
@@ -290,11 +301,14 @@ impl Core {
             game: None,
             entropy: Vec::new(),
             open: None,
+            silent_since: None,
             log: Log::default(),
             log_before_deal: 0,
             log_after_decision: Vec::new(),
             changes: 0,
             decisions: 0,
+            markers: Vec::new(),
+            marker_free_at: Duration::ZERO,
             restarted: None,
             pending: Vec::new(),
             events: Vec::new(),

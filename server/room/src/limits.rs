@@ -33,6 +33,14 @@ pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);
 pub(crate) const RECHECK_INTERVAL: Duration = Duration::from_millis(20);
 /// Most expressions of one seat in one game.
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
+/// Most markers in one game.
+pub const MAX_MARKERS: usize = 10_000;
+/// Most markers in a second, if more come for a while.
+pub const MARKERS_PER_SECOND: u32 = 50;
+/// Most markers at once.
+pub const MARKERS_AT_ONCE: u32 = 200;
+/// How far in the future a marked moment may be: clocks are not known exactly.
+pub const MAX_MARKER_AHEAD: Duration = Duration::from_secs(1);
 
 /// Most times that seats are taken in a room, including freed ones: each stays in its log.
 pub const MAX_SEATINGS: usize = 1_000;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use chefshat_engine::MAX_ENTROPY;
 use chefshat_engine::{Seat, Viewer};
 
-use super::Core;
+use super::{Core, MAX_MARKERS};
 use crate::journal::{Change, Entry, Fill, GameHeader, Report, Source};
 
 /// How long a journal need not say again that the server was restarted: what takes a room over writes
@@ -98,6 +98,7 @@ impl Core {
                     "a reported seat does not exist",
                 )
             }
+            Change::Marked(_) => check(self.markers.len() < MAX_MARKERS, "it has too many markers"),
             Change::Aborted(_) | Change::ServerRestarted => Ok(()),
         }
     }

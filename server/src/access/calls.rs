@@ -88,12 +88,78 @@ pub const CALLS: &[Call] = &[
     call("/chefshat.v1.TableService/Watch", Player, Compared)
         .streaming()
         .forwarded(),
+    call("/chefshat.v1.InstrumentService/AddMarker", Host, Compared).forwarded(),
+    call(
+        "/chefshat.v1.InstrumentService/FollowMarkers",
+        Host,
+        Compared,
+    )
+    .streaming()
+    .forwarded(),
     call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared).forwarded(),
     call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
     call("/chefshat.v1.RoomService/JoinRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.RoomService/CreateRoom", Host, Refused).forwarded(),
     call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
+    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused),
+    call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused),
+    call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused),
+    call(
+        "/chefshat.v1.StudyService/AddStudyParticipants",
+        Host,
+        Refused,
+    ),
+    call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused),
+    call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused).streaming(),
+    call(
+        "/chefshat.v1.StudyService/RemoveStudyParticipant",
+        Host,
+        Refused,
+    ),
+    call("/chefshat.v1.StudyService/CloseStudy", Host, Refused),
+    call("/chefshat.v1.StudyService/ExportStudy", Host, Refused).streaming(),
+    call(
+        "/chefshat.v1.StudyService/DeleteStudyParticipant",
+        Host,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/OpenStudy",
+        Player,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/FollowParticipation",
+        Player,
+        Refused,
+    )
+    .streaming(),
+    call(
+        "/chefshat.v1.ParticipationService/GiveConsent",
+        Player,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/AnswerQuestionnaire",
+        Player,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/ContinueStudy",
+        Player,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/RecordTraces",
+        Player,
+        Refused,
+    ),
+    call(
+        "/chefshat.v1.ParticipationService/WithdrawFromStudy",
+        Player,
+        Refused,
+    ),
     call(
         "/chefshat.v1.TournamentService/GetTournament",
         Spectator,
@@ -234,6 +300,7 @@ pub const CALLS: &[Call] = &[
         Spectator,
         Unlimited,
     ),
+    call("/chefshat.v1.ServerService/GetClock", Spectator, Compared).forwarded(),
     call("/grpc.health.v1.Health/Check", Anyone, Unlimited),
     call("/grpc.health.v1.Health/Watch", Anyone, Unlimited).streaming(),
     call(

@@ -75,7 +75,7 @@ impl NodeLease {
     }
 
     /// Sets until when the node may publish.
-    pub(super) fn set(&self, until: Instant) {
+    pub(crate) fn set(&self, until: Instant) {
         self.until.send_if_modified(|known| {
             let is_new = *known != until;
             *known = until;

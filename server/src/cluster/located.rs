@@ -7,7 +7,7 @@ use std::time::Duration;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use tokio::sync::Mutex as AsyncMutex;
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 use tracing::{debug, warn};
 
 use super::directory::{Directory, FoundBy, Location, Peer};
@@ -23,6 +23,9 @@ const MAX_REMEMBERED: usize = 20_000;
 /// Most rooms and tournaments that are looked for in the database at a time, for callers in turns:
 /// whoever makes ids up leaves connections for everything else.
 const LOOKED_FOR_AT_ONCE: usize = 2;
+/// How long a look takes at most, with the wait for its turn: many for one caller would otherwise wait
+/// for a database that hangs one after another.
+pub(super) const LOOK_LIMIT: Duration = Duration::from_secs(2);
 /// How long it is known which nodes have a lease.
 const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 
@@ -136,10 +139,18 @@ impl Directory for StoreDirectory {
             if let Some(peer) = self.known().get(found_by) {
                 return Location::Node(peer.clone());
             }
-            let location = self.read(found_by, caller).await.unwrap_or_else(|error| {
-                debug!(%error, "the owner of a room or tournament cannot be found");
-                Location::Unknown
-            });
+            let read = timeout(LOOK_LIMIT, self.read(found_by, caller)).await;
+            let location = match read {
+                Ok(Ok(location)) => location,
+                Ok(Err(error)) => {
+                    debug!(%error, "the owner of a room or tournament cannot be found");
+                    Location::Unknown
+                }
+                Err(_) => {
+                    debug!("the database did not say in time who owns a room or tournament");
+                    Location::Unknown
+                }
+            };
             if let Location::Node(peer) = &location {
                 let mut known = self.known();
                 if known.len() >= MAX_REMEMBERED {

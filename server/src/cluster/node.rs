@@ -2,7 +2,7 @@
 //! answers in. Requests to the database run beside each other; what is done with one unit is done
 //! one after another.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use tracing::{error, info, warn};
 
 use super::lease::{News, NodeLease};
 use super::turns::Turns;
-use super::units::Units;
+use super::units::{Resumed, Units};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
@@ -34,6 +34,9 @@ const TIDY_INTERVAL: Duration = Duration::from_secs(30);
 const ORPHANS_AT_ONCE: usize = 64;
 /// Units that are handed over at a time: each is away only from its own last commit on.
 const RELEASES_AT_ONCE: usize = 8;
+/// How long a unit that this node could not resume is left to others, such as those of another version.
+/// Then it tries again: the reason may have passed.
+pub(super) const LEFT_ALONE: Duration = Duration::from_mins(10);
 /// Pause before a node that was removed from the database tries again to join.
 const REJOIN_PAUSE: Duration = Duration::from_secs(1);
 
@@ -74,7 +77,8 @@ impl ClusterNode {
             units: Arc::new(units),
             began: Instant::now(),
             running: BTreeMap::new(),
-            not_resumable: BTreeSet::new(),
+            not_resumable: BTreeMap::new(),
+            nothing_to_run: BTreeMap::new(),
             turns: Turns::default(),
             answers: JoinSet::new(),
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
@@ -128,6 +132,8 @@ enum Event {
     Claimed(Vec<(Id, ClaimAnswer)>),
     /// A unit was released because this node cannot resume it.
     GivenUp(Id),
+    /// A unit has nothing to run at this epoch.
+    NothingToRun(Id, Epoch),
     /// A beat was answered, and the node was asked to hand over what it owns.
     AskedToDrain(Input<Id>),
     /// A unit was resumed or stopped, and nothing follows.
@@ -146,8 +152,11 @@ struct Task {
     began: Instant,
     /// The epochs at which units are resumed here.
     running: BTreeMap<Id, Epoch>,
-    /// Units that this node cannot resume, which it leaves to other versions of the program.
-    not_resumable: BTreeSet<Id>,
+    /// Units that this node could not resume, and when it has tried. It leaves them to others.
+    not_resumable: BTreeMap<Id, Instant>,
+    /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
+    /// stopped.
+    nothing_to_run: BTreeMap<Id, Epoch>,
     turns: Turns,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
@@ -171,13 +180,16 @@ impl Task {
             let alarm = self.began + Duration::from_millis(wakes_at.unwrap_or_default());
             tokio::select! {
                 Some(event) = self.answers.join_next() => match event {
-                    Ok(Event::Answer(input)) => self.put_in(input),
+                    Ok(Event::Answer(input)) => self.answered(input),
                     Ok(Event::Found(orphans)) => self.found(orphans),
                     Ok(Event::Claimed(claims)) => self.claimed(claims),
                     Ok(Event::GivenUp(unit)) => self.given_up(unit),
+                    Ok(Event::NothingToRun(unit, epoch)) => {
+                        self.nothing_to_run.insert(unit, epoch);
+                    }
                     Ok(Event::AskedToDrain(input)) => {
                         self.asked.send_replace(true);
-                        self.put_in(input);
+                        self.answered(input);
                     }
                     Ok(Event::Nothing) => {}
                     Ok(Event::Left) => return,
@@ -231,6 +243,33 @@ impl Task {
         });
     }
 
+    /// Takes the answer of the database to something.
+    fn answered(&mut self, input: Input<Id>) {
+        let is_beat = matches!(input, Input::Beat { .. });
+        self.put_in(input);
+        if is_beat && self.node.phase() == Phase::Serving {
+            self.resume_missing();
+        }
+    }
+
+    /// Compares what this node owns with what it runs. What it neither runs nor is about to, it resumes
+    /// after its next beat: for example a room whose creation was answered after the end of the lease,
+    /// when the rooms of the node had been stopped.
+    fn resume_missing(&mut self) {
+        let owned: BTreeMap<Id, Epoch> = self.node.owned().collect();
+        (self.nothing_to_run).retain(|unit, epoch| owned.get(unit) == Some(epoch));
+        for (unit, epoch) in owned {
+            let is_missing = !self.nothing_to_run.contains_key(&unit)
+                && self.turns.is_idle(unit)
+                && !self.units.has(unit);
+            if is_missing {
+                info!(%unit, epoch = epoch.0, "it is this node's but does not run; it is resumed");
+                self.running.remove(&unit);
+                self.put_in(Input::Fenced(unit, epoch));
+            }
+        }
+    }
+
     fn put_out(&mut self, output: Output<Id>) {
         let store = Arc::clone(&self.store);
         match output {
@@ -251,10 +290,14 @@ impl Task {
                 self.running.insert(unit, epoch);
                 let units = Arc::clone(&self.units);
                 self.queue(unit, async move {
-                    if units.resume(unit, epoch).await || !units.give_up(unit, epoch).await {
-                        return Event::Nothing;
+                    match units.resume(unit, epoch).await {
+                        Resumed::Runs => Event::Nothing,
+                        Resumed::Nothing => Event::NothingToRun(unit, epoch),
+                        Resumed::Impossible => match units.give_up(unit, epoch).await {
+                            true => Event::GivenUp(unit),
+                            false => Event::Nothing,
+                        },
                     }
-                    Event::GivenUp(unit)
                 });
             }
             Output::Stop(unit) => self.stop(unit),
@@ -308,12 +351,14 @@ impl Task {
     }
 
     fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
-        orphans.retain(|(unit, _)| !self.not_resumable.contains(unit));
+        orphans.retain(|(unit, _)| !self.not_resumable.contains_key(unit));
         self.put_in(Input::Orphans(orphans));
     }
 
     fn given_up(&mut self, unit: Id) {
-        self.not_resumable.insert(unit);
+        let minutes = LEFT_ALONE.as_secs() / 60;
+        error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
+        self.not_resumable.insert(unit, Instant::now());
         self.running.remove(&unit);
         self.put_in(Input::Released(unit, true));
     }
@@ -338,7 +383,9 @@ impl Task {
         let Ok(search) = Arc::clone(&self.search).try_acquire_owned() else {
             return;
         };
-        // Those that it cannot resume are found as well.
+        // Those that it could not resume are found as well.
+        self.not_resumable
+            .retain(|_, tried| tried.elapsed() < LEFT_ALONE);
         let count = count + self.not_resumable.len();
         let store = Arc::clone(&self.store);
         self.answers.spawn(async move {

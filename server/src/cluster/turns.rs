@@ -28,6 +28,12 @@ impl Turns {
         }
     }
 
+    /// Whether nothing is being done with a unit.
+    pub(super) fn is_idle(&mut self, unit: Id) -> bool {
+        let latest = self.0.get_mut(&unit);
+        latest.is_none_or(|ended| ended.try_recv() != Err(TryRecvError::Empty))
+    }
+
     /// Forgets the units with which nothing is done any more.
     pub(super) fn forget_ended(&mut self) {
         self.0
@@ -60,12 +66,14 @@ mod tests {
         assert_eq!(second.comes().now_or_never(), None);
         turns.forget_ended();
         assert!(turns.0.keys().eq([&unit]));
+        assert!(!turns.is_idle(unit) && turns.is_idle(other));
 
         drop(first);
         assert_eq!(second.comes().now_or_never(), Some(()));
         turns.forget_ended();
         assert!(turns.0.keys().eq([&unit]), "the second goes on");
         drop(second);
+        assert!(turns.is_idle(unit));
         turns.forget_ended();
         assert!(turns.0.is_empty());
     }

@@ -18,6 +18,16 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Units that are read and replayed at a time, so that many orphans do not slow down what runs.
 pub(super) const LOADS_AT_ONCE: usize = 4;
 
+/// What became of resuming a unit.
+pub(super) enum Resumed {
+    /// It runs here, or is not to run here any more.
+    Runs,
+    /// It has nothing to run, or is not the node's.
+    Nothing,
+    /// This version of the program cannot resume it.
+    Impossible,
+}
+
 /// The units of a node. What is done with one unit is done one after another, by the caller.
 pub(super) struct Units {
     store: Arc<dyn ClusterStore>,
@@ -68,32 +78,40 @@ impl Units {
         (self.wanted.lock()).expect("nothing panics under this lock")
     }
 
+    /// Whether something of a unit is here: it runs, is being created, or is over.
+    pub(super) fn has(&self, unit: Id) -> bool {
+        self.rooms.runs(unit)
+            || self.rooms.is_over(unit) == Some(true)
+            || self.tournaments.runs(unit)
+            || self.tournaments.get(unit).is_some()
+    }
+
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
-    /// database cannot be read. Returns `false` if this version of the program cannot resume it.
-    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> bool {
+    /// database cannot be read.
+    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> Resumed {
         // It was created here, and its node learns of it from its beat.
         let is_new = epoch == Epoch::FIRST;
         if is_new && (self.rooms.runs(unit) || self.tournaments.runs(unit)) {
-            return true;
+            return Resumed::Runs;
         }
         self.stop(unit).await;
         while self.wanted().get(&unit) == Some(&epoch) {
             match self.load(unit, epoch).await {
-                Ok(is_resumed) => return is_resumed,
+                Ok(resumed) => return resumed,
                 Err(error) => {
                     warn!(%unit, %error, "a room or tournament cannot be read; trying again");
                     sleep(RETRY).await;
                 }
             }
         }
-        true
+        Resumed::Runs
     }
 
-    /// Reads and runs a unit. Returns whether something of it is resumed, or it is not the node's.
-    async fn load(&self, unit: Id, epoch: Epoch) -> Result<bool, StoreError> {
+    /// Reads and runs a unit.
+    async fn load(&self, unit: Id, epoch: Epoch) -> Result<Resumed, StoreError> {
         let _permit = self.loads.acquire().await.expect("it is never closed");
         let Some(loaded) = self.store.load(unit, epoch).await? else {
-            return Ok(true);
+            return Ok(Resumed::Nothing);
         };
         let games = self.rooms.resume_all(loaded.games).await;
         if let Some(tournament) = loaded.tournament {
@@ -101,7 +119,10 @@ impl Units {
         }
         let is_resumed = games > 0 || self.tournaments.get(unit).is_some();
         info!(%unit, epoch = epoch.0, games, is_resumed, "taken over");
-        Ok(is_resumed)
+        Ok(match is_resumed {
+            true => Resumed::Runs,
+            false => Resumed::Impossible,
+        })
     }
 
     /// Ends everything of a unit that runs here.

@@ -1,6 +1,6 @@
 //! Decisions: masks, answers and their results, annotations, expressions.
 
-use chefshat_engine::{Mask, RuleSet};
+use chefshat_engine::{MAX_SEATS, Mask, RuleSet};
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, check_expression};
 use prost::Message as _;
@@ -96,18 +96,20 @@ pub fn answer_from_proto(answer: v1::Answer) -> Answer {
 /// # Errors
 /// A field is out of its range.
 pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, FieldProblem> {
-    check_expression(expression)?;
+    check_expression(expression, MAX_SEATS)?;
     Ok(expression.encode_to_vec().into_boxed_slice())
 }
 
 /// Why an expression was refused, for the stream of its seat.
 pub fn express_refused(error: ExpressError) -> v1::Refused {
     // Codes of google.rpc.Code.
+    const INVALID_ARGUMENT: u32 = 3;
     const RESOURCE_EXHAUSTED: u32 = 8;
     const FAILED_PRECONDITION: u32 = 9;
     let (code, reason) = match error {
         ExpressError::GameOver => (FAILED_PRECONDITION, "GAME_OVER"),
         ExpressError::TooMany => (RESOURCE_EXHAUSTED, "TOO_MANY_EXPRESSIONS"),
+        ExpressError::NoSuchSeat => (INVALID_ARGUMENT, "EXPRESSION_REFUSED"),
     };
     v1::Refused {
         reason: reason.into(),

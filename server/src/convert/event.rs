@@ -11,8 +11,8 @@ use prost::Message as _;
 
 use super::decision::source_to_proto;
 use super::kind::kind_to_proto;
-use super::policy::policy_of;
-use super::room::{abort_reason, participants, seed_commitment};
+use super::labels::{shown_name, shown_policy, shown_substitute};
+use super::room::{abort_reason, seed_commitment, shown_participants};
 use super::table::violation_to_proto;
 use chefshat_room::Core;
 use chefshat_room::log::RoomEvent;
@@ -30,11 +30,14 @@ pub fn event_to_proto(core: &Core, position: usize, viewer: Viewer) -> Option<v1
 
 fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
     match event {
-        RoomEvent::Seated(seat, participant) => Kind::Seated(Box::new(v1::Seated {
-            seat: seat_number(*seat),
-            name: participant.name.clone(),
-            kind: kind_to_proto(Some(participant.kind)),
-        })),
+        RoomEvent::Seated(seat, participant) => {
+            let (name, kind) = shown_name(core, *seat, &participant.name, Some(participant.kind));
+            Kind::Seated(Box::new(v1::Seated {
+                seat: seat_number(*seat),
+                name,
+                kind: kind_to_proto(kind),
+            }))
+        }
         RoomEvent::Vacated(seat) => Kind::Vacated(v1::Vacated {
             seat: seat_number(*seat),
         }),
@@ -47,7 +50,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         RoomEvent::Substituted(seat) | RoomEvent::Retired(seat) => {
             Kind::Substituted(v1::Substituted {
                 seat: seat_number(*seat),
-                built_in_agent: core.header().policy.substitute.name(),
+                built_in_agent: shown_substitute(core),
                 for_good: matches!(event, RoomEvent::Retired(_)),
             })
         }
@@ -126,8 +129,8 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
         game_id: header.game_id.to_string(),
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: header.rules_version,
-        policy: Some(policy_of(core)),
-        seats: participants(core),
+        policy: Some(shown_policy(core)),
+        seats: shown_participants(core),
         action_space: Some(action_space(&header.rules.actions())),
         hand_size: header.rules.hand_size().into(),
         seed_commitment: seed_commitment(header),
@@ -141,10 +144,12 @@ pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
 }
 
 /// The seed, public once a game has ended; nothing in a physical room. In a series of games with the same deals it is only in
-/// the record, which stays closed until all of them have ended.
+/// the record, which stays closed until all of them have ended. In a study the seeds are known to its owner alone.
 fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
     let game = core.game().filter(|_| !core.header().is_physical())?;
-    if core.header().series().is_some() && viewer != Viewer::Everything {
+    let header = core.header();
+    let is_withheld = header.series().is_some() || header.study.is_some();
+    if is_withheld && viewer != Viewer::Everything {
         return None;
     }
     let (server_seed, nonce, seat_entropy) = match core.header().seed {

@@ -6,6 +6,8 @@ mod agent;
 mod decision;
 mod event;
 mod kind;
+mod labels;
+mod marker;
 mod name;
 mod physical_record;
 mod players;
@@ -17,6 +19,8 @@ mod record_tests;
 mod room;
 mod standings;
 mod start;
+mod study;
+mod study_view;
 mod summary;
 mod table;
 mod tournament;
@@ -25,6 +29,7 @@ pub use agent::{agent_from_proto, check_budget, check_real_cards};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
+pub use marker::marker_to_proto;
 pub use name::checked_name;
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto, requested_policy};
@@ -32,10 +37,15 @@ pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines};
 pub use room::{
     awaited_to_proto, describe, describe_at, display_names_from_proto, fills_from_proto,
-    participants, seats_to_proto, tournament_id,
+    participants, seats_to_proto, tournament_id, wizards_from_proto,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
+pub use study::{
+    ConditionPlan, PARTICIPANT_KIND, StudyPlan, complete_settings, participant_state,
+    study_participant, study_plan, study_to_proto,
+};
+pub use study_view::{answers_from_proto, study_view};
 pub use summary::{SERVER_VERSION, summary};
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{

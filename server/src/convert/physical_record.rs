@@ -14,6 +14,7 @@ use tracing::error;
 
 use super::decision::source_to_proto;
 use super::event::event_to_proto;
+use super::marker::last_marker;
 use super::policy::millis;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
@@ -76,6 +77,7 @@ struct Placed {
 enum RoomEntryOf {
     Event(u64, Kind),
     Private(v1::PrivateExpression),
+    Marker(v1::Marker),
 }
 
 impl Room {
@@ -118,6 +120,14 @@ impl Room {
                 _ => {}
             }
             room.fold(number, entry);
+            if let Change::Marked(_) = entry.change {
+                let marker = last_marker(&room.core);
+                room.entries.extend(marker.map(|marker| Placed {
+                    place: (number, Phase::After),
+                    hand: None,
+                    entry: RoomEntryOf::Marker(marker),
+                }));
+            }
         }
         room
     }
@@ -190,6 +200,7 @@ impl Room {
                 let entry = match it.entry.clone() {
                     RoomEntryOf::Event(elapsed_ms, kind) => RoomEntry::Event { elapsed_ms, kind },
                     RoomEntryOf::Private(private) => RoomEntry::Private(private),
+                    RoomEntryOf::Marker(marker) => RoomEntry::Marker(marker),
                 };
                 (it.place, entry)
             })

@@ -4,12 +4,14 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use chefshat_engine::Viewer;
-use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::{invalid_reward, seat_number};
 use prost::Message as _;
 
 use super::decision::{mask_bytes, source_to_proto};
 use super::event::event_to_proto;
+use super::labels::without_labels;
+use super::marker::last_marker;
 use super::physical_record::physical_record_lines;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
@@ -23,7 +25,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
     if header.is_physical() {
         return physical_record_lines(header, journal);
     }
-    let mut core = Core::new(Arc::clone(header));
+    let mut core = Core::new(without_labels(header));
     let mut body = Vec::with_capacity(journal.len() * 2);
     let mut attempts: Vec<u32> = Vec::new();
     let (mut decisions, mut hints) = (0, 0);
@@ -52,6 +54,9 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         }
         let before = core.log().len();
         core.refold(entry);
+        if let Change::Marked(_) = entry.change {
+            body.extend(last_marker(&core).map(Line::Marker));
+        }
         body.extend(
             (before..core.log().len())
                 .filter_map(|position| event_to_proto(&core, position, Viewer::Everything))
@@ -64,11 +69,31 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         decisions,
         signature: None,
     });
+    if !header.wizards.is_empty() {
+        body.iter_mut().for_each(|line| by_wizard(header, line));
+    }
     std::iter::once(Line::Header(record_header(&core)))
         .chain(body)
         .chain(std::iter::once(footer))
         .map(|line| v1::RecordLine { line: Some(line) })
         .collect()
+}
+
+/// Sets the source of an expression of a seat that a person plays as another kind. Others in the room
+/// saw the source that the seat sent.
+fn by_wizard(header: &GameHeader, line: &mut Line) {
+    let (seat, expression) = match line {
+        Line::PrivateExpression(private) => (private.seat, &mut private.expression),
+        Line::Event(event) => match &mut event.kind {
+            Some(Kind::ExpressionShown(shown)) => (shown.seat, &mut shown.expression),
+            _ => return,
+        },
+        _ => return,
+    };
+    let is_wizard = usize::try_from(seat).is_ok_and(|seat| header.wizards.contains(&seat));
+    if let Some(expression) = expression.as_mut().filter(|_| is_wizard) {
+        expression.set_source(v1::ExpressionSource::Wizard);
+    }
 }
 
 /// All lines of the record of a stored game.

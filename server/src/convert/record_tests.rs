@@ -157,16 +157,31 @@ fn absent(lines: &mut [v1::RecordLine]) -> &mut v1::DecisionRecord {
         .expect("a seat was away")
 }
 
+/// Moves the first loss of a connection.
+fn lost_at(lines: &mut [v1::RecordLine], elapsed_ms: u64) {
+    let lost = lines.iter_mut().find_map(|line| match &mut line.line {
+        Some(Line::Event(event)) if matches!(event.kind, Some(Kind::Disconnected(_))) => {
+            Some(event)
+        }
+        _ => None,
+    });
+    lost.expect("a lost connection").elapsed_ms = elapsed_ms;
+}
+
 #[test]
 fn the_record_of_an_absence_cannot_be_changed() {
     let lines = record_with_an_absence(Some(ms(400)));
     replay(&lines).expect("the record verifies");
     type Edit = fn(&mut Vec<v1::RecordLine>);
-    let edits: [(Edit, &str); 4] = [
+    let edits: [(Edit, &str); 5] = [
         (|lines| absent(lines).bank_left_ms -= 1, "bankLeftMs"),
         (
             |lines| absent(lines).decision_time_us = 399_999,
             "the time was not up: the seat had 400 ms",
+        ),
+        (
+            |lines| lost_at(lines, 399),
+            "the time was not up: the seat had 1500 ms",
         ),
         (
             |lines| absent(lines).source = v1::DecisionSource::Timeout.into(),

@@ -1,6 +1,6 @@
 //! A room and its seats as messages.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
@@ -10,8 +10,9 @@ use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
+use super::labels::{labelled, shown_policy};
 use super::name::checked_name;
-use super::policy::{millis, policy_of};
+use super::policy::millis;
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
@@ -45,6 +46,15 @@ pub fn fills_from_proto(
             Some(FilledBy::ReservedFor(kind)) => Ok(Fill::Open {
                 reserved_for: kind_from_proto("seats", *kind)?,
             }),
+            Some(FilledBy::Wizard(kind)) => match kind_from_proto("seats", *kind)? {
+                shown @ Some(ParticipantKind::Robot | ParticipantKind::Agent) => Ok(Fill::Open {
+                    reserved_for: shown,
+                }),
+                _ => Err(FieldProblem::new(
+                    "seats",
+                    "`wizard` is the kind that others see: ROBOT or AGENT",
+                )),
+            },
             Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
             Some(FilledBy::AtTable(kind)) => kind_from_proto("seats", *kind)?
                 .map(Fill::AtTable)
@@ -55,6 +65,16 @@ pub fn fills_from_proto(
                 .map(Fill::BuiltIn)
                 .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
         })
+        .collect()
+}
+
+/// The seats that a person plays as another kind.
+pub fn wizards_from_proto(seats: &[v1::SeatConfig]) -> BTreeSet<usize> {
+    let is_wizard = |config: &v1::SeatConfig| matches!(config.filled_by, Some(FilledBy::Wizard(_)));
+    let seats = seats.iter().enumerate();
+    seats
+        .filter(|(_, config)| is_wizard(config))
+        .map(|(seat, _)| seat)
         .collect()
 }
 
@@ -71,7 +91,7 @@ pub fn display_names_from_proto(
         .filter(|(_, it)| !it.name.is_empty() || is_at_table(it));
     named
         .map(|(seat, config)| {
-            if matches!(config.filled_by, None | Some(FilledBy::ReservedFor(_))) {
+            if matches!(config.filled_by, None | Some(FilledBy::ReservedFor(_) | FilledBy::Wizard(_))) {
                 let problem = "only a built-in agent or a player at the table takes a name here; participants choose theirs when they join";
                 return Err(FieldProblem::new("seats", problem));
             }
@@ -90,7 +110,13 @@ pub fn seats_to_proto(header: &GameHeader) -> Vec<v1::SeatConfig> {
     seats
         .map(|(seat, fill)| v1::SeatConfig {
             name: header.display_names.get(&seat).cloned().unwrap_or_default(),
-            ..fill_to_proto(fill)
+            ..match fill {
+                Fill::Open { reserved_for } if header.wizards.contains(&seat) => v1::SeatConfig {
+                    filled_by: Some(FilledBy::Wizard(kind_to_proto(*reserved_for))),
+                    ..v1::SeatConfig::default()
+                },
+                _ => fill_to_proto(fill),
+            }
         })
         .collect()
 }
@@ -127,10 +153,13 @@ fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
     }
 }
 
-/// The public view of a room, with whom its game waits for.
+/// The public view of a room, with whom its game waits for if spectators may see that at once.
+/// In a series, it would show others of the same deal who opens and who passes.
 pub fn describe_at(core: &Core, now: Duration) -> v1::Room {
-    let delayed = core.header().policy.spectator_delay_decisions > 0;
-    let awaited = core.awaited_in_public().filter(|_| !delayed);
+    let header = core.header();
+    let (policy, in_series) = (&header.policy, header.series().is_some());
+    let watched = policy.spectators && policy.spectator_delay_decisions == 0 && !in_series;
+    let awaited = core.awaited_in_public().filter(|_| watched);
     v1::Room {
         awaited: awaited.map(|awaited| awaited_to_proto(Some(awaited), now)),
         ..describe(core)
@@ -143,7 +172,7 @@ pub fn awaited_to_proto(awaited: Option<Awaited>, now: Duration) -> v1::Awaited 
         seat: Some(seat_number(awaited.seat)),
         away: awaited.away,
         waited_ms: millis(now.saturating_sub(awaited.since)),
-        left_ms: millis(awaited.until.saturating_sub(now)),
+        left_ms: (awaited.until).map(|until| millis(until.saturating_sub(now))),
     })
 }
 
@@ -157,8 +186,8 @@ pub fn describe(core: &Core) -> v1::Room {
         name: header.name.clone(),
         state: state_to_proto(core.state()).into(),
         rules: Some(rules_to_proto(&header.rules)),
-        policy: Some(policy_of(core)),
-        seats: participants(core),
+        policy: Some(shown_policy(core)),
+        seats: shown_participants(core),
         seed_fixed: seed_commitment.is_empty() && !header.is_physical(),
         seed_commitment,
         created_at_ms: header.created_at_ms,
@@ -219,7 +248,12 @@ pub(super) fn state_to_proto(state: State) -> v1::RoomState {
     }
 }
 
-/// The seats of a room.
+/// The seats of a room, as everybody sees them.
+pub(super) fn shown_participants(core: &Core) -> Vec<v1::Participant> {
+    labelled(core, participants(core))
+}
+
+/// The seats of a room, as its record has them.
 pub fn participants(core: &Core) -> Vec<v1::Participant> {
     core.all_seats()
         .map(|seat| {
@@ -249,7 +283,62 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                     _ => None,
                 },
                 at_table,
+                shown_kind: v1::ParticipantKind::Unspecified.into(),
             }
         })
         .collect()
+}
+
+/// The seats of a room for its record, which says whom a person played as another kind.
+pub(super) fn recorded_participants(core: &Core) -> Vec<v1::Participant> {
+    let mut seats = participants(core);
+    for (index, seat) in seats.iter_mut().enumerate() {
+        if core.header().wizards.contains(&index) && !seat.name.is_empty() {
+            seat.shown_kind = seat.kind;
+            seat.kind = v1::ParticipantKind::Human.into();
+        }
+    }
+    seats
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use chefshat_room::journal::TournamentGame;
+    use chefshat_room::policy::Policy;
+    use chefshat_room::testing::{OPEN, Table};
+
+    use super::*;
+
+    #[test]
+    fn a_room_shows_whom_it_waits_for_only_where_spectators_see_it_at_once() {
+        for (spectators, delay, series, shown) in [
+            (true, 0, false, true),
+            (false, 0, false, false),
+            (true, 1, false, false),
+            (true, 0, true, false),
+        ] {
+            let policy = Policy {
+                spectators,
+                spectator_delay_decisions: delay,
+                ..Policy::default()
+            };
+            let mut table = Table::empty(policy, vec![OPEN; 4]);
+            let mut header = GameHeader::clone(table.core.header());
+            header.tournament = Some(TournamentGame {
+                tournament: Id([3; 16]),
+                series: series.then_some(Id([4; 16])),
+            });
+            table.core = Core::new(Arc::new(header));
+            table.fill();
+            assert!(table.core.awaited_in_public().is_some());
+            let described = describe_at(&table.core, table.now);
+            assert_eq!(
+                described.awaited.is_some(),
+                shown,
+                "{spectators} {delay} {series}"
+            );
+        }
+    }
 }

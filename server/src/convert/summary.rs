@@ -1,15 +1,16 @@
 //! The header and the summary of a record.
 
 use chefshat_proto::v1;
-use chefshat_record::convert::{action_space, rules_to_proto};
+use chefshat_record::convert::{action_space, rules_to_proto, seat_number};
 use chefshat_record::jsonl::FORMAT_VERSION;
-use chefshat_room::journal::Entry;
+use chefshat_room::journal::{Entry, StudyGame};
 use chefshat_room::{Core, PhysicalTable};
 
 use super::event::standings;
 use super::policy::{policy_of, visibility_to_proto};
 use super::room::{
-    aborted_because, participants, seed_commitment, series_id, state_to_proto, tournament_id,
+    aborted_because, recorded_participants, seed_commitment, series_id, state_to_proto,
+    tournament_id,
 };
 use super::start::{origin, start_to_proto};
 
@@ -28,7 +29,7 @@ pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: header.rules_version,
         policy: Some(policy_of(core)),
-        seats: participants(core),
+        seats: recorded_participants(core),
         seed_commitment: seed_commitment(header),
         created_at_ms: header.created_at_ms,
         server_version: SERVER_VERSION.into(),
@@ -36,6 +37,29 @@ pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
         start: start_to_proto(&header.start, header.rules.faces()),
         tournament_id: tournament_id(header),
         series_id: series_id(header),
+        study: header.study.as_deref().map(study_record),
+    }
+}
+
+fn study_record(game: &StudyGame) -> v1::StudyRecord {
+    v1::StudyRecord {
+        study_id: game.study.to_string(),
+        name: game.name.clone(),
+        condition: game.condition.clone(),
+        levels: (game.levels.iter())
+            .map(|(factor, level)| v1::StudyLevel {
+                factor: factor.clone(),
+                level: level.clone(),
+            })
+            .collect(),
+        number: game.number,
+        participant: game.participant.clone(),
+        session: game.session,
+        step: game.step,
+        practice: game.practice,
+        seed_index: game.seed_index,
+        seat: seat_number(game.seat),
+        attempt: game.attempt,
     }
 }
 
@@ -54,7 +78,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         created_at_ms: header.created_at_ms,
         ended_at_ms: header.created_at_ms.saturating_add(ended_at_ms),
         rules: Some(rules_to_proto(&header.rules)),
-        seats: participants(core),
+        seats: recorded_participants(core),
         standings: standings(core),
         shifts: core.game().map_or(0, |game| game.shift()),
         decisions: match core.table() {
@@ -67,6 +91,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         substituted: core.was_substituted(),
         hinted: core.was_hinted(),
         visibility: visibility_to_proto(header.policy.visibility).into(),
+        study_id: (header.study.as_ref()).map_or_else(String::new, |game| game.study.to_string()),
     }
 }
 

@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use axum::body::HttpBody;
 use bytes::Bytes;
+use chefshat_proto::v1::{self, room_service_client::RoomServiceClient};
 use futures::future::{BoxFuture, Either};
 use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
 use http_body::{Frame, SizeHint};
@@ -23,9 +24,10 @@ use tower::{Layer, Service, ServiceExt as _};
 use tracing::debug;
 
 use super::fanout::{self, Fanout};
+use super::limits::Charged;
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
 use crate::access::{Call, SECRET_HEADER};
-use crate::cluster::{Directory, Peers};
+use crate::cluster::{Directory, Peer, Peers};
 use crate::config::MAX_MESSAGE_BYTES;
 use crate::connections::peer_address;
 use crate::limits::{CallLimits, Key};
@@ -118,6 +120,14 @@ impl ForwardLayer {
             fanout: Arc::new(Fanout::new(limits)),
         }
     }
+
+    /// What a request needs to ask other nodes itself.
+    pub(super) fn gateway<B>(&self, request: &Request<B>) -> Gateway {
+        Gateway {
+            layer: self.clone(),
+            headers: passed_headers(request),
+        }
+    }
 }
 
 impl<S> Layer<S> for ForwardLayer {
@@ -155,10 +165,7 @@ where
     fn call(&mut self, mut request: Request<Body>) -> Self::Future {
         // Streams of seats, lists of everything and what is about several records ask other nodes
         // themselves.
-        let gateway = Gateway {
-            layer: self.layer.clone(),
-            headers: passed_headers(&request),
-        };
+        let gateway = self.layer.gateway(&request);
         request.extensions_mut().insert(gateway.clone());
         if !Call::find(request.uri().path()).is_some_and(|call| call.forwarded) {
             return Either::Left(self.services.call(request));
@@ -183,7 +190,7 @@ impl Gateway {
         S::Error: Send,
     {
         let (parts, body) = request.into_parts();
-        let caller = Key::of_address(peer_address(&parts.extensions));
+        let address = Key::of_address(peer_address(&parts.extensions));
         let kept = Kept::default();
         let mut body = Body::new(KeepingBody {
             body,
@@ -206,7 +213,14 @@ impl Gateway {
             *forwarded.headers_mut() = self.headers.clone();
             let sent = self.peers().send(&elsewhere.peer, forwarded);
             let answered = match shared {
-                Some(key) => self.layer.fanout.answer(key, caller, sent).await,
+                Some(key) => {
+                    let caller = response
+                        .extensions()
+                        .get()
+                        .map_or(address, |key: &Charged| key.0);
+                    let present = self.room(&elsewhere.peer, key.room.clone());
+                    self.layer.fanout.answer(key, caller, present, sent).await
+                }
                 None => sent.await,
             };
             match answered {
@@ -227,6 +241,23 @@ impl Gateway {
             services.ready().await?;
         }
         Ok(owner_unreachable().into_http())
+    }
+}
+
+impl Gateway {
+    /// A room of another node, as its spectators see it.
+    async fn room(&self, peer: &Peer, room_id: String) -> Option<v1::Room> {
+        let mut rooms = RoomServiceClient::new(self.peers().channel(peer));
+        let request = self.request(v1::GetRoomRequest {
+            room_id,
+            join_code: String::new(),
+        });
+        let room = rooms.get_room(request).await.ok()?.into_inner().room?;
+        // The stream itself says that.
+        Some(v1::Room {
+            awaited: None,
+            ..room
+        })
     }
 }
 

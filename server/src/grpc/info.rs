@@ -1,7 +1,7 @@
-//! `ServerService`: the server's version, limits and action tables.
+//! `ServerService`: the server's version, limits, action tables and clocks.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
@@ -15,7 +15,10 @@ use tonic::{Request, Response, Status};
 
 use super::forward::Gateway;
 use super::lists;
-use super::status::field;
+use super::reach::Reach;
+use super::status::{field, room_unknown};
+use crate::access::Caller;
+use crate::clock::since_epoch;
 use crate::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_HOSTED_SHIFTS,
     MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION,
@@ -26,7 +29,6 @@ use crate::config::{
 use crate::convert;
 use crate::limits::CallLimits;
 use crate::room::MAX_SPECTATORS;
-use crate::rooms::Rooms;
 
 /// Faces of the standard game.
 const STANDARD_FACES: u32 = 11;
@@ -34,13 +36,13 @@ const STANDARD_FACES: u32 = 11;
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Info {
-    rooms: Arc<Rooms>,
+    reach: Reach,
     limits: HashMap<String, u64>,
 }
 
 impl Info {
-    /// Creates the service for these rooms.
-    pub fn new(rooms: Arc<Rooms>, calls: &CallLimits, config: &ServerConfig) -> Self {
+    /// Creates the service for the rooms that callers reach.
+    pub fn new(reach: Reach, calls: &CallLimits, config: &ServerConfig) -> Self {
         let limits = [
             ("max_rooms", config.max_rooms),
             ("max_connections", config.max_connections),
@@ -91,7 +93,7 @@ impl Info {
         ])
         .map(|(name, limit)| (name.to_owned(), limit))
         .collect();
-        Self { rooms, limits }
+        Self { reach, limits }
     }
 }
 
@@ -101,7 +103,7 @@ impl ServerService for Info {
         &self,
         request: Request<v1::GetServerInfoRequest>,
     ) -> Result<Response<v1::GetServerInfoResponse>, Status> {
-        let mut open_rooms = convert::number(self.rooms.open_count());
+        let mut open_rooms = convert::number(self.reach.rooms().open_count());
         if let Some(gateway) = request.extensions().get::<Gateway>() {
             let ask = |channel| async move {
                 let request = gateway.request(v1::GetServerInfoRequest {});
@@ -134,8 +136,9 @@ impl ServerService for Info {
                 .collect(),
             limits: self.limits.clone(),
             open_rooms,
-            shutting_down: self.rooms.is_shutting_down(),
-            signing_key: (self.rooms.signing_key()).map_or_else(String::new, |key| key.to_string()),
+            shutting_down: self.reach.rooms().is_shutting_down(),
+            signing_key: (self.reach.rooms().signing_key())
+                .map_or_else(String::new, |key| key.to_string()),
         }))
     }
 
@@ -161,4 +164,38 @@ impl ServerService for Info {
                 .collect(),
         }))
     }
+
+    async fn get_clock(
+        &self,
+        request: Request<v1::GetClockRequest>,
+    ) -> Result<Response<v1::GetClockResponse>, Status> {
+        let received_at = since_epoch();
+        let received = tokio::time::Instant::now();
+        let caller = Caller::of(request.extensions());
+        let room_id = request.into_inner().room_id;
+        let room = match room_id.as_str() {
+            "" => None,
+            id => {
+                let handle = self.reach.room(&caller, id).await?;
+                let header = self.reach.rooms().header(handle.id());
+                Some((handle, header.ok_or_else(room_unknown)?))
+            }
+        };
+        let sent = tokio::time::Instant::now();
+        Ok(Response::new(v1::GetClockResponse {
+            received_at_us: micros(received_at),
+            // The time of day may have been set meanwhile.
+            sent_at_us: micros(received_at + (sent - received)),
+            room: room.map(|(handle, header)| v1::RoomClock {
+                game_id: header.game_id.to_string(),
+                created_at_ms: header.created_at_ms,
+                received_us: micros(handle.clock().at(received)),
+                sent_us: micros(handle.clock().at(sent)),
+            }),
+        }))
+    }
+}
+
+fn micros(time: Duration) -> u64 {
+    u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
 }

@@ -11,11 +11,12 @@ use bytes::Bytes;
 use futures::future::BoxFuture;
 use http::{Request, Response};
 use http_body::{Frame, SizeHint};
+use tokio::time::Instant;
 use tonic::body::Body;
 use tonic::{Code, Status};
 use tower::{Layer, Service};
 
-use super::status::{Refusal, status};
+use super::status::{Refusal, is_elsewhere, status};
 use crate::access::{Call, Caller};
 use crate::connections::{Client, peer_address};
 use crate::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
@@ -28,6 +29,22 @@ pub(super) fn charged(extensions: &http::Extensions) -> Key {
         None => Key::of_address(peer_address(extensions)),
     }
 }
+
+/// When a request was received, before it waited for its caller's share. In its extensions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrived(Instant);
+
+impl Arrived {
+    /// When a request with these extensions was received.
+    pub(super) fn of(extensions: &http::Extensions) -> Instant {
+        let arrived: Option<&Self> = extensions.get();
+        arrived.map_or_else(Instant::now, |arrived| arrived.0)
+    }
+}
+
+/// Who was charged for a call that belongs to another node. In the extensions of its answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Charged(pub(super) Key);
 
 /// The client that sent a request, unless a proxy did: its connection belongs to many callers.
 fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
@@ -125,6 +142,7 @@ where
     }
 
     fn call(&mut self, mut request: Request<B>) -> Self::Future {
+        request.extensions_mut().insert(Arrived(Instant::now()));
         let key = charged(request.extensions());
         let client = own_client(request.extensions()).cloned();
         let caller: Option<&Caller> = request.extensions().get();
@@ -192,9 +210,13 @@ impl Place {
     }
 
     /// Keeps the place until the answer has been read.
-    fn keep(self, response: Response<Body>) -> Response<Body> {
+    fn keep(self, mut response: Response<Body>) -> Response<Body> {
         if let Some(admitted) = &self.admitted {
             admitted.executed();
+        }
+        let status: Option<&Status> = response.extensions().get();
+        if status.is_some_and(|status| is_elsewhere(status).is_some()) {
+            response.extensions_mut().insert(Charged(self.key));
         }
         response.map(|body| {
             // A refusal has no body to be read.

@@ -79,6 +79,10 @@ pub(super) async fn new_room(
     for agent in built_in(&fills) {
         convert::check_budget("seats", agent).map_err(refused)?;
     }
+    if request.physical && !convert::wizards_from_proto(&request.seats).is_empty() {
+        let problem = "a person cannot play as a robot or an agent at a table with real cards";
+        return Err(refused(FieldProblem::new("seats", problem)));
+    }
     if request.physical {
         check_agents(&policy, &fills)?;
         if policy.hints {
@@ -95,6 +99,7 @@ pub(super) async fn new_room(
         rules: beginning.rules,
         policy,
         fills,
+        wizards: convert::wizards_from_proto(&request.seats),
         display_names: convert::display_names_from_proto(&request.seats).map_err(refused)?,
         start: beginning.start,
         game_seed: beginning.game_seed,

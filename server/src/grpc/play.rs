@@ -4,11 +4,15 @@
 mod attaching;
 #[cfg(test)]
 mod late_tests;
+mod parked;
+#[cfg(test)]
+mod parked_tests;
 mod participants;
 mod reader;
 mod remote;
 mod requests;
 
+use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::{Arc, OnceLock};
 use std::task::{Context, Poll};
@@ -16,12 +20,12 @@ use std::task::{Context, Poll};
 use chefshat_proto::v1::{self, act_request};
 use chefshat_record::convert::FieldProblem;
 use futures::{Stream, StreamExt as _};
-use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
+use super::limits::Arrived;
 use super::reach::Reach;
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::access::Caller;
@@ -169,8 +173,11 @@ impl PlayService for Play {
                         outbox.end(StreamEnd::Complete);
                         break;
                     }
-                    Some((handle, call)) = reader.called.recv() => {
-                        reader.follow_call(handle, call).await;
+                    own = poll_fn(|context| reader.poll_own(context)) => {
+                        reader.do_own(own).await;
+                        if !reader.has_attached() {
+                            return outbox.end(StreamEnd::Complete);
+                        }
                     }
                 }
             }
@@ -183,11 +190,18 @@ impl PlayService for Play {
         &self,
         request: Request<v1::ActRequest>,
     ) -> Result<Response<v1::ActResponse>, Status> {
-        let arrived = Instant::now();
+        let arrived = Arrived::of(request.extensions());
         let caller = Caller::of(request.extensions());
         let executing: Option<Executing> = request.extensions().get().cloned();
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
+        if let Some(executing) = executing
+            .as_ref()
+            .filter(|_| !self.reach.has_in_memory(token.room))
+        {
+            // Others are not delayed while it is looked for.
+            executing.give_back();
+        }
         let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown);
         let room = room.await?;
         let action = match request.command {
@@ -298,6 +312,7 @@ mod tests {
             policy: Policy::default(),
             fills: vec![Fill::Open { reserved_for: None }; 4],
             display_names: BTreeMap::new(),
+            wizards: std::collections::BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: None,

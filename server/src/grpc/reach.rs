@@ -171,7 +171,8 @@ impl Reach {
         };
         let found = self.room_here(id, Key::of_caller(caller)).await?;
         let handle = found.ok_or_else(unknown)?;
-        let header = self.rooms.header(id).ok_or_else(unknown)?;
+        // A node that has just stopped it is about to resume it, or another is.
+        let header = self.rooms.header(id).ok_or_else(room_gone)?;
         if header.policy.visibility == Visibility::Private
             && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
         {
@@ -190,18 +191,29 @@ impl Reach {
     }
 
     /// The room of a ticket, which is still to be compared. A caller whose scope does not include a
-    /// private room gets the answer for an unknown ticket, whatever the ticket.
+    /// private room gets the answer for an unknown ticket, whatever the ticket. Waits while the room
+    /// changes hands.
     pub(super) async fn room_of_ticket(
         &self,
         caller: &Caller,
         room: Id,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
-        let key = Key::of_caller(caller);
-        let found = settled(&self.rooms, || self.room_here(room, key)).await?;
+        let look = || self.look_for_ticket(caller, room, &unknown);
+        settled(&self.rooms, look).await
+    }
+
+    /// As [`Reach::room_of_ticket`], without waiting.
+    pub(super) async fn look_for_ticket(
+        &self,
+        caller: &Caller,
+        room: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let found = self.room_here(room, Key::of_caller(caller)).await?;
         let handle = found.ok_or_else(&unknown)?;
         if caller.scope.is_some() {
-            let header = self.rooms.header(room).ok_or_else(&unknown)?;
+            let header = self.rooms.header(room).ok_or_else(room_gone)?;
             check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
                 match header.policy.visibility {
                     Visibility::Private => unknown(),
@@ -210,6 +222,12 @@ impl Reach {
             })?;
         }
         Ok(handle)
+    }
+
+    /// Whether the room or tournament of a ticket is in memory and runs, so that finding it takes no
+    /// time.
+    pub(super) fn has_in_memory(&self, id: Id) -> bool {
+        self.tournaments.get(id).is_some() || self.rooms.get(id).is_some_and(|room| !room.is_gone())
     }
 
     /// Whether a room is in the lists of a caller.
@@ -240,19 +258,20 @@ impl Reach {
         Ok(handle)
     }
 
-    /// Checks that the scope of a caller includes a tournament of which it has a ticket, which is
-    /// still to be compared; as for rooms.
-    pub(super) fn check_ticket_of(
+    /// Whether the scope of a caller includes the tournament of a ticket, which is still to be
+    /// compared; as for rooms. `None` if this node does not have the tournament.
+    pub(super) fn tournament_of_ticket(
         &self,
         caller: &Caller,
-        tournament: &TournamentHandle,
+        id: Id,
         unknown: impl Fn() -> Status,
-    ) -> Result<(), Status> {
-        let checked = check(caller, |it| it.reaches_tournament(tournament.id()));
-        checked.map_err(|refused| match tournament.visibility() {
+    ) -> Option<Result<(), Status>> {
+        let tournament = self.tournaments.get(id)?;
+        let checked = check(caller, |it| it.reaches_tournament(id));
+        Some(checked.map_err(|refused| match tournament.visibility() {
             Visibility::Private => unknown(),
             Visibility::Public | Visibility::Unlisted => refused,
-        })
+        }))
     }
 
     /// Whether a tournament is in the lists of a caller.
@@ -269,16 +288,16 @@ impl Reach {
         stored: &StoredGame,
         unknown: impl Fn() -> Status,
     ) -> Result<Sight, Status> {
-        let (visibility, standing) = match stored {
+        let (visibility, standing, least) = match stored {
             StoredGame::Hosted(header, entries, _) => {
                 let standing = self.standing_in_game(caller, header, entries);
-                (header.policy.visibility, standing)
+                (header.policy.visibility, standing, least_to_read(header))
             }
             // Importing it made it public.
-            StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger),
+            StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger, Standing::Stranger),
         };
         let is_private = visibility == Visibility::Private;
-        if is_private && standing == Standing::Stranger {
+        if is_private && standing < least {
             return Err(unknown());
         }
         check(caller, |caller| match stored {
@@ -320,7 +339,10 @@ impl Reach {
         // Reading a game takes time: only those that a secret may be of are read. The games of a
         // tournament may outlast it.
         let forgotten = tournament.filter(|_| kept.is_none());
-        let mut ids = Id::parse(&summary.room_id).into_iter().chain(forgotten);
+        let study = Id::parse(&summary.study_id);
+        let mut ids = (Id::parse(&summary.room_id).into_iter())
+            .chain(forgotten)
+            .chain(study);
         if !ids.any(|id| caller.secrets.mention(id)) {
             return Ok(false);
         }
@@ -330,7 +352,7 @@ impl Reach {
         let stored = (self.rooms.store().finished(game).await).map_err(read_failed)?;
         Ok(match stored {
             Some(StoredGame::Hosted(header, entries, _)) => {
-                self.standing_in_game(caller, &header, &entries) > Standing::Stranger
+                self.standing_in_game(caller, &header, &entries) >= least_to_read(&header)
             }
             Some(StoredGame::Imported(_)) | None => false,
         })
@@ -402,9 +424,21 @@ impl Reach {
                 }
             }
         });
+        let owns_study = header.study.as_ref().is_some_and(|game| {
+            let owns = |token: &Token| {
+                let owner = Token::of_tournament_room(header.room_id, &token.hash());
+                header.owner.is(&owner.hash())
+            };
+            secrets.of_id(game.study).any(owns)
+        });
+        let by_study = match owns_study {
+            true => Standing::Owner,
+            false => Standing::Stranger,
+        };
         by_token
             .max(by_room)
             .max(by_tournament.unwrap_or(Standing::Stranger))
+            .max(by_study)
     }
 }
 
@@ -414,6 +448,14 @@ fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Sta
         false => Standing::Stranger,
     };
     by_token.max(tournament.standing(&caller.secrets))
+}
+
+/// What a caller must be to a private game to read its record. That of a study names the condition.
+fn least_to_read(header: &GameHeader) -> Standing {
+    match header.study {
+        Some(_) => Standing::Owner,
+        None => Standing::Participant,
+    }
 }
 
 fn tournament_of(header: &GameHeader) -> Option<Id> {

@@ -263,7 +263,11 @@ fn seen(
         return lines;
     }
     let count = lines.len();
-    lines.retain(|line| !matches!(line.line, Some(Line::PrivateExpression(_))));
+    let for_the_record_only = |line: &v1::RecordLine| {
+        let line = line.line.as_ref();
+        matches!(line, Some(Line::PrivateExpression(_) | Line::Marker(_)))
+    };
+    lines.retain(|line| !for_the_record_only(line));
     let mut changed = lines.len() < count;
     let mut signature = None;
     for line in &mut lines {

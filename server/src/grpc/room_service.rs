@@ -337,22 +337,14 @@ impl RoomService for RoomCalls {
         let request = request.into_inner();
         let caller = caller.showing(&request.owner_token);
         let handle = self.reach().room(&caller, &request.room_id).await?;
-        let wrong = || {
-            status::status(
-                Code::PermissionDenied,
-                "OWNER_TOKEN_WRONG",
-                "this is not the owner token that CreateRoom returned for this room",
-                [("field", "owner_token")],
-            )
-        };
         let token = Token::parse(&request.owner_token)
             .filter(|token| token.room == handle.id())
-            .ok_or_else(wrong)?;
+            .ok_or_else(status::owner_token_wrong)?;
         let room = handle
             .close(token.secret)
             .await
             .map_err(Refusal::from)?
-            .ok_or_else(wrong)?;
+            .ok_or_else(status::owner_token_wrong)?;
         Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
     }
 }

@@ -124,6 +124,16 @@ pub fn room_unknown() -> Status {
     )
 }
 
+/// A token is not that of the room's creator.
+pub fn owner_token_wrong() -> Status {
+    status(
+        Code::PermissionDenied,
+        "OWNER_TOKEN_WRONG",
+        "this is not the owner token that CreateRoom returned for this room",
+        [("field", "owner_token")],
+    )
+}
+
 /// No seat has this ticket.
 pub fn ticket_unknown() -> Status {
     status(

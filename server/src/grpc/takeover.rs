@@ -18,7 +18,7 @@ use crate::rooms::Rooms;
 use chefshat_room::ids::Id;
 
 /// How long a client waits: as long as its longest pause, after which it begins with the shortest.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 /// Pauses between two looks.
 const FIRST_PAUSE: Duration = Duration::from_millis(20);
 const LONGEST_PAUSE: Duration = Duration::from_millis(250);
@@ -26,17 +26,23 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(250);
 const ANSWER_LIMIT: Duration = Duration::from_secs(1);
 
 /// The pauses of one client.
-struct Pauses {
+pub(super) struct Pauses {
     began: Instant,
     next: Duration,
 }
 
 impl Pauses {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             began: Instant::now(),
             next: FIRST_PAUSE,
         }
+    }
+
+    /// The time until the next look.
+    pub(super) fn next(&mut self) -> Duration {
+        let longer = LONGEST_PAUSE.min(self.next * 2);
+        std::mem::replace(&mut self.next, longer)
     }
 
     /// Waits before the next look; `false` if the client has waited for long enough.
@@ -44,30 +50,34 @@ impl Pauses {
         if self.began.elapsed() >= PATIENCE {
             return false;
         }
-        sleep(self.next).await;
-        self.next = LONGEST_PAUSE.min(self.next * 2);
+        sleep(self.next()).await;
         true
     }
 }
 
+/// Whether clients wait here for what changes hands. Those of a node that is drained connect to
+/// another one.
+pub(super) fn waits(rooms: &Rooms) -> bool {
+    rooms.lease().is_some() && !rooms.is_shutting_down()
+}
+
+/// Whether a room is about to be taken over or resumed.
+pub(super) fn is_changing(found: &Result<Handle, Status>) -> bool {
+    match found {
+        Ok(room) => room.is_gone(),
+        Err(status) => status.code() == Code::Unavailable && is_elsewhere(status).is_none(),
+    }
+}
+
 /// Looks for a room until it is not about to be taken over or resumed.
-pub(super) async fn settled<F>(
-    rooms: &Rooms,
-    look: impl Fn() -> F,
-) -> Result<Option<Handle>, Status>
+pub(super) async fn settled<F>(rooms: &Rooms, look: impl Fn() -> F) -> Result<Handle, Status>
 where
-    F: Future<Output = Result<Option<Handle>, Status>>,
+    F: Future<Output = Result<Handle, Status>>,
 {
     let mut pauses = Pauses::new();
     loop {
         let found = look().await;
-        let is_changing = match &found {
-            Ok(room) => room.as_ref().is_some_and(Handle::is_gone),
-            Err(status) => status.code() == Code::Unavailable && is_elsewhere(status).is_none(),
-        };
-        // The clients of a node that is drained connect to another one.
-        let waits = rooms.lease().is_some() && !rooms.is_shutting_down();
-        if !(is_changing && waits && pauses.pause().await) {
+        if !(is_changing(&found) && waits(rooms) && pauses.pause().await) {
             return found;
         }
     }

@@ -12,6 +12,10 @@ pub(super) const MAX_STREAMS: usize = 20_000;
 pub(super) const MAX_ANSWERS: usize = 1_024;
 /// Most calls of all callers that are executed at a time.
 pub(super) const MAX_EXECUTED: usize = 64;
+/// Most bytes of streams of other nodes that are kept for spectators who share them, of all callers.
+pub(super) const MAX_HISTORY: usize = 64 * 1024 * 1024;
+/// Bytes that such a stream takes at a time.
+pub const HISTORY_STEP: usize = 16 * 1024;
 /// Most lists of rooms that are made at a time: each asks many rooms.
 pub(super) const MAX_LISTS: usize = 4;
 /// Most calls of all callers that wait for something.
@@ -49,6 +53,7 @@ pub struct CallLimits {
     answers: Arc<Places>,
     executed: Arc<Places>,
     lists: Arc<Places>,
+    histories: Arc<Places>,
     waiting: Arc<Places>,
     calls: Rate,
     wrong_codes: Rate,
@@ -108,6 +113,7 @@ impl CallLimits {
             answers: Places::new(MAX_ANSWERS, shares),
             executed: Places::new(MAX_EXECUTED, shares),
             lists: Places::new(MAX_LISTS, shares),
+            histories: Places::new(MAX_HISTORY / HISTORY_STEP, shares),
             waiting: Places::new(MAX_WAITING, shares),
             calls: Rate::new(CALLS_PER_SECOND, CALLS_AT_ONCE),
             wrong_codes: Rate::new(WRONG_CODES_PER_SECOND, WRONG_CODES_AT_ONCE),
@@ -224,6 +230,18 @@ impl CallLimits {
     /// Takes the place of a stream that is already open for others; `None` if the caller has too many.
     pub fn share_stream(&self, key: Key) -> Option<Held> {
         self.streams.try_take(key)
+    }
+
+    /// Takes memory for the next [`HISTORY_STEP`] bytes of a stream that spectators share; `None` if
+    /// its caller has too much of it.
+    pub fn keep_history(&self, key: Key) -> Option<Held> {
+        self.histories.try_take(key)
+    }
+
+    /// How many times a caller alone may have that memory.
+    #[cfg(test)]
+    pub fn share_of_histories(&self, key: Key) -> usize {
+        self.histories.share_of(key)
     }
 
     /// Checks whether a caller may try a join code.

@@ -20,6 +20,8 @@ pub enum Key {
     Proxies,
     /// A tournament that was resumed: who created it is unknown.
     Tournament(Id),
+    /// A study that was resumed: who created it is unknown.
+    Study(Id),
     /// Rooms that were resumed: who created them is unknown.
     Resumed,
 }
@@ -61,7 +63,7 @@ impl Key {
         match self {
             Self::Address(address) => address.is_loopback(),
             Self::Token(_) | Self::Proxies => false,
-            Self::Local | Self::Tournament(_) | Self::Resumed => true,
+            Self::Local | Self::Tournament(_) | Self::Study(_) | Self::Resumed => true,
         }
     }
 }

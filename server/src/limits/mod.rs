@@ -18,7 +18,7 @@ use std::time::Duration;
 pub use background::{Background, Turn};
 pub use calls::{
     Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
-    Executing,
+    Executing, HISTORY_STEP,
 };
 pub use frames::Metered;
 pub use key::{Key, Shares};

@@ -8,12 +8,13 @@ use super::{background, calls, frames};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
     MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_SEARCH_BUDGET,
-    MAX_SEARCH_ROLLOUTS, MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS,
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
-    VECTOR_SETUP_TIMEOUT,
+    MAX_SEARCH_ROLLOUTS, MAX_STUDIES, MAX_STUDY_STREAMS, MAX_TOURNAMENTS,
+    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
+    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
 use crate::room::MAX_SPECTATORS;
+use crate::webhooks::MAX_WAITING;
 use chefshat_room::{SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED};
 
 /// A number with commas between thousands.
@@ -65,6 +66,7 @@ fn of_all() -> String {
         ),
         ("spectators of a room", number(MAX_SPECTATORS), ""),
         ("tournaments that are not over", number(MAX_TOURNAMENTS), ""),
+        ("studies", number(MAX_STUDIES), ""),
         (
             "streams (play, watch, follow, read)",
             number(calls::MAX_STREAMS),
@@ -77,6 +79,12 @@ fn of_all() -> String {
             "",
         ),
         ("streams that follow tournaments", number(MAX_FOLLOWERS), ""),
+        ("streams that follow studies", number(MAX_FOLLOWERS), ""),
+        (
+            "streams that show studies to participants",
+            number(MAX_STUDY_STREAMS),
+            "",
+        ),
         (
             "answers that have not been read",
             format!(
@@ -92,6 +100,14 @@ fn of_all() -> String {
                 "{}; others wait for {}",
                 number(calls::MAX_EXECUTED),
                 seconds(calls::MAX_WAIT)
+            ),
+            "",
+        ),
+        (
+            "memory for streams of other nodes that spectators share, beyond their first bytes",
+            format!(
+                "{} MiB; then those who come later or read slowly have streams of their own",
+                calls::MAX_HISTORY >> 20
             ),
             "",
         ),
@@ -156,6 +172,11 @@ fn of_all() -> String {
                 seconds(background::BURST)
             ),
             "`--built-in-rate`",
+        ),
+        (
+            "webhooks that wait for their receiver",
+            format!("{}; further ones are dropped", number(MAX_WAITING)),
+            "",
         ),
     ];
     let rows = rows.map(|(what, most, flag)| [what.to_owned(), most, flag.to_owned()]);

@@ -10,8 +10,8 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotAttached, Ruled,
-    SeatAction, SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, MarkOutcome,
+    MarkRequest, Message, NotAttached, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
@@ -33,6 +33,7 @@ pub struct Handle {
     mailbox: mpsc::Sender<Message>,
     resting: Arc<Resting<Room>>,
     fence: CancellationToken,
+    clock: RoomClock,
 }
 
 /// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
@@ -52,6 +53,7 @@ pub fn spawn_room(
         mailbox,
         resting,
         fence,
+        clock,
     }
 }
 
@@ -65,6 +67,11 @@ impl Handle {
     /// The id of the room.
     pub fn id(&self) -> Id {
         self.id
+    }
+
+    /// Its clock, which measures the times of its events.
+    pub fn clock(&self) -> RoomClock {
+        self.clock
     }
 
     /// Whether the room has stopped: it has ended, or its game resumes elsewhere or later.
@@ -282,6 +289,28 @@ impl Handle {
     /// The room is gone, or (inner result) too many watch it.
     pub async fn watch_table(&self, secret: [u8; 32]) -> Result<Option<Watching>, RoomGone> {
         self.ask(|reply| Message::WatchTable(secret, reply)).await
+    }
+
+    /// Adds a marker; `None` if the token is not the owner's.
+    ///
+    /// # Errors
+    /// The room is gone, or (inner result) the marker is refused.
+    pub async fn mark(&self, request: MarkRequest) -> Result<Option<MarkOutcome>, RoomGone> {
+        self.ask(|reply| Message::Mark(Box::new(request), reply))
+            .await
+    }
+
+    /// Follows the markers from a position on; `None` if the token is not the owner's.
+    ///
+    /// # Errors
+    /// The room is gone, or (inner result) too many follow them.
+    pub async fn follow_markers(
+        &self,
+        secret: [u8; 32],
+        position: usize,
+    ) -> Result<Option<Following>, RoomGone> {
+        self.ask(|reply| Message::FollowMarkers(secret, position, reply))
+            .await
     }
 
     /// Gives up a seat whose participant has left the tournament: a substitute plays until the end. A

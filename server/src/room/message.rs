@@ -8,15 +8,16 @@ use chefshat_proto::v1;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 
+use super::markers::MarkerFollower;
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
 use crate::limits::{Hint, Key};
 use crate::outbox::{HandStamp, OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
-use chefshat_room::journal::{AbortReason, ParticipantKind};
+use chefshat_room::journal::{AbortReason, Marked, ParticipantKind};
 use chefshat_room::{
-    Answer, ConnectionId, ExpressError, HintError, JoinError, LeaveError, ReportError,
+    Answer, ConnectionId, ExpressError, HintError, JoinError, LeaveError, MarkError, ReportError,
 };
 
 /// A request for a seat.
@@ -149,6 +150,8 @@ pub enum SeatAction {
     Express {
         /// For the record only.
         record_only: bool,
+        /// The seat that it is about, if it is about one.
+        about: Option<u32>,
         /// The expression, encoded.
         expression: Box<[u8]>,
     },
@@ -175,6 +178,20 @@ pub(super) type Hinted = Result<Hint, HintError>;
 pub type Ruled = Result<Box<v1::ReportResponse>, ReportRefusal>;
 /// The states of a table, from the current one on.
 pub type Watching = Result<watch::Receiver<SentState>, SpectateError>;
+
+/// A request for a marker.
+#[derive(Debug)]
+pub struct MarkRequest {
+    /// The secret of the owner's token.
+    pub secret: [u8; 32],
+    /// What is marked.
+    pub marked: Marked,
+}
+
+/// The result of a request for a marker.
+pub(super) type MarkOutcome = Result<v1::Marker, MarkError>;
+/// A stream that follows markers.
+pub(super) type Following = Result<MarkerFollower, SpectateError>;
 
 /// A message to a room.
 pub(super) enum Message {
@@ -211,6 +228,10 @@ pub(super) enum Message {
         oneshot::Sender<Option<Ruled>>,
     ),
     WatchTable([u8; 32], oneshot::Sender<Option<Watching>>),
+    /// Adds a marker.
+    Mark(Box<MarkRequest>, oneshot::Sender<Option<MarkOutcome>>),
+    /// Follows the markers from this position on, with the secret of the owner's token.
+    FollowMarkers([u8; 32], usize, oneshot::Sender<Option<Following>>),
     /// The participant of a seat has left the tournament.
     Retire(Seat),
     Abort(AbortReason),

@@ -2,10 +2,11 @@
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
 //! which sends it the messages in `message`, or handles an answer in place through `resting`;
 //! `clients` are those that took seats; `observed` counts and traces; `table_view` is what those who
-//! attend to a physical table see.
+//! attend to a physical table see, `markers` what the owner follows.
 
 mod clients;
 mod handle;
+mod markers;
 mod message;
 mod observed;
 mod resting;
@@ -16,9 +17,10 @@ mod task;
 mod tests;
 
 pub use handle::{Handle, RoomGone, spawn_room};
+pub use markers::MarkerFollower;
 pub use message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, NotAttached, ReportRefusal, Ruled,
-    SeatAction, SpectateError, SpectateRequest, Supersedes, Watching,
+    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkRequest, NotAttached,
+    ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Supersedes, Watching,
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use table_view::SentState;

@@ -4,6 +4,7 @@
 //! spectator that falls too far behind is disconnected.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,8 +56,8 @@ pub struct Subscriber {
     position: usize,
     /// Updates for the next flush.
     pending: Updates,
-    /// Whom the game waited for when that was last sent: the seat, its decision, whether it is away.
-    awaited: Option<(Seat, u64, bool)>,
+    /// [`Awaited::key`] of what was last sent.
+    awaited: Option<(Seat, u64, bool, bool)>,
     stalled: bool,
     ended: bool,
     role: Role,
@@ -314,16 +315,11 @@ impl Subscriber {
 
     /// Sends what is due. `urgent`: send now even if the seat receives events with its decisions.
     /// Returns `false` when nothing more can follow.
-    pub fn deliver(
-        &mut self,
-        core: &Core,
-        public: &PublicEvents,
-        now: Duration,
-        urgent: bool,
-    ) -> bool {
+    pub fn deliver(&mut self, news: &Publication<'_>, urgent: bool) -> bool {
         if self.ended {
             return false;
         }
+        let (core, public, now) = (news.core, news.public, news.now);
         let visible = match &self.role {
             Role::Seat(_) => core.log().len(),
             Role::Spectator { .. } => core.visible_to_spectators(),
@@ -333,8 +329,8 @@ impl Subscriber {
             core.awaited()
                 .filter(|open| open.decision.seat == connection.seat && open.id != connection.sent)
         });
-        let awaited = self.awaited_of(core);
-        let key = awaited.map(|it| (it.seat, it.decision, it.away));
+        let awaited = self.awaited_of(news);
+        let key = awaited.map(|it| it.key());
         let awaits_another = !over && key != self.awaited;
         let backlog = visible - self.position;
         let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
@@ -394,13 +390,14 @@ impl Subscriber {
     }
 
     /// Whom the game waits for, if the subscriber is told: not its own seat.
-    fn awaited_of(&self, core: &Core) -> Option<Awaited> {
+    fn awaited_of(&self, news: &Publication<'_>) -> Option<Awaited> {
+        let policy = &news.core.header().policy;
         let own = match &self.role {
             Role::Seat(connection) if connection.options.at_once => Some(connection.seat),
-            Role::Spectator { .. } if core.header().policy.spectator_delay_decisions == 0 => None,
+            Role::Spectator { .. } if policy.spectator_delay_decisions == 0 => None,
             Role::Seat(_) | Role::Spectator { .. } => return None,
         };
-        (core.awaited_in_public()).filter(|awaited| Some(awaited.seat) != own)
+        news.awaited().filter(|awaited| Some(awaited.seat) != own)
     }
 
     /// Adds the events up to a position to the pending updates.
@@ -468,6 +465,31 @@ impl std::fmt::Debug for Subscriber {
             .debug_struct("Subscriber")
             .field("position", &self.position)
             .finish_non_exhaustive()
+    }
+}
+
+/// What a room publishes to its subscribers at one time.
+pub struct Publication<'a> {
+    core: &'a Core,
+    public: &'a PublicEvents,
+    now: Duration,
+    awaited: OnceCell<Option<Awaited>>,
+}
+
+impl<'a> Publication<'a> {
+    /// The state of a room, with its public events encoded.
+    pub fn new(core: &'a Core, public: &'a PublicEvents, now: Duration) -> Self {
+        Self {
+            core,
+            public,
+            now,
+            awaited: OnceCell::new(),
+        }
+    }
+
+    /// Whom the game waits for, found once for all subscribers who are told.
+    fn awaited(&self) -> Option<Awaited> {
+        *(self.awaited.get_or_init(|| self.core.awaited_in_public()))
     }
 }
 

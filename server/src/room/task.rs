@@ -28,14 +28,17 @@ use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tracing::{Instrument as _, debug, error, info, warn};
 
 use super::clients::Clients;
+use super::markers::MarkerLog;
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Hinted, JoinRequest, Joined, Message, NotAttached,
-    NotifySpace, ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, MarkOutcome,
+    MarkRequest, Message, NotAttached, NotifySpace, ReportRefusal, Ruled, SeatAction,
+    SpectateError, SpectateRequest, Watching,
 };
 use super::observed::Observed;
 use super::resting::Resting;
 use super::subscriber::{
-    MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent,
+    MAX_PENDING_EVENTS, MAX_SPECTATORS, PublicEvents, Publication, SeatConnection, Subscriber,
+    is_urgent,
 };
 use super::table_view::TableView;
 use crate::clock::RoomClock;
@@ -48,11 +51,13 @@ use crate::outbox::{HandStamp, OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::store::{Journal, Signed, Store, StoreError};
+use crate::webhooks::Webhooks;
 
 /// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;
-/// How often a node reads a journal to sign the record, and the pause before the next time.
-const SIGNING_ATTEMPTS: u32 = 10;
+/// How long a node tries to read a journal to sign the record, as long as its store tries to commit
+/// the end of the game, and the pause before the next attempt.
+const SIGNING_LIMIT: Duration = Duration::from_mins(5);
 const SIGNING_PAUSE: Duration = Duration::from_secs(1);
 /// Most events that a room of built-in agents keeps for spectators who come late. Its record has
 /// all of them.
@@ -85,6 +90,8 @@ pub struct TaskContext {
     pub searches: Arc<Searches>,
     /// What lets a node of a cluster publish; `None` in a single server, which always may.
     pub lease: Option<Arc<NodeLease>>,
+    /// Announces rooms and ends of games.
+    pub webhooks: Webhooks,
     /// Who created the room.
     pub owner: Key,
     /// How much of each limit one caller may use.
@@ -138,6 +145,7 @@ pub(super) fn spawn(
         timer_at: None,
         answers_in_place: false,
         table: physical.then(|| Box::new(TableView::new())),
+        markers: None,
         observed,
         context: context.clone(),
     });
@@ -174,6 +182,9 @@ enum Release {
     Reported(oneshot::Sender<Option<Ruled>>, ReportOutcome),
     WatchTable(oneshot::Sender<Option<Watching>>),
     Hint(oneshot::Sender<Option<Hinted>>, Hint),
+    /// The marker with this number.
+    Marked(oneshot::Sender<Option<MarkOutcome>>, usize),
+    FollowMarkers(usize, oneshot::Sender<Option<Following>>),
 }
 
 /// The state of a room: its core, journal and subscribers.
@@ -211,6 +222,8 @@ pub(super) struct Room {
     answers_in_place: bool,
     /// The physical table, if the room has one.
     table: Option<Box<TableView>>,
+    /// The markers, if anybody has followed them.
+    markers: Option<Box<MarkerLog>>,
     observed: Observed,
     context: TaskContext,
 }
@@ -530,6 +543,13 @@ impl Room {
                 true => self.releases.push(Release::WatchTable(reply)),
                 false => answer(reply, None),
             },
+            Message::Mark(request, reply) => self.mark(*request, reply),
+            Message::FollowMarkers(secret, position, reply) => {
+                match self.core.header().owner.matches(&secret) {
+                    true => self.releases.push(Release::FollowMarkers(position, reply)),
+                    false => answer(reply, None),
+                }
+            }
             Message::Retire(seat) => self.retire(seat),
             Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::Suspend => self.suspended = true,
@@ -624,14 +644,10 @@ impl Room {
     /// Gives up a seat whose participant has left the tournament.
     fn retire(&mut self, seat: Seat) {
         let handed = self.handed();
+        self.core.retire(self.now, seat, handed);
         if let Some(mut subscriber) = self.connections[seat.index()].take() {
-            let connection = subscriber.connection().map(|attached| attached.id);
-            if let Some(connection) = connection {
-                self.core.lost(self.now, seat, connection, handed);
-            }
             subscriber.detach(v1::DetachReason::Requested);
         }
-        self.core.retire(self.now, seat);
     }
 
     fn is_current(&self, seat: Seat, connection: ConnectionId) -> bool {
@@ -674,10 +690,11 @@ impl Room {
             }
             SeatAction::Express {
                 record_only,
+                about,
                 expression,
             } => self
                 .core
-                .express(self.now, seat, record_only, expression)
+                .express(self.now, seat, record_only, about, expression)
                 .map(|()| None),
             SeatAction::Resume => {
                 self.core.resume(self.now, seat);
@@ -712,6 +729,17 @@ impl Room {
             table.keep_picture(&self.core, message);
         }
         Some(outcome)
+    }
+
+    /// Adds a marker, and answers once it is committed.
+    fn mark(&mut self, request: MarkRequest, reply: oneshot::Sender<Option<MarkOutcome>>) {
+        if !self.core.header().owner.matches(&request.secret) {
+            return answer(reply, None);
+        }
+        match self.core.mark(self.now, request.marked) {
+            Ok(number) => self.releases.push(Release::Marked(reply, number)),
+            Err(error) => answer(reply, Some(Err(error))),
+        }
     }
 
     fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
@@ -809,6 +837,9 @@ impl Room {
         if let Some(table) = &self.table {
             table.follow(&self.core, self.now);
         }
+        if let Some(markers) = &self.markers {
+            markers.follow(&self.core);
+        }
         self.deliver();
         self.observed.trace_decision(&self.core);
         let metrics = &self.context.metrics;
@@ -865,6 +896,18 @@ impl Room {
                 let response = convert::report_response(&outcome, state);
                 answer(reply, Some(Ok(Box::new(response))));
             }
+            Release::Marked(reply, number) => {
+                let marker = &self.core.markers()[number - 1];
+                let marker = convert::marker_to_proto(number - 1, marker);
+                answer(reply, Some(Ok(marker)));
+            }
+            Release::FollowMarkers(position, reply) => {
+                let core = &self.core;
+                let log = (self.markers).get_or_insert_with(|| Box::new(MarkerLog::new(core)));
+                log.follow(core);
+                let following = log.subscribe(position).ok_or(SpectateError::Full);
+                answer(reply, Some(following));
+            }
             Release::WatchTable(reply) => {
                 let watching = (self.table.as_ref())
                     .and_then(|table| table.watch(&self.core, self.now))
@@ -881,6 +924,10 @@ impl Room {
         connection: ConnectionId,
         reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
     ) {
+        // Its participant may have left or been removed in the same batch.
+        if self.core.seat_of_ticket(&request.secret) != Some(seat) {
+            return answer(reply, Err(NotAttached::TicketUnknown));
+        }
         let participant = self.core.standing(seat).participant;
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
         let stamp = HandStamp::new(self.clock);
@@ -896,7 +943,8 @@ impl Room {
         let mut subscriber =
             Subscriber::seat(connected, request.outbox, Arc::clone(&self.on_space));
         subscriber.confirm_attached(&self.core, request.request_id, request.assigned_ticket);
-        subscriber.deliver(&self.core, &self.public, self.now, true);
+        let news = Publication::new(&self.core, &self.public, self.now);
+        subscriber.deliver(&news, true);
         if let Some(mut older) = self.connections[seat.index()].replace(subscriber) {
             older.detach(v1::DetachReason::Superseded);
         }
@@ -935,17 +983,18 @@ impl Room {
     /// Sends updates that are due. Visits only connections for which some may be: with many rooms,
     /// each visit costs several cache misses.
     fn deliver(&mut self) {
-        let news = self.core.log().since(self.delivered);
+        let events = self.core.log().since(self.delivered);
         let length = self.core.log().len();
+        let news = Publication::new(&self.core, &self.public, self.now);
         let awaited = self.core.awaited().map(|open| open.decision.seat);
         let all = length >= self.backlog_due_at || self.core.state().is_over();
         for seat in self.core.all_seats() {
-            let urgent = news.clone().any(|entry| is_urgent(&entry.event, seat));
+            let urgent = events.clone().any(|entry| is_urgent(&entry.event, seat));
             let always_visit = &mut self.always_visit[seat.index()];
             if (all || urgent || *always_visit || awaited == Some(seat))
                 && let Some(subscriber) = &mut self.connections[seat.index()]
             {
-                subscriber.deliver(&self.core, &self.public, self.now, urgent);
+                subscriber.deliver(&news, urgent);
                 *always_visit = subscriber.must_always_be_visited();
             }
         }
@@ -955,9 +1004,8 @@ impl Room {
             self.backlog_due_at = due_at.unwrap_or(length + MAX_PENDING_EVENTS);
         }
         self.delivered = length;
-        let (core, public, now) = (&self.core, &self.public, self.now);
         self.spectators
-            .retain_mut(|spectator| spectator.deliver(core, public, now, false));
+            .retain_mut(|spectator| spectator.deliver(&news, false));
     }
 
     /// Handles the end of the game: finishes the journal and writes the record.
@@ -967,6 +1015,7 @@ impl Room {
         // A game without a deal has no record.
         let summary = self.core.game().map(|_| convert::summary(&self.core));
         let has_record = summary.is_some();
+        let announced = summary.clone().filter(|_| self.context.webhooks.is_on());
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
         let signed = match has_record {
             true => self.sign().await,
@@ -984,6 +1033,7 @@ impl Room {
             self.fail(&error);
             return false;
         }
+        (self.context.webhooks).game_ended(&header, announced.as_ref());
         info!(
             room = %header.room_id,
             game = %header.game_id,
@@ -1010,10 +1060,11 @@ impl Room {
         let background = background.then_some((&*self.context.background, self.context.owner));
         let header = self.core.header();
         let (game, unit) = (header.game_id, header.unit());
-        let mut attempts = match self.context.lease {
-            Some(_) => SIGNING_ATTEMPTS,
-            None => 1,
+        let limit = match self.context.lease {
+            Some(_) => SIGNING_LIMIT,
+            None => Duration::ZERO,
         };
+        let began = Instant::now();
         loop {
             let header = Arc::clone(self.core.header());
             let journal = &mut *self.journal;
@@ -1022,8 +1073,7 @@ impl Room {
                 Ok(signed) => return Ok(signed),
                 Err(error) => error,
             };
-            attempts -= 1;
-            if attempts == 0 {
+            if began.elapsed() >= limit {
                 error!(%game, %error, "a record could not be signed; it stays unsigned");
                 return Ok(None);
             }

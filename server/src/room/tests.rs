@@ -18,10 +18,11 @@ use tokio_util::task::TaskTracker;
 
 use super::subscriber::DeliveryOptions;
 use super::{
-    AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, RoomWatcher, SeatAction, SpectateError,
-    SpectateRequest, Supersedes, TaskContext, spawn_room,
+    AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, NotAttached, RoomWatcher, SeatAction,
+    SpectateError, SpectateRequest, Supersedes, TaskContext, spawn_room,
 };
 use crate::clock::RoomClock;
+use crate::cluster::NodeLease;
 use crate::limits::{Background, Key, Searches, Shares};
 use crate::metrics::{Metrics, SearchOutcome};
 use crate::outbox::StreamEnd;
@@ -29,6 +30,7 @@ use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::store::{Journal, MemoryStore, Signed, Store as _, StoreError};
+use crate::webhooks::Webhooks;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, Policy};
@@ -64,6 +66,17 @@ async fn room_of(
     metrics: Arc<Metrics>,
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
+    room_of_node(None, fills, policy, shifts, metrics, change).await
+}
+
+async fn room_of_node(
+    lease: Option<Arc<NodeLease>>,
+    fills: Vec<Fill>,
+    policy: Policy,
+    shifts: u32,
+    metrics: Arc<Metrics>,
+    change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
+) -> Handle {
     let header = Arc::new(GameHeader {
         room_id: Id([1; 16]),
         game_id: Id([2; 16]),
@@ -77,6 +90,7 @@ async fn room_of(
         rules_version: RULES_VERSION,
         policy,
         display_names: BTreeMap::new(),
+        wizards: std::collections::BTreeSet::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         fills,
@@ -86,6 +100,7 @@ async fn room_of(
         owner: SecretHash::of(b"owner"),
         tournament: None,
         table: None,
+        study: None,
     });
     let store = Arc::new(MemoryStore::default());
     let journal = store
@@ -101,7 +116,7 @@ async fn room_of(
         None,
         change(journal),
         TaskContext {
-            lease: None,
+            lease,
             signer: Signer::new(Some(Arc::new(SigningKey::from_seed(&[7; 32])))),
             record_writer: RecordWriter::new(
                 store.clone(),
@@ -117,6 +132,7 @@ async fn room_of(
             watcher: Arc::new(NullWatcher),
             background,
             searches: Arc::new(searches),
+            webhooks: Webhooks::default(),
             owner: Key::Local,
             shares: Shares::default(),
         },
@@ -145,27 +161,31 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
     attach(room, joined.ticket).await
 }
 
+fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
+    AttachRequest {
+        secret: ticket.secret,
+        request_id: 0,
+        outbox,
+        handle: 0,
+        options: DeliveryOptions {
+            at_once: true,
+            no_mask: false,
+            snapshot: false,
+            from: 0,
+        },
+        by_gateway: false,
+        supersedes: Supersedes::Any,
+        entropy: Vec::new(),
+        arrived: Instant::now(),
+        detached: Arc::default(),
+        assigned_ticket: None,
+    }
+}
+
 async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
     let attached = room
-        .attach(AttachRequest {
-            secret: ticket.secret,
-            request_id: 0,
-            outbox,
-            handle: 0,
-            options: DeliveryOptions {
-                at_once: true,
-                no_mask: false,
-                snapshot: false,
-                from: 0,
-            },
-            by_gateway: false,
-            supersedes: Supersedes::Any,
-            entropy: Vec::new(),
-            arrived: Instant::now(),
-            detached: Arc::default(),
-            assigned_ticket: None,
-        })
+        .attach(attachment(&ticket, outbox))
         .await
         .expect("the room exists")
         .expect("a valid ticket");
@@ -243,6 +263,38 @@ async fn a_stalled_stream_delays_nobody_and_misses_nothing() {
     // And a seat that attaches only now.
     let mut late = attach(&room, stalled.ticket).await;
     assert_eq!(read(&room, &mut late, false).await, expected);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_seat_that_is_given_up_in_the_batch_of_its_attachment_is_not_attached() {
+    // By the tournament, while the game is played.
+    let room = room(Policy::default(), 1).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let removed = &seats[0];
+    let (outbox, mut updates) = Outbox::new();
+    let again = room.attach(attachment(&removed.ticket, outbox));
+    let (again, ()) = tokio::join!(again, room.retire(removed.seat));
+    assert!(matches!(again, Ok(Err(NotAttached::TicketUnknown))));
+    assert!(
+        updates.next().now_or_never().flatten().is_none(),
+        "nothing was sent"
+    );
+    let described = room.describe().await.expect("the room exists");
+    let seat = &described.seats[removed.seat.index()];
+    assert!(seat.substituted && !seat.connected, "{seat:?}");
+    // By its participant, before the game.
+    let room = self::room(Policy::default(), 1).await;
+    let seat = take_seat(&room).await;
+    let (outbox, _updates) = Outbox::new();
+    let again = room.attach(attachment(&seat.ticket, outbox));
+    let (again, left) = tokio::join!(again, room.leave(seat.ticket.secret));
+    assert!(matches!(again, Ok(Err(NotAttached::TicketUnknown))));
+    assert!(matches!(left, Ok(Some(Ok(_)))));
+    let described = room.describe().await.expect("the room exists");
+    assert!(!described.seats[seat.seat.index()].connected);
 }
 
 #[tokio::test(start_paused = true)]
@@ -476,7 +528,8 @@ async fn check_streams_end_after_panic(at_once: bool) {
 
 /// A journal that may fail to read back, and reports whether its game ends with a signature.
 struct Observed {
-    readable: bool,
+    /// How often reading fails before it succeeds.
+    failures: u32,
     signed: Arc<OnceLock<bool>>,
     journal: Box<dyn Journal>,
 }
@@ -490,9 +543,12 @@ impl Journal for Observed {
     }
 
     fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        match self.readable {
-            true => self.journal.entries(),
-            false => ready(Err(StoreError::Failed("no reader is free".into()))).boxed(),
+        match self.failures.checked_sub(1) {
+            None => self.journal.entries(),
+            Some(left) => {
+                self.failures = left;
+                ready(Err(StoreError::Failed("no reader is free".into()))).boxed()
+            }
         }
     }
 
@@ -508,15 +564,30 @@ impl Journal for Observed {
 
 #[tokio::test(start_paused = true)]
 async fn a_game_that_cannot_be_read_back_ends_unsigned() {
-    for readable in [true, false] {
+    let lease = Arc::new(NodeLease::new());
+    lease.set(Instant::now() + Duration::from_hours(1_000));
+    // A node waits for its database as long as it does to commit the end.
+    for (lease, failures, is_signed) in [
+        (None, 0, true),
+        (None, 1, false),
+        (Some(&lease), 200, true),
+        (Some(&lease), u32::MAX, false),
+    ] {
         let signed = Arc::new(OnceLock::new());
-        let room = room_with(Policy::default(), 1, |journal| {
-            Box::new(Observed {
-                readable,
-                signed: Arc::clone(&signed),
-                journal,
-            })
-        });
+        let room = room_of_node(
+            lease.cloned(),
+            vec![FREE; 4],
+            Policy::default(),
+            1,
+            Arc::default(),
+            |journal| {
+                Box::new(Observed {
+                    failures,
+                    signed: Arc::clone(&signed),
+                    journal,
+                })
+            },
+        );
         let room = room.await;
         let mut seats = Vec::new();
         for _ in 0..4 {
@@ -524,7 +595,7 @@ async fn a_game_that_cannot_be_read_back_ends_unsigned() {
         }
         let reads = seats.iter_mut().map(|seat| read(&room, seat, true));
         futures::future::join_all(reads).await;
-        assert_eq!(signed.get(), Some(&readable));
+        assert_eq!(signed.get(), Some(&is_signed));
     }
 }
 

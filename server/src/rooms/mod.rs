@@ -30,9 +30,12 @@ use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
 use crate::signing::Signer;
 use crate::store::{Store, StoreError};
+use crate::webhooks::Webhooks;
 use chefshat_room::Core;
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
-use chefshat_room::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
+use chefshat_room::journal::{
+    Fill, GameHeader, GameStart, SeatedParticipant, StudyGame, TournamentGame,
+};
 use chefshat_room::policy::{Durability, Policy};
 pub use table::CreateError;
 use table::{Entry, Table};
@@ -54,6 +57,8 @@ pub struct NewRoom {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
+    /// Open seats that a person plays as the kind that they are reserved for.
+    pub wizards: BTreeSet<usize>,
     /// Display names of built-in agents, by seat, if set.
     pub display_names: BTreeMap<usize, String>,
     /// The recorded players of seats that replay one, by seat.
@@ -64,7 +69,7 @@ pub struct NewRoom {
     pub game_seed: Option<[u8; 32]>,
     /// Whether the cards are real.
     pub physical: bool,
-    /// The participants seated from the start, if a tournament creates the room.
+    /// The participants seated from the start, if a tournament or study creates the room.
     pub seating: Option<Seating>,
     /// The request for it, if it can be repeated.
     pub request: Option<RequestKey>,
@@ -72,12 +77,12 @@ pub struct NewRoom {
     pub charged: Key,
 }
 
-/// The part of a room's settings that a tournament decides.
+/// The part of a room's settings that a tournament or study decides.
 #[derive(Debug)]
 pub struct Seating {
-    /// The id of its game's tournament and series.
-    pub game: TournamentGame,
-    /// The room's owner token, with the id that the tournament has committed before.
+    /// What its game is part of.
+    pub part_of: PartOf,
+    /// The room's owner token, with the id that the tournament or study has committed before.
     pub owner: Token,
     /// The game's id.
     pub game_id: Id,
@@ -85,6 +90,31 @@ pub struct Seating {
     pub participants: BTreeMap<usize, SeatedParticipant>,
     /// The server's part of the seed, if several games share the deals.
     pub server_seed: Option<[u8; 32]>,
+}
+
+/// What a game is part of.
+#[derive(Debug, Clone)]
+pub enum PartOf {
+    /// A tournament, and perhaps a series.
+    Tournament(TournamentGame),
+    /// A study.
+    Study(Arc<StudyGame>),
+}
+
+impl PartOf {
+    fn tournament(&self) -> Option<TournamentGame> {
+        match self {
+            Self::Tournament(game) => Some(*game),
+            Self::Study(_) => None,
+        }
+    }
+
+    fn study(&self) -> Option<&Arc<StudyGame>> {
+        match self {
+            Self::Tournament(_) => None,
+            Self::Study(game) => Some(game),
+        }
+    }
 }
 
 /// A new room with its secrets.
@@ -152,6 +182,9 @@ impl Rooms {
         let background = Background::new(config.shares, config.built_in_decisions_per_second)?;
         let background = Arc::new(background);
         let searches = Arc::new(Searches::new(Arc::clone(&metrics))?);
+        let webhooks = (config.webhooks.clone())
+            .map(|settings| Webhooks::new(settings, Arc::clone(&metrics)))
+            .unwrap_or_default();
         Ok(Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
             closed: Mutex::default(),
@@ -175,6 +208,7 @@ impl Rooms {
                 background,
                 searches,
                 lease,
+                webhooks,
                 owner: Key::Resumed,
                 shares: config.shares,
             },
@@ -183,6 +217,11 @@ impl Rooms {
             places: Places::new(config.max_rooms, config.shares),
             shares: config.shares,
         }))
+    }
+
+    /// What announces rooms, games and tournaments.
+    pub fn webhooks(&self) -> &Webhooks {
+        &self.context.webhooks
     }
 
     /// The public key that signs records, if the server has one.
@@ -286,6 +325,15 @@ impl Rooms {
         let table = self.lock();
         let entry = table.by_number.get(table.numbers.get(&id)?)?;
         (!entry.suspended).then_some(entry.over)
+    }
+
+    /// Removes a room whose game is over: it shows a participant whose data are deleted.
+    pub fn forget(&self, id: Id) {
+        let mut table = self.lock();
+        let over = table.get(id).is_some_and(|entry| entry.over);
+        if let Some(number) = table.numbers.get(&id).copied().filter(|_| over) {
+            table.remove(number);
+        }
     }
 
     /// Completes when a game has ended or a room is gone after this call.
@@ -500,7 +548,8 @@ impl Reservation {
     fn of(rooms: &Arc<Rooms>, owner: Token, new: &NewRoom) -> Result<Claim, CreateError> {
         let charged = new.charged;
         let seating = new.seating.as_ref();
-        let unit = seating.map_or(owner.room, |seating| seating.game.tournament);
+        let tournament = seating.and_then(|seating| seating.part_of.tournament());
+        let unit = tournament.map_or(owner.room, |game| game.tournament);
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.room) {
             return match entry.header.owner.matches(&owner.secret) {
@@ -532,6 +581,8 @@ impl Reservation {
         let server_seed = seating.and_then(|seating| seating.server_seed);
         let owner = self.owner;
         let room_id = owner.room;
+        // Before the commit, which takes time: the room's clock starts at `created_at_ms`.
+        let clock = RoomClock::of_age(Duration::ZERO);
         let mut header = Arc::new(GameHeader {
             room_id,
             game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
@@ -540,6 +591,7 @@ impl Reservation {
             policy: new.policy,
             rules_version: RULES_VERSION,
             fills: new.fills,
+            wizards: new.wizards,
             display_names: new.display_names,
             recorded: new.recorded,
             start: new.start,
@@ -553,7 +605,8 @@ impl Reservation {
             created_at_ms: since_epoch_ms(),
             join_code: join_code(),
             owner: owner.hash(),
-            tournament: seating.map(|seating| seating.game),
+            tournament: seating.and_then(|seating| seating.part_of.tournament()),
+            study: seating.and_then(|seating| seating.part_of.study()).cloned(),
             table: new.physical.then(|| Token::of_table(&owner).hash()),
         });
         let participants = new.seating.map_or_else(BTreeMap::new, |it| it.participants);
@@ -581,7 +634,6 @@ impl Reservation {
         // Checked and added under one lock, so that a shutdown in between cannot miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
-            let clock = RoomClock::of_age(Duration::ZERO);
             let context = TaskContext {
                 owner: new.charged,
                 ..rooms.context.clone()
@@ -601,6 +653,8 @@ impl Reservation {
                 listed: true,
                 place: self.place.take(),
             });
+            drop(table);
+            rooms.context.webhooks.room_created(&header);
             return Ok(Created {
                 handle,
                 join_code: header.join_code.clone(),

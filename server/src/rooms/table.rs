@@ -96,7 +96,12 @@ impl Table {
         let number = self.next_number;
         self.next_number += 1;
         self.numbers.insert(entry.handle.id(), number);
-        self.codes.insert(entry.header.join_code.clone(), number);
+        let code = entry.header.join_code.clone();
+        let taken_by = self.codes.get(&code).and_then(|it| self.by_number.get(it));
+        // The codes of rooms that are over are given to new ones, which are found by them.
+        if !(entry.over && taken_by.is_some_and(|other| !other.over)) {
+            self.codes.insert(code, number);
+        }
         self.by_number.insert(number, entry);
     }
 
@@ -139,7 +144,9 @@ impl Table {
     pub(super) fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
             self.numbers.remove(&entry.handle.id());
-            self.codes.remove(&entry.header.join_code);
+            if self.codes.get(&entry.header.join_code) == Some(&number) {
+                self.codes.remove(&entry.header.join_code);
+            }
         }
     }
 }

@@ -3,9 +3,9 @@
 use chefshat_engine::RuleSetSpec;
 
 use super::*;
-use crate::store::FailingStore;
+use crate::store::{FailingStore, MemoryStore, ResumableGame};
 use chefshat_room::ids::SecretHash;
-use chefshat_room::journal::ParticipantKind;
+use chefshat_room::journal::{AbortReason, Change, Entry, ParticipantKind};
 
 #[tokio::test]
 async fn participants_of_a_tournament_are_committed_with_their_room() {
@@ -26,6 +26,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         policy: Policy::default(),
         fills: vec![fill; 4],
         display_names: BTreeMap::new(),
+        wizards: std::collections::BTreeSet::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         game_seed: None,
@@ -33,10 +34,10 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         request: None,
         charged: Key::Local,
         seating: Some(Seating {
-            game: TournamentGame {
+            part_of: PartOf::Tournament(TournamentGame {
                 tournament: Id([1; 16]),
                 series: None,
-            },
+            }),
             owner: Token::random(Id([2; 16])),
             game_id: Id([3; 16]),
             participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
@@ -47,4 +48,54 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
     let room = made.handle.describe().await.expect("the room exists");
     let names: Vec<&str> = room.seats.iter().map(|seat| seat.name.as_str()).collect();
     assert_eq!(names, ["Ada", "", "Bo", ""]);
+}
+
+#[tokio::test]
+async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(
+        &ServerConfig::default(),
+        Arc::clone(&store) as _,
+        TaskTracker::new(),
+    );
+    let rooms = rooms.expect("threads");
+    let made = rooms.create(NewRoom {
+        name: "open".into(),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        policy: Policy::default(),
+        fills: vec![Fill::Open { reserved_for: None }; 4],
+        display_names: BTreeMap::new(),
+        wizards: std::collections::BTreeSet::new(),
+        recorded: BTreeMap::new(),
+        start: GameStart::default(),
+        game_seed: None,
+        physical: false,
+        request: None,
+        charged: Key::Local,
+        seating: None,
+    });
+    let open = made.await.expect("a room").handle.id();
+    let header = rooms.header(open).expect("it exists");
+    // Its code was that of a room that another node had.
+    let former = GameHeader {
+        room_id: Id([8; 16]),
+        game_id: Id([9; 16]),
+        ..(*header).clone()
+    };
+    let entries = vec![Entry {
+        at: Duration::ZERO,
+        change: Change::Aborted(AbortReason::Closed),
+    }];
+    let journal = store.create(Arc::new(former.clone()), entries.clone());
+    rooms
+        .show_ended(ResumableGame {
+            header: former,
+            entries,
+            journal: journal.await.expect("memory"),
+            concluded: true,
+        })
+        .await;
+    assert!(rooms.get(Id([8; 16])).is_some(), "it is shown");
+    let found = rooms.by_code(&header.join_code).expect("it is open");
+    assert_eq!(found.id(), open);
 }

@@ -191,7 +191,7 @@ fn calls(
         call(
             "SpectatorService/Watch",
             [&v1::SpectatorServiceWatchRequest {
-                room_id,
+                room_id: room_id.clone(),
                 from_sequence: 1,
                 ..v1::SpectatorServiceWatchRequest::default()
             }],
@@ -260,6 +260,29 @@ fn calls(
         call(
             "ServerService/GetActionTable",
             [&v1::GetActionTableRequest { faces: 11 }],
+        ),
+        call(
+            "InstrumentService/AddMarker",
+            [&v1::AddMarkerRequest {
+                room_id: room_id.clone(),
+                owner_token: room.owner_token.clone(),
+                label: "EEG on".into(),
+                elapsed_us: Some(1),
+            }],
+        ),
+        call(
+            "InstrumentService/FollowMarkers",
+            [&v1::FollowMarkersRequest {
+                room_id: room_id.clone(),
+                owner_token: room.owner_token.clone(),
+                from_number: 1,
+            }],
+        ),
+        call(
+            "ServerService/GetClock",
+            [&v1::GetClockRequest {
+                room_id: room_id.clone(),
+            }],
         ),
     ]
 }
@@ -368,7 +391,7 @@ async fn serve_edited(which: usize, edits: &Edits, frames: bool) {
     let closing = CancellationToken::new();
     let routes = routes(
         &server.rooms,
-        &server.tournaments,
+        (&server.tournaments, &server.studies),
         &server.calls,
         &server.connections,
         &server.config,

@@ -1,12 +1,14 @@
 //! Stores games in memory until the process ends.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
+use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
+use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
     Journal, Keep, Part, ResumableGame, Signed, Store, StoreError, StoredGame, matches_filter,
@@ -25,6 +27,15 @@ pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 #[derive(Debug, Default)]
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
+    studies: Mutex<BTreeMap<Id, StudyInMemory>>,
+}
+
+#[derive(Debug)]
+struct StudyInMemory {
+    header: Arc<StudyHeader>,
+    changes: Vec<StudyChange>,
+    rows: u64,
+    traces: Vec<StoredTraces>,
 }
 
 #[derive(Debug, Default)]
@@ -216,6 +227,80 @@ impl Store for MemoryStore {
         ready(Ok(Vec::new())).boxed()
     }
 
+    fn hosts_studies(&self) -> bool {
+        true
+    }
+
+    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
+        let id = header.id;
+        let created = match lock_studies(&self.studies).entry(id) {
+            btree_map::Entry::Occupied(_) => Err(StoreError::Taken(id)),
+            btree_map::Entry::Vacant(place) => {
+                place.insert(StudyInMemory {
+                    header,
+                    changes: Vec::new(),
+                    rows: 0,
+                    traces: Vec::new(),
+                });
+                Ok(())
+            }
+        };
+        ready(created).boxed()
+    }
+
+    fn append_study(
+        &self,
+        study: Id,
+        row: u64,
+        mut changes: Vec<StudyChange>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
+            study.changes.append(&mut changes);
+            study.rows = row + 1;
+        }
+        ready(Ok(())).boxed()
+    }
+
+    fn rewrite_study(
+        &self,
+        study: Id,
+        changes: Vec<StudyChange>,
+        forgotten: u32,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
+            (study.changes, study.rows) = (changes, 1);
+            study.traces.retain(|traces| traces.number != forgotten);
+        }
+        ready(Ok(())).boxed()
+    }
+
+    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+        let studies = lock_studies(&self.studies);
+        let stored = studies.get(&study).map(|study| StoredStudy {
+            header: StudyHeader::clone(&study.header),
+            changes: study.changes.clone(),
+            rows: study.rows,
+        });
+        ready(Ok(stored)).boxed()
+    }
+
+    fn append_traces(
+        &self,
+        study: Id,
+        traces: StoredTraces,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
+            study.traces.push(traces);
+        }
+        ready(Ok(())).boxed()
+    }
+
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        let studies = lock_studies(&self.studies);
+        let traces = studies.get(&study).map(|study| study.traces.clone());
+        ready(Ok(traces.unwrap_or_default())).boxed()
+    }
+
     fn failed(&self) -> BoxFuture<'static, StoreError> {
         pending().boxed()
     }
@@ -282,6 +367,14 @@ fn listed<'a>(
 
 fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {
     finished
+        .lock()
+        .expect("no code that holds this lock can panic")
+}
+
+fn lock_studies(
+    studies: &Mutex<BTreeMap<Id, StudyInMemory>>,
+) -> MutexGuard<'_, BTreeMap<Id, StudyInMemory>> {
+    studies
         .lock()
         .expect("no code that holds this lock can panic")
 }

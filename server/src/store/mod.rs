@@ -9,6 +9,7 @@ mod form;
 mod memory;
 mod postgres;
 mod sqlite;
+pub mod studies;
 #[cfg(test)]
 mod tests;
 pub mod tournaments;
@@ -16,6 +17,7 @@ pub mod tournaments;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
+use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
@@ -32,6 +34,7 @@ pub use sqlite::{
 use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
+use studies::{StoredStudy, StoredTraces, StudyHeader};
 use tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store failed, with advice.
@@ -214,10 +217,61 @@ pub trait Store: Send + Sync + 'static {
         &self,
         newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>>;
+    /// Whether it stores studies. If not, their methods fail.
+    fn hosts_studies(&self) -> bool {
+        false
+    }
+    /// Creates a study.
+    fn create_study(&self, _header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// Adds row `row` (from 0) to the journal of a study.
+    fn append_study(
+        &self,
+        _study: Id,
+        _row: u64,
+        _changes: Vec<StudyChange>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// Replaces the journal of a study by one row, and deletes the interface traces of a
+    /// participant, in one commit.
+    fn rewrite_study(
+        &self,
+        _study: Id,
+        _changes: Vec<StudyChange>,
+        _forgotten: u32,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// A study, or `None`.
+    fn study(&self, _study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// The ids of all studies, oldest first.
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
+    }
+    /// Adds interface traces to those of a participant's game.
+    fn append_traces(
+        &self,
+        _study: Id,
+        _traces: StoredTraces,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// The interface traces of a study, in the order in which they were added.
+    fn traces(&self, _study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
     /// Waits until the store fails for good.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Closes the store; it must not be used afterwards.
     fn close(&self) -> BoxFuture<'_, ()>;
+}
+
+fn no_studies() -> StoreError {
+    StoreError::Failed("this store has no studies".to_owned())
 }
 
 impl std::fmt::Debug for dyn Store {

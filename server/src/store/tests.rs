@@ -1,6 +1,7 @@
 //! Behavior that all stores share. Each test runs with games in memory, in SQLite and in PostgreSQL.
 
 mod lists;
+mod studies;
 mod tournaments;
 
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
@@ -41,6 +42,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
         rules_version: RULES_VERSION,
         fills: vec![Fill::Open { reserved_for: None }; 4],
         display_names: Default::default(),
+        wizards: std::collections::BTreeSet::new(),
         recorded: Default::default(),
         start: GameStart::default(),
         seed: SeedPlan::Fixed {
@@ -51,6 +53,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
         owner: SecretHash::of(b"owner"),
         tournament: None,
         table: None,
+        study: None,
     })
 }
 

@@ -2,14 +2,15 @@
 //! they are possible.
 
 use chefshat_agents::NamedAgent;
-use chefshat_tournament::{ByHandProblem, Entrant, MAX_GAMES_AT_A_TIME};
+use chefshat_tournament::{ByHandProblem, Entrant, Leaving, State};
 
-use super::handle::TournamentHandle;
-use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Stopped};
+use super::handle::{TournamentHandle, TournamentState};
+use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Stopped, Who};
 use super::task::Task;
+use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
+use crate::limits::Key;
 use crate::store::tournaments::TournamentEntry;
-use chefshat_room::ids::Token;
-use chefshat_room::journal::ParticipantKind;
+use chefshat_room::ids::{SecretHash, Token};
 
 impl TournamentHandle {
     /// Changes the tournament by hand. Returns the ticket of a new participant who connects.
@@ -21,7 +22,14 @@ impl TournamentHandle {
         what: ByHand,
     ) -> Result<Result<Option<Token>, ByHandRefusal>, Stopped> {
         let over = match &what {
-            ByHand::Withdraw { .. } | ByHand::Replace { .. } => ByHandProblem::Over,
+            // A repeated request is answered in every state of the tournament.
+            ByHand::Replace { participant, by } => {
+                if let Some(answer) = self.replaced_before(*participant, by) {
+                    return Ok(answer);
+                }
+                ByHandProblem::Over
+            }
+            ByHand::Withdraw { .. } | ByHand::Remove { .. } => ByHandProblem::Over,
             ByHand::SetPaused(_) | ByHand::Postpone { .. } | ByHand::Recall { .. } => {
                 ByHandProblem::NotPlaying
             }
@@ -31,102 +39,128 @@ impl TournamentHandle {
             changed => changed,
         }
     }
+
+    fn replaced_before(
+        &self,
+        participant: usize,
+        by: &Newcomer,
+    ) -> Option<Result<Option<Token>, ByHandRefusal>> {
+        let ticket = self.ticket_with(Some(by.request_id()?));
+        self.committed().replaced_before(participant, by, ticket)
+    }
+}
+
+impl TournamentState {
+    /// The answer to an earlier request with the same id; `None` if the request is new.
+    fn replaced_before(
+        &self,
+        participant: usize,
+        by: &Newcomer,
+        ticket: Token,
+    ) -> Option<Result<Option<Token>, ByHandRefusal>> {
+        let known = self.participant_of(&ticket.hash())?;
+        let has = &self.core.participants()[known];
+        let mut asked = by.entrant(has);
+        if asked.name.is_empty() {
+            asked.name.clone_from(&has.name);
+        }
+        let former = self.core.former(known);
+        Some(
+            match known == participant && asked == *has && !former.is_empty() {
+                true => Ok(connects(has).then_some(ticket)),
+                false => Err(ByHandRefusal::RequestIdUsed),
+            },
+        )
+    }
+}
+
+/// Whether a participant connects with a ticket.
+fn connects(entrant: &Entrant) -> bool {
+    entrant.built_in.is_none() && !entrant.at_table
 }
 
 impl Task {
     /// Makes a change by hand. Returns the ticket of a new participant who connects.
     pub(super) fn change_by_hand(&mut self, what: ByHand) -> Result<Option<Token>, ByHandRefusal> {
-        let core = &self.state.core;
         match what {
-            ByHand::Withdraw {
-                participant,
-                removed,
-            } => {
-                if let Some(change) = core.withdraw(participant, removed)? {
-                    self.fold(change);
-                    self.dismiss(participant);
-                }
-            }
-            ByHand::Replace { participant, by } => return self.replace(participant, by),
+            ByHand::Withdraw { who, charged } => self.withdraw(who, charged)?,
+            ByHand::Remove { participant } => self.leave(participant, Leaving::Removed)?,
+            ByHand::Replace { participant, by } => return self.replace(participant, &by),
             ByHand::SetPaused(paused) => {
-                let change = core.set_paused(paused)?;
+                let change = self.state.core.set_paused(paused)?;
                 self.fold_all(change.into_iter().collect());
             }
             ByHand::Postpone { game, by } => {
-                let change = core.postpone(game, by)?;
+                let by = by.map(|ticket| self.ticket_holder(&ticket)).transpose()?;
+                let change = self.state.core.postpone(game, by)?;
                 self.fold(change);
             }
             ByHand::Recall { game } => {
-                let change = core.recall(game)?;
+                let change = self.state.core.recall(game)?;
                 self.fold(change);
             }
         }
         Ok(None)
     }
 
+    /// The participant who has this ticket now.
+    fn ticket_holder(&self, ticket: &SecretHash) -> Result<usize, ByHandRefusal> {
+        (self.state.participant_of(ticket)).ok_or(ByHandRefusal::TicketUnknown)
+    }
+
+    fn withdraw(&mut self, who: Who, charged: Key) -> Result<(), ByHandRefusal> {
+        let participant = match who {
+            Who::Number(participant) => return self.leave(participant, Leaving::ByOrganiser),
+            Who::Ticket(ticket) => self.ticket_holder(&ticket)?,
+        };
+        if self.state.core.state() != State::Open {
+            return self.leave(participant, Leaving::Itself);
+        }
+        let times = self.left_early.get(&charged).copied().unwrap_or_default();
+        if times >= MAX_EARLY_WITHDRAWALS_OF_CALLER {
+            return Err(ByHandProblem::TooMany(MAX_EARLY_WITHDRAWALS_OF_CALLER).into());
+        }
+        self.leave(participant, Leaving::Itself)?;
+        self.left_early.insert(charged, times + 1);
+        Ok(())
+    }
+
+    /// A participant leaves; nothing changes if it has left.
+    fn leave(&mut self, participant: usize, leaving: Leaving) -> Result<(), ByHandRefusal> {
+        if let Some(change) = self.state.core.withdraw(participant, leaving)? {
+            self.fold(change);
+            self.dismiss(participant);
+        }
+        Ok(())
+    }
+
     fn replace(
         &mut self,
         participant: usize,
-        by: Newcomer,
+        by: &Newcomer,
     ) -> Result<Option<Token>, ByHandRefusal> {
+        let ticket = self.handle.ticket_with(by.request_id());
+        if let Some(answer) = self.state.replaced_before(participant, by, ticket) {
+            return answer;
+        }
         let core = &self.state.core;
         let former = (core.participants().get(participant)).ok_or(ByHandProblem::NoParticipant)?;
-        let (entrant, request_id) = match by {
-            Newcomer::BuiltIn { agent, name } => {
-                let name = match name.as_str() {
-                    "" => self.name_of(agent, participant),
-                    _ => name,
-                };
-                let entrant = Entrant {
-                    name,
-                    kind: ParticipantKind::Agent,
-                    built_in: Some(agent),
-                    filler: false,
-                    stateless: true,
-                    max_games: MAX_GAMES_AT_A_TIME,
-                    at_table: false,
-                };
-                (entrant, None)
-            }
-            Newcomer::Somebody {
-                name,
-                kind,
-                max_games,
-                stateless,
-                request_id,
-            } => {
-                let entrant = Entrant {
-                    name,
-                    kind: kind.unwrap_or(former.kind),
-                    built_in: None,
-                    filler: false,
-                    stateless,
-                    max_games,
-                    at_table: former.at_table,
-                };
-                (entrant, request_id)
-            }
-        };
-        let connects = entrant.built_in.is_none() && !entrant.at_table;
-        let ticket = self.handle.ticket_with(request_id.as_ref());
-        if let Some(known) = self.state.participant_of(&ticket.hash()) {
-            let is_same = known == participant && core.participants()[known] == entrant;
-            return match is_same {
-                true => Ok(Some(ticket)),
-                false => Err(ByHandRefusal::RequestIdUsed),
-            };
+        let mut entrant = by.entrant(former);
+        if let (Newcomer::BuiltIn { agent, .. }, "") = (by, entrant.name.as_str()) {
+            entrant.name = self.name_of(*agent, participant);
         }
+        let connects = connects(&entrant);
         let change = core.replace(participant, entrant)?;
         self.fold(change);
         self.dismiss(participant);
-        if !connects {
-            return Ok(None);
+        if connects || by.request_id().is_some() {
+            // If it does not connect, the ticket identifies repetitions of the request.
+            self.push(TournamentEntry::Ticket {
+                participant,
+                ticket: ticket.hash(),
+            });
         }
-        self.push(TournamentEntry::Ticket {
-            participant,
-            ticket: ticket.hash(),
-        });
-        Ok(Some(ticket))
+        Ok(connects.then_some(ticket))
     }
 
     /// A free name for a built-in agent.

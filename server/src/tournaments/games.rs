@@ -3,7 +3,7 @@
 //! once even if the server restarts in between. The core decides when games are called and what
 //! counts.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
@@ -17,7 +17,7 @@ use super::message::Call;
 use super::task::Task;
 use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
-use crate::rooms::{CreateError, NewRoom, Seating};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use crate::store::tournaments::TournamentEntry;
 use crate::store::{StoreError, StoredGame};
 use chefshat_room::ids::Id;
@@ -256,6 +256,7 @@ impl Task {
             policy: plan.policy.clone(),
             fills,
             display_names,
+            wizards: BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.handle.game_seed(number, game.deal),
@@ -263,10 +264,10 @@ impl Task {
             request: None,
             charged: self.handle.charged,
             seating: Some(Seating {
-                game: TournamentGame {
+                part_of: PartOf::Tournament(TournamentGame {
                     tournament: self.handle.id(),
                     series: game.deal.map(|deal| self.handle.series(deal)),
-                },
+                }),
                 owner: self.handle.room_owner(room_id),
                 game_id,
                 participants,

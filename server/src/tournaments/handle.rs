@@ -14,6 +14,7 @@ use super::shared::{AsOf, Shared};
 use crate::access::{Secrets, Standing};
 use crate::convert::{self, TournamentPlan};
 use crate::limits::Key;
+use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash, Token};
@@ -249,16 +250,26 @@ impl TournamentHandle {
         }
     }
 
-    /// Attaches a stream to a participant; `number` is the id of the connection.
-    pub async fn enter(&self, participant: usize, number: u64, connection: Connection) {
-        let message = Message::Enter(participant, number, connection);
-        if let Err(mpsc::error::SendError(Message::Enter(_, _, connection))) =
-            self.mailbox.send(message).await
-            && self.is_over()
-        {
-            connection.call(Call::Over);
+    /// Attaches a stream to the participant with this ticket; `number` is the id of the connection.
+    pub async fn enter(
+        &self,
+        participant: usize,
+        ticket: &Token,
+        number: u64,
+        connection: Connection,
+    ) {
+        let message = Message::Enter(participant, ticket.hash(), number, connection);
+        let sent = self.mailbox.send(message).await;
+        let Err(mpsc::error::SendError(Message::Enter(_, _, _, connection))) = sent else {
+            return;
+        };
+        match self.is_over() {
+            true => {
+                connection.call(Call::Over);
+            }
+            // It resumes here or at another node, which does not know the stream.
+            false => connection.outbox.end(StreamEnd::RoomGone),
         }
-        // On failure the server ends, and the stream with it.
     }
 
     /// Whether this is the newest connection of the participant.

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use chefshat_agents::NamedAgent;
-use chefshat_tournament::{BeginProblem, ByHandProblem, Entrant, JoinProblem};
+use chefshat_tournament::{BeginProblem, ByHandProblem, Entrant, JoinProblem, MAX_GAMES_AT_A_TIME};
 use tokio::sync::{mpsc, oneshot};
 
+use crate::limits::Key;
 use crate::outbox::{Outbox, StreamEnd};
 use crate::room::Supersedes;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 
 /// A message to a stream that is attached to a participant.
@@ -98,10 +99,15 @@ pub enum JoinRefusal {
 pub enum ByHand {
     /// A participant leaves.
     Withdraw {
+        /// Who.
+        who: Who,
+        /// Who is charged for it.
+        charged: Key,
+    },
+    /// The organiser removes a participant.
+    Remove {
         /// The participant.
         participant: usize,
-        /// Whether the organiser removes it.
-        removed: bool,
     },
     /// Somebody else takes the place of a participant.
     Replace {
@@ -116,14 +122,23 @@ pub enum ByHand {
     Postpone {
         /// The game.
         game: usize,
-        /// The participant who asks for it; `None`: the organiser.
-        by: Option<usize>,
+        /// The ticket of the participant who asks for it; `None`: the organiser.
+        by: Option<SecretHash>,
     },
     /// Calls a game again, before all others.
     Recall {
         /// The game.
         game: usize,
     },
+}
+
+/// A participant who is to leave.
+#[derive(Debug, Clone, Copy)]
+pub enum Who {
+    /// The one that has this ticket when the message is processed.
+    Ticket(SecretHash),
+    /// The one with this number, on behalf of the organiser.
+    Number(usize),
 }
 
 /// Who takes the place of a participant.
@@ -135,6 +150,8 @@ pub enum Newcomer {
         agent: NamedAgent,
         /// Display name, or empty.
         name: String,
+        /// Identifies repetitions of the request.
+        request_id: Option<[u8; 32]>,
     },
     /// Somebody else, who connects, or sits at the physical table if the former participant does.
     Somebody {
@@ -151,6 +168,47 @@ pub enum Newcomer {
     },
 }
 
+impl Newcomer {
+    /// Identifies repetitions of the request.
+    pub(super) fn request_id(&self) -> Option<&[u8; 32]> {
+        match self {
+            Newcomer::BuiltIn { request_id, .. } | Newcomer::Somebody { request_id, .. } => {
+                request_id.as_ref()
+            }
+        }
+    }
+
+    /// The entrant that takes the place of `former`.
+    pub(super) fn entrant(&self, former: &Entrant) -> Entrant {
+        match self {
+            Newcomer::BuiltIn { agent, name, .. } => Entrant {
+                name: name.clone(),
+                kind: ParticipantKind::Agent,
+                built_in: Some(*agent),
+                filler: false,
+                stateless: true,
+                max_games: MAX_GAMES_AT_A_TIME,
+                at_table: false,
+            },
+            Newcomer::Somebody {
+                name,
+                kind,
+                max_games,
+                stateless,
+                ..
+            } => Entrant {
+                name: name.clone(),
+                kind: kind.unwrap_or(former.kind),
+                built_in: None,
+                filler: false,
+                stateless: *stateless,
+                max_games: *max_games,
+                at_table: former.at_table,
+            },
+        }
+    }
+}
+
 /// Why a change by hand is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ByHandRefusal {
@@ -162,6 +220,9 @@ pub enum ByHandRefusal {
         "this request id was used for another participant, name, kind, number of games or statelessness; draw a new one"
     )]
     RequestIdUsed,
+    /// No participant has the ticket (any more).
+    #[error("no participant of this tournament has this ticket")]
+    TicketUnknown,
 }
 
 /// The tournament's task has stopped because the server ends.
@@ -176,6 +237,6 @@ pub(super) enum Message {
         ByHand,
         oneshot::Sender<Result<Option<Token>, ByHandRefusal>>,
     ),
-    Enter(usize, u64, Connection),
+    Enter(usize, SecretHash, u64, Connection),
     Left(usize, u64),
 }

@@ -25,7 +25,9 @@ use tracing::{error, info};
 
 pub use handle::{TableProblem, TournamentHandle};
 pub use leaderboard::Leaderboard;
-pub use message::{ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Stopped};
+pub use message::{
+    ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Stopped, Who,
+};
 pub use shared::ComputeError;
 
 use crate::clock::since_epoch_ms;

@@ -16,12 +16,12 @@ use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use crate::clock::since_epoch_ms;
 use crate::cluster::News;
 use crate::config::{TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
-use crate::limits::Held;
+use crate::limits::{Held, Key};
 use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{Id, SecretHash, Token};
 
 /// Messages that are processed before their consequences are computed.
 const MESSAGES_AT_A_TIME: usize = 64;
@@ -56,6 +56,9 @@ pub(super) struct Task {
     deals: BTreeSet<u32>,
     /// Whether something visible has changed that is not committed.
     pub(super) has_changed: bool,
+    /// Number of participants who withdrew before the beginning, by who is charged for it, since the
+    /// server was started. Bounded by the number of such withdrawals.
+    pub(super) left_early: BTreeMap<Key, u32>,
     /// Participants whose seats in a game were given up, by game, since the server was started.
     pub(super) retired: BTreeSet<(usize, usize)>,
     /// When a participant last joined, or the server was started.
@@ -87,6 +90,7 @@ impl Task {
         Self {
             start_at: start_in.map(|time| now + Duration::from_millis(time)),
             paused_at: state.core.is_paused().then_some(now),
+            left_early: BTreeMap::new(),
             retired: BTreeSet::new(),
             state,
             handle,
@@ -242,7 +246,7 @@ impl Task {
         }
         inbox.close();
         while let Some(message) = inbox.recv().await {
-            if let Message::Enter(_, _, connection) = message {
+            if let Message::Enter(_, _, _, connection) = message {
                 connection.call(Call::Over);
             }
         }
@@ -280,8 +284,8 @@ impl Task {
                     let _ = reply.send(());
                 }));
             }
-            Message::Enter(participant, number, connection) => {
-                self.enter(participant, number, connection);
+            Message::Enter(participant, ticket, number, connection) => {
+                self.enter(participant, &ticket, number, connection);
             }
             Message::Left(participant, number) => self.left(participant, number),
         }
@@ -313,8 +317,19 @@ impl Task {
         }
     }
 
-    fn enter(&mut self, participant: usize, number: u64, connection: Connection) {
+    fn enter(
+        &mut self,
+        participant: usize,
+        ticket: &SecretHash,
+        number: u64,
+        connection: Connection,
+    ) {
         if !connection.outbox.is_open() {
+            return;
+        }
+        if self.state.participant_of(ticket) != Some(participant) {
+            // The ticket has ended meanwhile: somebody else may have the place.
+            connection.call(Call::Over);
             return;
         }
         let holder = self.connections.get(&participant).map(|(held, _)| *held);
@@ -420,7 +435,9 @@ impl Task {
                 let appended = store.append_tournament(id, self.rows, entries.clone());
                 self.published(appended).await?;
                 self.rows += 1;
+                let before = self.handle.committed().core.state();
                 self.handle.publish(&entries);
+                self.announce(before);
             }
             for reply in self.replies.drain(..) {
                 reply();
@@ -439,6 +456,21 @@ impl Task {
             if !has_entries && self.pending.is_empty() {
                 return Ok(());
             }
+        }
+    }
+
+    /// Announces that the tournament has started or is over, unless it was before.
+    fn announce(&self, before: State) {
+        let after = self.handle.committed().core.state();
+        let (id, name) = (self.handle.id(), &self.handle.header.settings.name);
+        let webhooks = self.rooms.webhooks();
+        if before == State::Open && matches!(after, State::Playing | State::Finished) {
+            let participants = self.handle.committed().core.participants().len();
+            webhooks.tournament_started(id, name, participants);
+        }
+        let is_over = |state| matches!(state, State::Finished | State::Closed);
+        if is_over(after) && !is_over(before) {
+            webhooks.tournament_ended(id, name, after == State::Finished);
         }
     }
 

@@ -6,6 +6,7 @@ use super::*;
 use crate::config::ServerConfig;
 use crate::limits::Key;
 use crate::store::{SqliteStore, Store};
+use chefshat_tournament::ByHandProblem;
 
 #[tokio::test]
 async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
@@ -315,6 +316,25 @@ async fn a_pause_ends_by_itself() {
     until(&handle, |core| core.state() == State::Finished).await;
 }
 
+/// A withdrawal with a ticket.
+fn withdrawal(ticket: &Token) -> ByHand {
+    ByHand::Withdraw {
+        who: Who::Ticket(ticket.hash()),
+        charged: Key::Local,
+    }
+}
+
+/// Somebody who takes a place, by a request with this id.
+fn cem(request_id: u8) -> Newcomer {
+    Newcomer::Somebody {
+        name: "Cem".into(),
+        kind: None,
+        max_games: 1,
+        stateless: true,
+        request_id: Some([request_id; 32]),
+    }
+}
+
 #[tokio::test]
 async fn the_ticket_of_a_participant_ends_with_its_place() {
     let tournaments = in_memory();
@@ -329,48 +349,136 @@ async fn the_ticket_of_a_participant_ends_with_its_place() {
     };
     let change = async |what| handle.change_by_hand(what).await.expect("the task runs");
     let known = |ticket: &Token| handle.participant_of(&ticket.secret);
-    let (ada, ticket) = join("Ada").await;
-    assert_eq!(known(&ticket), Some(ada));
-    let leaves = ByHand::Withdraw {
-        participant: ada,
-        removed: false,
-    };
-    assert_eq!(change(leaves).await, Ok(None));
-    assert_eq!(known(&ticket), None, "the place is free");
+    let (ada, adas) = join("Ada").await;
+    assert_eq!(known(&adas), Some(ada));
+    assert_eq!(change(withdrawal(&adas)).await, Ok(None));
+    assert_eq!(known(&adas), None, "the place is free");
     let (bo, bos) = join("Bo").await;
-    assert_eq!(bo, ada, "the number is taken again");
-    let by = || Newcomer::Somebody {
-        name: "Cem".into(),
-        kind: None,
-        max_games: 1,
-        stateless: true,
-        request_id: Some([3; 32]),
-    };
-    let replaced = change(ByHand::Replace {
-        participant: bo,
-        by: by(),
-    });
-    let cems = replaced.await.expect("replaced").expect("a ticket");
+    assert_ne!(bo, ada, "no number is used again");
+    // Decided when it is made: the ticket has no place any more.
+    let again = change(withdrawal(&adas)).await;
+    assert_eq!(again, Err(ByHandRefusal::TicketUnknown));
+    let (participant, by) = (bo, cem(3));
+    let replaced = change(ByHand::Replace { participant, by }).await;
+    let cems = replaced.expect("replaced").expect("a ticket");
     assert_eq!((known(&bos), known(&cems)), (None, Some(bo)));
+    let late = change(withdrawal(&bos)).await;
+    assert_eq!(late, Err(ByHandRefusal::TicketUnknown));
     // The response was lost.
-    let again = change(ByHand::Replace {
-        participant: bo,
-        by: by(),
-    });
+    let by = cem(3);
+    let again = change(ByHand::Replace { participant, by }).await;
     assert_eq!(
-        again.await.map(|it| it.map(|it| it.secret)),
+        again.map(|it| it.map(|it| it.secret)),
         Ok(Some(cems.secret))
     );
     let other = change(ByHand::Replace {
         participant: 0,
-        by: by(),
+        by: cem(3),
     });
     assert_eq!(other.await, Err(ByHandRefusal::RequestIdUsed));
     handle.begin().await.expect("the task runs").expect("begun");
-    let leaves = ByHand::Withdraw {
-        participant: bo,
-        removed: false,
+    let postpone = ByHand::Postpone {
+        game: 0,
+        by: Some(bos.hash()),
     };
-    assert_eq!(change(leaves).await, Ok(None));
+    assert_eq!(change(postpone).await, Err(ByHandRefusal::TicketUnknown));
+    assert_eq!(change(withdrawal(&cems)).await, Ok(None));
     assert_eq!(known(&cems), Some(bo), "it may look at the results");
+    assert_eq!(change(withdrawal(&cems)).await, Ok(None));
+    assert_eq!(change(ByHand::Remove { participant }).await, Ok(None));
+    assert_eq!(known(&cems), None, "the organiser has removed it");
+}
+
+#[tokio::test]
+async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
+    let tournaments = in_memory();
+    let settings = chefshat_proto::v1::TournamentSettings {
+        physical_tables: 1,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let table = Entry {
+        at_table: true,
+        ..entrant("Ada")
+    };
+    let (at_table, _) = (handle.join(table).await.expect("the task runs")).expect("joined");
+    let replace = async |participant, by| {
+        let what = ByHand::Replace { participant, by };
+        handle.change_by_hand(what).await.expect("the task runs")
+    };
+    let built_in = |agent: &str, name: &str, id: u8| Newcomer::BuiltIn {
+        agent: agent.parse().expect("a built-in agent"),
+        name: name.into(),
+        request_id: Some([id; 32]),
+    };
+    let former = |participant| handle.read(|core| core.former(participant).len());
+    let name =
+        |participant: usize| handle.read(|core| core.participants()[participant].name.clone());
+    // Two of them get the names "greedy" and "greedy 2"; the second is asked for twice.
+    let first = replace(0, built_in("greedy", "", 1)).await;
+    assert_eq!((first, name(0)), (Ok(None), "greedy".to_owned()));
+    for _ in 0..2 {
+        let second = replace(1, built_in("greedy", "", 2)).await;
+        assert_eq!(second, Ok(None));
+        assert_eq!((former(1), name(1)), (1, "greedy 2".to_owned()));
+        // The first name is free now.
+        replace(0, built_in("random", "Rita", 3))
+            .await
+            .expect("replaced");
+    }
+    assert_eq!(former(0), 2);
+    let other = replace(1, built_in("random", "", 2)).await;
+    assert_eq!(other, Err(ByHandRefusal::RequestIdUsed));
+    // At a physical table there is no ticket either.
+    for _ in 0..2 {
+        assert_eq!(replace(at_table, cem(4)).await, Ok(None));
+        assert_eq!(former(at_table), 1);
+    }
+    // The answer is the same when the tournament is over.
+    handle.close().await.expect("the task runs");
+    assert_eq!(replace(at_table, cem(4)).await, Ok(None));
+    let late = replace(at_table, cem(5)).await;
+    assert_eq!(late, Err(ByHandProblem::Over.into()));
+}
+
+#[tokio::test]
+async fn one_caller_cannot_join_and_withdraw_for_ever() {
+    use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
+    let tournaments = in_memory();
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let come = async || {
+        let joined = handle.join(entrant("fickle")).await.expect("the task runs");
+        joined.expect("joined").1
+    };
+    let go = async |ticket: &Token, address: [u8; 4]| {
+        let what = ByHand::Withdraw {
+            who: Who::Ticket(ticket.hash()),
+            charged: Key::Address(address.into()),
+        };
+        handle.change_by_hand(what).await.expect("the task runs")
+    };
+    let (stranger, other) = ([192, 0, 2, 1], [192, 0, 2, 2]);
+    for _ in 0..MAX_EARLY_WITHDRAWALS_OF_CALLER {
+        assert_eq!(go(&come().await, stranger).await, Ok(None));
+    }
+    let ticket = come().await;
+    let refused = go(&ticket, stranger).await;
+    let most = MAX_EARLY_WITHDRAWALS_OF_CALLER;
+    assert_eq!(refused, Err(ByHandProblem::TooMany(most).into()));
+    assert_eq!(go(&ticket, other).await, Ok(None));
+    // What the organiser does is not counted there.
+    let ticket = come().await;
+    let participant = handle.participant_of(&ticket.secret).expect("joined");
+    let removed = ByHand::Remove { participant };
+    let removed = handle.change_by_hand(removed).await.expect("the task runs");
+    assert_eq!(removed, Ok(None));
+    handle.begin().await.expect("the task runs").expect("begun");
 }

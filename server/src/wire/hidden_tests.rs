@@ -10,7 +10,7 @@ use chefshat_proto::v1;
 use chefshat_record::convert::{decision_kind, observation_to_proto};
 use chefshat_referee::counts::JOKER;
 use chefshat_referee::{Report, SeenCards};
-use chefshat_room::journal::{GameHeader, ParticipantKind};
+use chefshat_room::journal::{Fill, GameHeader, ParticipantKind};
 use chefshat_room::policy::Policy;
 use chefshat_room::testing::real_table::{PERSON, policy, shifts};
 use chefshat_room::testing::{OPEN, Table, ms};
@@ -136,6 +136,46 @@ fn hidden_cards_do_not_change_what_is_sent() {
         });
     }
     assert!(turns > 400, "only {turns} turns were compared");
+}
+
+/// A table of four agents, of which a person plays these seats.
+fn with_wizards(wizards: &[usize]) -> Table {
+    let agents = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let mut table = Table::empty(Policy::default(), vec![agents; 4]);
+    let mut header = GameHeader::clone(table.core.header());
+    header.wizards = wizards.iter().copied().collect();
+    table.core = Core::new(Arc::new(header));
+    table.fill();
+    table
+}
+
+#[test]
+fn a_person_who_plays_as_an_agent_does_not_change_what_is_sent() {
+    let (mut plain, mut wizard) = (with_wizards(&[]), with_wizards(&[0, 2]));
+    let views = [0, 1, 2, 3].map(|seat| Viewer::Seat(Seat::new(seat)));
+    let turns = play_both(&mut plain, &mut wizard, |plain, wizard| {
+        for (seat, see) in views.into_iter().chain([Viewer::Spectator]).enumerate() {
+            let viewer = Seat::new(seat % 4);
+            assert_eq!(sent_to(plain, viewer, see), sent_to(wizard, viewer, see));
+        }
+        let room = |table: &Table| convert::describe_at(&table.core, table.now).encode_to_vec();
+        assert_eq!(room(plain), room(wizard));
+    });
+    assert!(turns > 20, "only {turns} turns were compared");
+    // The record says it, of these seats alone.
+    let lines = convert::record_lines(wizard.core.header(), &wizard.journal);
+    let Some(v1::record_line::Line::Header(header)) = &lines[0].line else {
+        panic!("no header");
+    };
+    for seat in &header.seats {
+        let (kind, shown) = match seat.seat {
+            0 | 2 => (v1::ParticipantKind::Human, v1::ParticipantKind::Agent),
+            _ => (v1::ParticipantKind::Agent, v1::ParticipantKind::Unspecified),
+        };
+        assert_eq!((seat.kind(), seat.shown_kind()), (kind, shown));
+    }
 }
 
 /// The open decision as a message: the expected encoding.

@@ -1,7 +1,8 @@
 //! Pairs of games that differ only in which seats hold the jokers, and so in who may declare a
 //! special action and keeps quiet or lets it run out. Random policies, clocks, paces, answers and
 //! faults, the same in both games: everything sent to a viewer who holds no joker must be the same,
-//! to the byte, and sent at the same time. The same comparison detects deliberate leaks.
+//! to the byte, and sent at the same time. Other pairs differ in whether somebody is offered a special
+//! action at all, and takes time to decline it. The same comparison detects deliberate leaks.
 
 use std::time::Duration;
 
@@ -161,6 +162,9 @@ impl World {
         let awaited = core.awaited_in_public();
         let awaited = awaited.filter(|it| see != Viewer::Seat(it.seat));
         messages.push(convert::awaited_to_proto(awaited, self.table.now).encode_to_vec());
+        if see == Viewer::Spectator {
+            messages.push(convert::describe_at(core, self.table.now).encode_to_vec());
+        }
         messages.push(core.visible_to_spectators().to_be_bytes().to_vec());
         messages.push(leak(core).to_be_bytes().to_vec());
         messages
@@ -263,11 +267,14 @@ impl Plan {
     /// Two games: in one the first seat holds both jokers, in the other the second seat holds them
     /// or each holds one. `None` if the deal has no such cards, or if forced gifts, which their
     /// receivers see, would differ.
-    fn worlds(&self, rules: &RuleSet, chance: &mut Chance) -> Option<[World; 2]> {
-        let [first, second] = self.holders;
+    fn worlds(
+        &self,
+        rules: &RuleSet,
+        others: [Seat; 2],
+        chance: &mut Chance,
+    ) -> Option<[World; 2]> {
         let seed = u8::try_from(chance.below(256)).expect("below 256");
-        let hands = dealt(rules, seed, [first; 2])?;
-        let others = chance.pick(&[[second; 2], [second; 2], [first, second]]);
+        let hands = dealt(rules, seed, [self.holders[0]; 2])?;
         let twin = with_jokers_at(others, &hands, rules.faces())?;
         let rarest = |hands: &BySeat<Cards>| {
             let two = |seat| {
@@ -301,10 +308,16 @@ fn agree(worlds: &mut [World; 2]) -> bool {
         && one.choices.iter().zip(&other.choices).all(|(a, b)| a == b)
 }
 
-/// Compares what was sent since the last comparison.
-fn compare(plan: &Plan, worlds: &mut [World; 2], leak: Leak) -> Result<usize, String> {
+/// Compares what was sent since the last comparison to everybody but a seat.
+fn compare(
+    plan: &Plan,
+    worlds: &mut [World; 2],
+    except: Option<Seat>,
+    leak: Leak,
+) -> Result<usize, String> {
     let mut messages = 0;
-    for see in plan.viewers() {
+    let except = except.map(Viewer::Seat);
+    for see in plan.viewers().filter(|see| Some(*see) != except) {
         let [one, other] = [&worlds[0], &worlds[1]].map(|world| world.sent_to(see, leak));
         if one != other {
             let differing = one.iter().zip(&other).position(|(one, other)| one != other);
@@ -338,7 +351,9 @@ fn play_pair(number: u64, leak: Leak) -> Result<usize, String> {
     let mut chance = Chance(number);
     let plan = Plan::random(&mut chance);
     let rules = plan.rules.validate().expect("a valid rule set");
-    let Some(mut worlds) = plan.worlds(&rules, &mut chance) else {
+    let [first, second] = plan.holders;
+    let others = chance.pick(&[[second; 2], [second; 2], [first, second]]);
+    let Some(mut worlds) = plan.worlds(&rules, others, &mut chance) else {
         return Ok(0);
     };
     let mut messages = 0;
@@ -349,7 +364,7 @@ fn play_pair(number: u64, leak: Leak) -> Result<usize, String> {
         }
         // A silent decision in one game alone is taken in no time.
         if worlds[0].is_silent() == worlds[1].is_silent() {
-            messages += compare(&plan, &mut worlds, leak)
+            messages += compare(&plan, &mut worlds, None, leak)
                 .map_err(|problem| format!("pair {number}: {problem}"))?;
         }
         let ended = |world: &World| {
@@ -371,7 +386,7 @@ fn step(plan: &Plan, worlds: &mut [World; 2], chance: &mut Chance) {
         // A silent decision takes time only if there is one in both games.
         [one, other] => {
             let (runs_out, time) = (one && other && chance.below(2) == 0, chance.below(900));
-            // Whoever may hold the jokers is away, and returns afterwards.
+            // The seats that may hold the jokers are away, and return afterwards.
             let away = runs_out && chance.below(2) == 0;
             for world in worlds.iter_mut().filter(|world| world.is_silent()) {
                 if away {
@@ -452,6 +467,88 @@ fn nothing_that_is_sent_depends_on_a_silent_decision() {
     let least = usize::try_from(pairs).expect("a number that fits") * 10;
     assert!(messages > least, "only {messages} messages were compared");
     println!("{pairs} pairs, {messages} messages");
+}
+
+/// Plays the start of a Shift in a pair of which in one game alone somebody is offered a special
+/// action. It thinks before it declines; the first who gives takes as much longer in the other game.
+/// Returns the number of messages compared with those of everybody who is asked in neither.
+fn play_offered(number: u64, leak: Leak) -> Result<usize, String> {
+    let mut chance = Chance(number);
+    let mut plan = Plan::random(&mut chance);
+    plan.rules.exchange = true;
+    let policy = &mut plan.policy;
+    // No time runs out.
+    policy.decision_time = ms(10_000);
+    policy.clocks.iter_mut().for_each(|clock| {
+        clock.decision_time = Some(ms(20_000));
+        clock.absence_time = clock.absence_time.map(|_| ms(15_000));
+    });
+    policy.absence_time = policy.absence_time.map(|_| ms(9_000));
+    policy.spectator_delay_decisions = 0;
+    policy.pace = policy.pace.or(Some(ms(100)));
+    let rules = plan.rules.validate().expect("a valid rule set");
+    let Some(mut worlds) = plan.worlds(&rules, plan.holders, &mut chance) else {
+        return Ok(0);
+    };
+    let awaited = |world: &World| world.table.core.awaited_in_public();
+    let (offered, Some(giver)) = (worlds[0].is_silent(), awaited(&worlds[1])) else {
+        return Ok(0);
+    };
+    // Where built-in agents give first, their gifts show that nothing was offered.
+    let gives = matches!(worlds[1].asked(), Some((_, DecisionKind::Exchange)));
+    if !offered || !gives {
+        return Ok(0);
+    }
+    let mut messages = 0;
+    let (declines, gives) = (chance.index(8), 20 + chance.index(8));
+    let gift = chance.index(2);
+    for tick in 0..30 {
+        let seat = Seat::new(chance.index(plan.fills.len()));
+        let (lost, found) = (chance.below(4) == 0, chance.below(4) == 0);
+        for world in worlds.iter_mut() {
+            let joined = world.connections[seat.index()] != ConnectionId(0);
+            if lost && joined {
+                world.lose(seat);
+            } else if found && joined {
+                world.attach(seat);
+            }
+        }
+        if tick == declines {
+            let decline = worlds[0].table.core.header().rules.actions().decline();
+            worlds[0].answer_after(ms(0), decline.index().into());
+        }
+        if tick == gives {
+            // One that is legal in both games: the giver may hold jokers.
+            let [one, other] = [&worlds[0], &worlds[1]].map(|it| it.table.core.legal_actions());
+            let both: Vec<ActionId> = one.iter().filter(|it| other.contains(*it)).collect();
+            for world in worlds.iter_mut() {
+                let (seat, id) = world.table.open();
+                assert_eq!(seat, giver.seat, "the first who gives is shown");
+                let action = both[gift % both.len()];
+                world.table.answer(seat, id, action.index().into());
+            }
+        }
+        // A built-in agent with another hand may have given other cards.
+        if !agree(&mut worlds) {
+            break;
+        }
+        messages += compare(&plan, &mut worlds, Some(giver.seat), leak)
+            .map_err(|problem| format!("pair {number}, tick {tick}: {problem}"))?;
+        for world in worlds.iter_mut() {
+            world.table.pass_time(ms(100));
+        }
+    }
+    Ok(messages)
+}
+
+#[test]
+fn nothing_that_is_sent_before_the_first_gift_shows_whether_a_special_action_is_offered() {
+    let messages: usize = (0..2_000)
+        .map(|pair| play_offered(pair, no_leak).unwrap_or_else(|leak| panic!("{leak}")))
+        .sum();
+    assert!(messages > 5_000, "only {messages} messages were compared");
+    let asked: Leak = |core| (core.open()).map_or(0, |open| 1 + open.decision.seat.index() as u128);
+    assert!((0..2_000).any(|pair| play_offered(pair, asked).is_err()));
 }
 
 #[test]

@@ -91,6 +91,23 @@ pub enum Change {
 }
 
 impl Change {
+    /// The participant that it is about; `None` if it is about the study.
+    pub fn number(&self) -> Option<u32> {
+        match self {
+            Self::Added { number, .. }
+            | Self::Opened { number, .. }
+            | Self::Consented { number, .. }
+            | Self::Answered { number, .. }
+            | Self::Placed { number, .. }
+            | Self::GameEnded { number, .. }
+            | Self::Continued { number, .. }
+            | Self::DroppedOut { number, .. }
+            | Self::Withdrew { number, .. }
+            | Self::Removed { number, .. } => Some(*number),
+            Self::Closed => None,
+        }
+    }
+
     /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym and its
     /// answers. The changes fold to the same study as before. Returns whether this one is different
     /// now and must be stored again.

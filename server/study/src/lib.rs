@@ -53,7 +53,7 @@ pub use change::{Change, ConsentGiven, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SESSIONS, Refusal};
 pub use games::{DueGame, MAX_ATTEMPTS};
-pub use link::ParticipantLink;
+pub use link::{ParticipantLink, SessionSecret};
 pub use questionnaire::{
     Answer, AnswerProblem, Item, ItemAnswer, ItemKind, MAX_ITEMS, MAX_OPTIONS, Questionnaire,
 };

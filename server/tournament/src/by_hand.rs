@@ -7,11 +7,17 @@ use thiserror::Error;
 use super::Tournament;
 use super::change::{Change, Entrant, Former, GameState};
 use super::entry::JoinProblem;
-use super::settings::Format;
+use super::settings::{Deals, Format};
 use super::state::{State, TournamentState};
 
-/// Maximum number of changes by hand, which bounds what is stored of them.
+/// Maximum number of pauses, replacements, and games moved in the queue by the organiser, which
+/// bounds what is stored of them. Resuming, removing and closing are not counted.
 pub const MAX_CHANGES_BY_HAND: u32 = 10_000;
+/// Maximum number of participants who withdraw by themselves before the beginning. After it each
+/// does so once.
+pub const MAX_EARLY_WITHDRAWALS: u32 = 1_000;
+/// Maximum number of times that one participant postpones games.
+pub const MAX_POSTPONEMENTS: u32 = 100;
 /// Maximum number of times that a place is taken by somebody else.
 pub const MAX_REPLACEMENTS: usize = 4;
 
@@ -48,9 +54,23 @@ pub enum ByHandProblem {
     /// The participant has postponed the game too often.
     #[error("you have postponed this game {0} times, which is the maximum; ask the organiser")]
     PostponedTooOften(u32),
+    /// All participants of the game have left.
+    #[error("all participants of this game have left; replace one of them first")]
+    NobodyLeft,
     /// Too many changes by hand.
-    #[error("a tournament can be changed by hand at most {MAX_CHANGES_BY_HAND} times")]
-    TooMany,
+    #[error("this was changed by hand too often: at most {0} times")]
+    TooMany(u32),
+}
+
+/// Who makes a participant leave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Leaving {
+    /// It leaves by itself.
+    Itself,
+    /// The organiser withdraws it.
+    ByOrganiser,
+    /// The organiser removes it.
+    Removed,
 }
 
 impl Tournament {
@@ -75,24 +95,31 @@ impl Tournament {
         self.state.paused
     }
 
-    /// The change by which a participant leaves; `None` if it has left.
+    /// The change by which a participant leaves; `None` if it has left. Whoever left by itself can
+    /// still be removed.
     ///
     /// # Errors
     /// If it cannot leave.
     pub fn withdraw(
         &self,
         participant: usize,
-        removed: bool,
+        leaving: Leaving,
     ) -> Result<Option<Change>, ByHandProblem> {
         let entrant = self.place(participant)?;
         if entrant.filler {
             return Err(ByHandProblem::Filler);
         }
-        let change = Change::Withdrawn {
+        let (state, removed) = (&self.state, leaving == Leaving::Removed);
+        if state.withdrawn[participant] && (!removed || state.removed[participant]) {
+            return Ok(None);
+        }
+        if leaving == Leaving::Itself && state.phase == State::Open {
+            within(state.withdrawn_early, MAX_EARLY_WITHDRAWALS)?;
+        }
+        Ok(Some(Change::Withdrawn {
             participant,
             removed,
-        };
-        Ok((!self.is_withdrawn(participant)).then_some(change))
+        }))
     }
 
     /// The change by which somebody else takes the place of a participant.
@@ -102,9 +129,10 @@ impl Tournament {
     pub fn replace(&self, participant: usize, by: Entrant) -> Result<Change, ByHandProblem> {
         self.place(participant)?;
         if self.state.phase == State::Open && self.is_withdrawn(participant) {
-            // The place is free: anybody can join.
+            // It is not among the participants any more, and anybody can join.
             return Err(ByHandProblem::NoParticipant);
         }
+        self.few_by_organiser()?;
         if self.former(participant).len() >= MAX_REPLACEMENTS {
             return Err(ByHandProblem::TooManyReplacements);
         }
@@ -118,12 +146,14 @@ impl Tournament {
     /// It is not being played.
     pub fn set_paused(&self, paused: bool) -> Result<Option<Change>, ByHandProblem> {
         self.being_played()?;
-        let change = if paused {
-            Change::Paused
-        } else {
-            Change::Resumed
-        };
-        Ok((self.state.paused != paused).then_some(change))
+        if self.state.paused == paused {
+            return Ok(None);
+        }
+        if !paused {
+            return Ok(Some(Change::Resumed));
+        }
+        self.few_by_organiser()?;
+        Ok(Some(Change::Paused))
     }
 
     /// The change that postpones a game; `by` a participant, or the organiser.
@@ -143,27 +173,38 @@ impl Tournament {
         }
         let most = self.state.settings.max_calls;
         let times = found.postponed.iter().filter(|&&who| who == by).count();
-        if by.is_some() && times >= most as usize {
-            return Err(ByHandProblem::PostponedTooOften(most));
+        match by {
+            None => self.few_by_organiser()?,
+            Some(_) if times >= most as usize => {
+                return Err(ByHandProblem::PostponedTooOften(most));
+            }
+            Some(by) => within(self.state.postponements[by], MAX_POSTPONEMENTS)?,
         }
         Ok(Change::Postponed { game, by })
     }
 
-    /// The change that calls a due or void game again, before all others.
+    /// The change that calls a due or void game again, before all others. While the tournament is
+    /// paused, no round is drawn and it does not end, so the last void game can still be called.
     ///
     /// # Errors
     /// It cannot be called.
     pub fn recall(&self, game: usize) -> Result<Change, ByHandProblem> {
         self.being_played()?;
+        self.few_by_organiser()?;
         let found = (self.games().get(game)).ok_or(ByHandProblem::NoGame)?;
         // Who advanced to the next round of a knockout has been decided.
         let is_decided =
             self.state.settings.format == Format::Knockout && found.round < self.state.drawn;
         match found.state {
-            GameState::Due => Ok(Change::Recalled { game }),
-            GameState::Void if !is_decided => Ok(Change::Recalled { game }),
-            _ => Err(ByHandProblem::NotDue),
+            GameState::Due => {}
+            GameState::Void if !is_decided => {}
+            _ => return Err(ByHandProblem::NotDue),
         }
+        if found.seats.iter().all(|&who| self.is_withdrawn(who)) {
+            // It would be void at once.
+            return Err(ByHandProblem::NobodyLeft);
+        }
+        Ok(Change::Recalled { game })
     }
 
     /// A participant of a tournament that is not over.
@@ -171,34 +212,40 @@ impl Tournament {
         if self.state.phase.is_over() {
             return Err(ByHandProblem::Over);
         }
-        self.few_changes()?;
         let entrant = self.state.participants.get(participant);
         entrant.ok_or(ByHandProblem::NoParticipant)
     }
 
     fn being_played(&self) -> Result<(), ByHandProblem> {
         match self.state.phase {
-            State::Playing => self.few_changes(),
+            State::Playing => Ok(()),
             State::Open | State::Finished | State::Closed => Err(ByHandProblem::NotPlaying),
         }
     }
 
-    fn few_changes(&self) -> Result<(), ByHandProblem> {
-        match self.state.by_hand < MAX_CHANGES_BY_HAND {
-            true => Ok(()),
-            false => Err(ByHandProblem::TooMany),
-        }
+    /// Whether the organiser can make one more change that is counted.
+    fn few_by_organiser(&self) -> Result<(), ByHandProblem> {
+        within(self.state.by_organiser, MAX_CHANGES_BY_HAND)
+    }
+}
+
+fn within(count: u32, most: u32) -> Result<(), ByHandProblem> {
+    match count < most {
+        true => Ok(()),
+        false => Err(ByHandProblem::TooMany(most)),
     }
 }
 
 impl TournamentState {
-    pub(super) fn withdraw(&mut self, participant: usize) {
+    pub(super) fn withdraw(&mut self, participant: usize, removed: bool) {
         if participant >= self.participants.len() {
             return;
         }
         self.by_hand += 1;
+        self.withdrawn_early += u32::from(self.phase == State::Open && !removed);
         self.leave_games(participant);
         self.withdrawn[participant] = true;
+        self.removed[participant] |= removed;
         self.set_physical_of(participant);
     }
 
@@ -207,14 +254,25 @@ impl TournamentState {
             return;
         }
         self.by_hand += 1;
+        self.by_organiser += 1;
         self.leave_games(participant);
         self.withdrawn[participant] = false;
+        self.removed[participant] = false;
+        self.postponements[participant] = 0;
         let games = self.sums[participant].games;
         let entrant = std::mem::replace(&mut self.participants[participant], by.clone());
         self.former[participant].push(Former { entrant, games });
         // What the former participant missed is not the new one's.
         for &(_, index) in &self.due {
-            self.games[index].missing.retain(|&who| who != participant);
+            let game = &mut self.games[index];
+            game.missing.retain(|&who| who != participant);
+            game.forfeited.retain(|&who| who != participant);
+        }
+        for &index in &self.playing {
+            let game = &mut self.games[index];
+            if game.forfeited.contains(&participant) {
+                game.forgiven.push(participant);
+            }
         }
         self.set_physical_of(participant);
     }
@@ -239,6 +297,14 @@ impl TournamentState {
             return;
         }
         self.by_hand += 1;
+        match by {
+            None => self.by_organiser += 1,
+            Some(by) => {
+                if let Some(times) = self.postponements.get_mut(by) {
+                    *times += 1;
+                }
+            }
+        }
         self.leave(index);
         let game = &mut self.games[index];
         game.missing.clear();
@@ -259,12 +325,14 @@ impl TournamentState {
             return;
         }
         self.by_hand += 1;
+        self.by_organiser += 1;
         let game = &mut self.games[index];
         game.state = GameState::Due;
         game.calls = 0;
         game.forfeited.clear();
         game.missing.clear();
         game.left.clear();
+        game.forgiven.clear();
         game.turn = self.front_turn;
         self.due.insert((self.front_turn, index));
         self.front_turn -= 1;
@@ -275,6 +343,10 @@ impl TournamentState {
     fn revive(&mut self, index: usize) {
         self.over -= 1;
         let game = &mut self.games[index];
+        if game.dealt && self.settings.deals == Deals::SameAtAllTables {
+            // Its participants have seen the deal.
+            game.deal = None;
+        }
         match game.deal.and_then(|deal| self.deals.get_mut(deal as usize)) {
             // Its deal may be known.
             Some(0) => game.deal = None,

@@ -9,7 +9,7 @@
 //! last call itself, the game is called once more without it; other absentees are waited for as
 //! before. A game that all participants forfeit, or that is aborted on its last call, is voided.
 //! Those who have left forfeit without being waited for. While the tournament is paused, no game is
-//! called and no wait counts.
+//! called, no wait counts, no round is drawn, and the tournament does not end.
 
 #[cfg(test)]
 mod tests;
@@ -63,11 +63,14 @@ impl Tournament {
                 (self.joined() >= enough).then(|| self.beginning())?
             }
             State::Playing => {
-                if let Some(change) = self.pairings() {
-                    return Some(change);
-                }
-                if self.state.is_round_over() && self.state.drawn >= self.state.rounds {
-                    return Some(Change::Finished);
+                // A void game can be called again until then.
+                if !self.state.paused {
+                    if let Some(change) = self.pairings() {
+                        return Some(change);
+                    }
+                    if self.state.is_round_over() && self.state.drawn >= self.state.rounds {
+                        return Some(Change::Finished);
+                    }
                 }
                 self.next_game(now_ms)
             }
@@ -89,6 +92,7 @@ impl Tournament {
             return None;
         }
         let is_last_call = played.calls >= state.settings.max_calls;
+        let never_started = matches!(ended, Ended::NeverStarted { .. });
         let mut was_left = false;
         let missing: Vec<usize> = match ended {
             Ended::Played { shifts, seats } if seats.len() == played.seats.len() => {
@@ -112,7 +116,11 @@ impl Tournament {
         Some(if is_last_call && missing.is_empty() && !was_left {
             Change::Voided { game }
         } else {
-            Change::Rescheduled { game, missing }
+            Change::Rescheduled {
+                game,
+                missing,
+                never_started,
+            }
         })
     }
 
@@ -142,6 +150,7 @@ impl Tournament {
                             Change::Rescheduled {
                                 game: index,
                                 missing,
+                                never_started: false,
                             }
                         } else {
                             called(index, game, missing)

@@ -35,8 +35,8 @@ pub struct Former {
 /// A step of a tournament. Folding the same changes again restores the tournament.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// A participant joined. Its number is the first that is free because its participant left
-    /// before the beginning, else the count of those before it.
+    /// A participant joined. Its number is the count of those before it; the number of one that left
+    /// is not used again.
     Joined(Entrant),
     /// A participant left, by itself or because its organiser removed it.
     Withdrawn {
@@ -95,6 +95,9 @@ pub enum Change {
         game: usize,
         /// Participants who did not come; empty if there was another reason.
         missing: Vec<usize>,
+        /// Whether it had not started although it was called, so nobody has seen its deal. `false`
+        /// also if that is unknown.
+        never_started: bool,
     },
     /// A game has a result.
     Counted {
@@ -198,6 +201,12 @@ pub struct Game {
     pub left: Vec<usize>,
     /// Participants who postponed it, as often as they did; `None`: the organiser.
     pub postponed: Vec<Option<usize>>,
+    /// Participants who took the place of one that forfeited it while it is being played. If it is
+    /// called again, they play.
+    pub(super) forgiven: Vec<usize>,
+    /// Whether participants may have seen its deal: it was called, and is not known to have never
+    /// started.
+    pub(super) dealt: bool,
     /// Position in the queue of due games.
     pub(super) turn: u64,
 }

@@ -9,6 +9,9 @@ use super::change::{Change, Entrant};
 use super::settings::{Deals, MAX_GAMES_AT_A_TIME, MIN_PARTICIPANTS};
 use super::state::State;
 
+/// Maximum number of participants who ever join, also if they leave before the beginning.
+const MAX_NUMBERS: usize = 4_096;
+
 /// Why joining fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum JoinProblem {
@@ -61,7 +64,8 @@ impl Tournament {
         if state.phase != State::Open {
             return Err(JoinProblem::Started);
         }
-        if self.joined() >= state.settings.max_participants {
+        let is_at_limit = state.participants.len() >= MAX_NUMBERS;
+        if is_at_limit || self.joined() >= state.settings.max_participants {
             return Err(JoinProblem::Full);
         }
         self.admits(&entrant, None)?;
@@ -75,7 +79,7 @@ impl Tournament {
 
     /// The number of the next participant to join.
     pub fn next_number(&self) -> usize {
-        self.state.next_number()
+        self.state.participants.len()
     }
 
     /// Checks an entrant; `place`: the participant whose place it takes.

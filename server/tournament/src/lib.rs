@@ -67,7 +67,10 @@ mod swiss;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use by_hand::{ByHandProblem, MAX_CHANGES_BY_HAND, MAX_REPLACEMENTS};
+pub use by_hand::{
+    ByHandProblem, Leaving, MAX_CHANGES_BY_HAND, MAX_EARLY_WITHDRAWALS, MAX_POSTPONEMENTS,
+    MAX_REPLACEMENTS,
+};
 pub use change::{Change, Ended, Entrant, Former, Game, GameResult, GameState, SeatResult};
 pub use chefshat_agents::ParticipantKind;
 pub use chefshat_engine::SeatStatistics;

@@ -94,7 +94,7 @@ impl Scheduler {
                 (self.to_check).extend(drawn.map(|index| (state.games[index].turn, index)));
                 self.known = state.games.len();
             }
-            Change::Rescheduled { game, missing } => {
+            Change::Rescheduled { game, missing, .. } => {
                 self.free_since.retain(|who, _| !missing.contains(who));
                 self.on_game_change(state, *game);
             }

@@ -90,8 +90,16 @@ pub(super) struct TournamentState {
     pub(super) former: Vec<Vec<Former>>,
     /// The participants of the games, ascending; empty before the beginning.
     pub(super) field: Vec<usize>,
+    /// By participant: whether the organiser has removed it.
+    pub(super) removed: Vec<bool>,
+    /// By participant: how often it has postponed games.
+    pub(super) postponements: Vec<u32>,
     /// Number of changes that a participant or the organiser made by hand.
     pub(super) by_hand: u32,
+    /// How many of them the organiser made, without removals and the ends of pauses.
+    pub(super) by_organiser: u32,
+    /// Number of withdrawals before the beginning, without removals.
+    pub(super) withdrawn_early: u32,
     pub(super) sums: Vec<Sums>,
     /// Total number of rounds; 0 before the beginning.
     pub(super) rounds: u32,
@@ -125,7 +133,11 @@ impl TournamentState {
             withdrawn: Vec::new(),
             former: Vec::new(),
             field: Vec::new(),
+            removed: Vec::new(),
+            postponements: Vec::new(),
             by_hand: 0,
+            by_organiser: 0,
+            withdrawn_early: 0,
             sums: Vec::new(),
             rounds: 0,
             drawn: 0,
@@ -150,12 +162,6 @@ impl TournamentState {
         }
         let numbers = 0..self.participants.len();
         numbers.filter(|&who| !self.withdrawn[who]).collect()
-    }
-
-    /// The number of the next participant to join.
-    pub(super) fn next_number(&self) -> usize {
-        let free = self.withdrawn.iter().position(|&withdrawn| withdrawn);
-        free.unwrap_or(self.participants.len())
     }
 
     /// Whether all games of the rounds paired so far are over.
@@ -186,11 +192,15 @@ impl TournamentState {
     pub(super) fn fold(&mut self, change: &Change) {
         match change {
             Change::Joined(entrant) => self.join(entrant),
-            Change::Withdrawn { participant, .. } => self.withdraw(*participant),
+            Change::Withdrawn {
+                participant,
+                removed,
+            } => self.withdraw(*participant, *removed),
             Change::Replaced { participant, by } => self.replace(*participant, by),
             Change::Paused | Change::Resumed => {
                 self.by_hand += 1;
                 self.paused = *change == Change::Paused;
+                self.by_organiser += u32::from(self.paused);
             }
             Change::Postponed { game, by } => self.postpone(*game, *by),
             Change::Recalled { game } => self.recall(*game),
@@ -205,7 +215,11 @@ impl TournamentState {
                 byes,
             } => self.draw(*round, tables, byes),
             Change::Called { game, forfeited } => self.call(*game, forfeited),
-            Change::Rescheduled { game, missing } => self.reschedule(*game, missing),
+            Change::Rescheduled {
+                game,
+                missing,
+                never_started,
+            } => self.reschedule(*game, missing, *never_started),
             Change::Counted { game, result } => self.count(*game, result),
             Change::Voided { game } => self.void(*game),
             Change::Finished => self.phase = State::Finished,
@@ -217,15 +231,10 @@ impl TournamentState {
     }
 
     fn join(&mut self, entrant: &Entrant) {
-        let number = self.next_number();
-        if let Some(free) = self.participants.get_mut(number) {
-            *free = entrant.clone();
-            self.withdrawn[number] = false;
-            self.former[number].clear();
-            return;
-        }
         self.participants.push(entrant.clone());
         self.withdrawn.push(false);
+        self.removed.push(false);
+        self.postponements.push(0);
         self.former.push(Vec::new());
         self.busy.push(0);
         self.sums.push(Sums {
@@ -295,6 +304,8 @@ impl TournamentState {
             missing: Vec::new(),
             left: Vec::new(),
             postponed: Vec::new(),
+            forgiven: Vec::new(),
+            dealt: false,
             turn: 0,
         });
         self.set_physical(index);
@@ -320,6 +331,7 @@ impl TournamentState {
         self.due.remove(&(game.turn, index));
         game.state = GameState::Playing;
         game.calls += 1;
+        game.dealt = true;
         game.forfeited = forfeited.to_vec();
         game.missing.clear();
         self.playing.insert(index);
@@ -331,7 +343,7 @@ impl TournamentState {
         }
     }
 
-    fn reschedule(&mut self, index: usize, missing: &[usize]) {
+    fn reschedule(&mut self, index: usize, missing: &[usize], never_started: bool) {
         let Some(game) = self.games.get_mut(index) else {
             return;
         };
@@ -342,12 +354,17 @@ impl TournamentState {
             GameState::Counted(_) | GameState::Void => return,
         }
         game.missing = missing.to_vec();
-        if missing.is_empty() && self.settings.deals == Deals::SameAtAllTables {
+        game.dealt = false;
+        let is_seen = missing.is_empty() && !never_started;
+        if is_seen && self.settings.deals == Deals::SameAtAllTables {
             let deal = game.deal.take();
             self.end_of_deal(deal);
         }
         self.leave(index);
-        self.games[index].left.clear();
+        let game = &mut self.games[index];
+        game.left.clear();
+        let forgiven = std::mem::take(&mut game.forgiven);
+        game.forfeited.retain(|who| !forgiven.contains(who));
         self.set_physical(index);
         self.queue(index);
     }

@@ -110,6 +110,16 @@ async fn the_agent_in_javascript_passes() {
     passes(&agent, many, Some(&set_up("CHEFSHAT_NODE_DIR"))).await;
 }
 
+async fn the_agent_in_cpp_passes() {
+    let agent = set_up("CHEFSHAT_CPP_AGENT");
+    let agent = agent.to_str().expect("text");
+    let many = format!(
+        "exec '{agent}' --address {{address}} --tournament {{tournament}} --name {{name}} --games 8"
+    );
+    let agent = [agent, "--address", "{address}", "--code", "{code}"];
+    passes(&agent, &many, None).await;
+}
+
 /// The agent without an SDK: with a fault or without, in a room or in a tournament.
 const BAD_AGENT: &str = env!("CARGO_BIN_EXE_bad_agent");
 
@@ -130,6 +140,7 @@ async fn good_agents_of_all_languages_pass() {
         the_built_in_agents_pass(),
         the_agent_of_the_python_package_passes(),
         the_agent_in_javascript_passes(),
+        the_agent_in_cpp_passes(),
         an_agent_without_an_sdk_passes(),
     );
 }

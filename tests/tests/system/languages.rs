@@ -1,20 +1,35 @@
-//! One game of four processes in three languages, against the binary over its port.
+//! One game of four processes in four languages, against the binary over its port; and what is tested
+//! of the agent in C++ alone: its ticket file, signals, TLS and tokens.
 
+use std::path::Path;
 use std::process::{Output, Stdio};
+use std::sync::Arc;
 
-use chefshat_client::Client;
+use chefshat_client::{Client, ConnectOptions};
 use chefshat_proto::v1;
 use chefshat_record::{jsonl, replay};
-use chefshat_tests::{Launch, patiently, set_up};
+use chefshat_server::access::{AccessSettings, Mode, NewToken, Role, TokenFile};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::store::MemoryStore;
+use chefshat_server::tls::TlsFiles;
+use chefshat_tests::{
+    Launch, StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, set_up,
+};
 use serde_json::Value;
+use tokio::io::{AsyncBufReadExt as _, BufReader};
 use tokio::process::Command;
 
-/// Runs a participant and returns its output.
-async fn participant(name: &str, mut command: Command) -> Output {
+/// Runs a program and returns its output.
+async fn output_of(name: &str, mut command: Command) -> Output {
     let output = command.stdin(Stdio::null()).kill_on_drop(true).output();
-    let output = patiently(name, output)
+    patiently(name, output)
         .await
-        .unwrap_or_else(|error| panic!("{name} does not start: {error}"));
+        .unwrap_or_else(|error| panic!("{name} does not start: {error}"))
+}
+
+/// Runs a participant to the end of its game and returns its output.
+async fn participant(name: &str, command: Command) -> Output {
+    let output = output_of(name, command).await;
     assert!(
         output.status.success(),
         "{name}: {}\n{}\n{}",
@@ -25,8 +40,18 @@ async fn participant(name: &str, mut command: Command) -> Output {
     output
 }
 
+/// The agent in C++, without settings from the environment of the tests.
+fn agent_in_cpp(address: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(set_up("CHEFSHAT_CPP_AGENT"));
+    command.args(["--address", address]).args(arguments);
+    for name in ["CODE", "TICKET", "TOKEN", "CA"] {
+        command.env_remove(format!("CHEFSHAT_{name}"));
+    }
+    command
+}
+
 #[tokio::test]
-async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
+async fn rust_python_javascript_and_cpp_play_a_game_to_fifteen_points() {
     let binary = set_up("CHEFSHAT_BIN");
     let python = set_up("CHEFSHAT_PYTHON");
     let node = set_up("CHEFSHAT_NODE_DIR");
@@ -42,12 +67,9 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     let room = created.room.expect("a room");
     let address = url.trim_start_matches("http://");
     let code = created.join_code.as_str();
-    let built_in = |kind: &str| {
-        let mut command = Command::new(&binary);
-        command.args(["agent", kind, "--server", &url, "--code", code]);
-        command.args(["--name", kind, "--json"]);
-        command
-    };
+    let mut built_in = Command::new(&binary);
+    built_in.args(["agent", "greedy", "--server", &url, "--code", code]);
+    built_in.args(["--name", "greedy", "--json"]);
     let mut in_python = Command::new(python);
     in_python
         .args(["-m", "chefshat.agent", "--address", address])
@@ -58,8 +80,11 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
         .args(["--address", address, "--code", code, "--name", "node"])
         .current_dir(node);
     let outputs = tokio::join!(
-        participant("greedy", built_in("greedy")),
-        participant("random", built_in("random")),
+        participant("greedy", built_in),
+        participant(
+            "cpp",
+            agent_in_cpp(address, &["--code", code, "--name", "cpp"])
+        ),
         participant("python", in_python),
         participant("node", in_node),
     );
@@ -72,7 +97,7 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     let over = client.get_room(&room.room_id).await.expect("still listed");
     assert_eq!(over.state(), v1::RoomState::Finished);
     let names: Vec<&str> = over.seats.iter().map(|seat| seat.name.as_str()).collect();
-    for name in ["greedy", "random", "python", "node"] {
+    for name in ["greedy", "cpp", "python", "node"] {
         assert!(names.contains(&name), "{name} is not among {names:?}");
     }
     assert!(server.stop().await.status.success());
@@ -95,4 +120,157 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
         Ok(replayed.decisions),
         "no timeouts and no illegal actions"
     );
+}
+
+/// The error that an agent printed before it exited with status 1.
+fn error_of(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let error = said.lines().find_map(|line| line.strip_prefix("agent: "));
+    error
+        .unwrap_or_else(|| panic!("no error: {said}"))
+        .to_owned()
+}
+
+#[tokio::test]
+async fn an_agent_in_cpp_that_is_killed_or_stopped_resumes_with_its_ticket_file() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let built_in = v1::SeatConfig {
+        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".to_owned())),
+        ..v1::SeatConfig::default()
+    };
+    let open = v1::SeatConfig::default();
+    let created = client
+        .create_room(v1::CreateRoomRequest {
+            rules: Some(one_shift()),
+            // Far longer than a test, so that no decision times out while no agent runs.
+            policy: Some(v1::RoomPolicy {
+                decision_time_ms: Some(3_600_000),
+                ..v1::RoomPolicy::default()
+            }),
+            seats: vec![open.clone(), open, built_in.clone(), built_in],
+            ..v1::CreateRoomRequest::default()
+        })
+        .await
+        .expect("a new room");
+    let code = created.join_code.as_str();
+    let other = client
+        .join_with_code(code, "other")
+        .await
+        .expect("a free seat");
+    let mut other = StreamSeat::attached(server.channel().await, &other.ticket).await;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("ticket");
+    let url = server.url();
+    let agent = || {
+        let file = file.to_str().expect("text");
+        agent_in_cpp(&url, &["--code", code, "--ticket-file", file])
+    };
+
+    let mut first = agent().kill_on_drop(true).spawn().expect("it starts");
+    // The game has begun and waits for the other seat.
+    let mut open = other.decision().await;
+    for _ in 0..2 {
+        other.answer(open.decision_id, first_legal(&open)).await;
+        open = other.decision().await;
+    }
+    let refused = error_of(&output_of("a second agent", agent()).await);
+    assert!(refused.starts_with("another agent uses "), "{refused}");
+    first.kill().await.expect("SIGKILL");
+    let ticket = std::fs::read_to_string(&file).expect("a ticket file");
+
+    let mut second = agent()
+        .stderr(Stdio::piped())
+        .kill_on_drop(true)
+        .spawn()
+        .expect("it starts");
+    let mut lines = BufReader::new(second.stderr.take().expect("a pipe")).lines();
+    let line = patiently("its first line", lines.next_line()).await;
+    let line = line.expect("text").expect("a line");
+    assert!(line.starts_with("resuming with the ticket in "), "{line}");
+    let id = second.id().expect("it runs").to_string();
+    let sent = Command::new("kill").args(["-TERM", &id]).status().await;
+    assert!(sent.expect("kill runs").success());
+    let status = patiently("the stopped agent", second.wait()).await;
+    assert_eq!(status.expect("a child process").code(), Some(1));
+    let line = lines.next_line().await.expect("text");
+    assert_eq!(line.as_deref(), Some("agent: stopped by a signal"));
+    let kept = std::fs::read_to_string(&file).expect("the file is kept");
+    assert_eq!(kept, ticket);
+
+    let third = tokio::spawn(participant("the third agent", agent()));
+    other.answer(open.decision_id, first_legal(&open)).await;
+    assert_eq!(play_on(&mut other).await, v1::DetachReason::GameOver);
+    let output = third.await.expect("it plays to the end");
+    let result: Value = serde_json::from_slice(&output.stdout).expect("a JSON line");
+    assert_eq!(result["standings"].as_array().map(Vec::len), Some(4));
+    let room = created.room.expect("a room").room_id;
+    let room = client.get_room(&room).await.expect("still listed");
+    let seat = result["seat"].as_u64().expect("a number");
+    assert_eq!(
+        room.seats[usize::try_from(seat).expect("small")].name,
+        "C++"
+    );
+    assert!(!file.exists(), "a ticket that is used up is removed");
+}
+
+#[tokio::test]
+async fn an_agent_in_cpp_shows_its_token_over_tls() {
+    let certificates = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/tls");
+    let files = TlsFiles {
+        certificate: certificates.join("localhost.pem"),
+        key: certificates.join("localhost.key"),
+        client_authority: None,
+    };
+    let ca = files.certificate.clone();
+    let guarded = |config: &mut ServerConfig| {
+        config.tls = Some(files);
+        config.access = AccessSettings {
+            mode: Some(Mode::Tokens),
+            ..AccessSettings::default()
+        };
+    };
+    let server = TestServer::with(guarded, Arc::new(MemoryStore::default())).await;
+    let url = format!("https://localhost:{}", server.address.port());
+    let token = |role| {
+        let created = TokenFile::of(server.data_dir()).create(NewToken {
+            role,
+            label: String::new(),
+            lifetime: None,
+            scope: None,
+        });
+        created.expect("the data folder is writable").to_text()
+    };
+    let options = ConnectOptions {
+        token: Some(token(Role::Host)),
+        ca: Some(ca.clone()),
+    };
+    let client = Client::connect_with(&url, &options).await;
+    let client = client.expect("the server listens");
+    let built_in = v1::SeatConfig {
+        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".to_owned())),
+        ..v1::SeatConfig::default()
+    };
+    let created = client
+        .create_room(v1::CreateRoomRequest {
+            rules: Some(one_shift()),
+            seats: [vec![v1::SeatConfig::default()], vec![built_in; 3]].concat(),
+            ..v1::CreateRoomRequest::default()
+        })
+        .await
+        .expect("a new room");
+    let code = ["--code", created.join_code.as_str()];
+
+    let mut without_token = agent_in_cpp(&url, &code);
+    without_token.env("CHEFSHAT_CA", &ca);
+    let refused = error_of(&output_of("without a token", without_token).await);
+    assert!(refused.contains("token"), "{refused}");
+
+    let mut with_token = agent_in_cpp(&url, &code);
+    with_token.env("CHEFSHAT_CA", &ca);
+    with_token.env("CHEFSHAT_TOKEN", token(Role::Player));
+    let output = participant("with a token", with_token).await;
+    let result: Value = serde_json::from_slice(&output.stdout).expect("a JSON line");
+    assert_eq!(result["seat"], 0);
 }

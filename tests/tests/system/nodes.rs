@@ -192,6 +192,11 @@ async fn what_nobody_has_is_answered_as_by_a_single_server_to_the_byte() {
     check!("RoomService/GetRoom", room(&nobodys), room(&nobodys));
     // A private room of another node, and one that does not exist.
     check!("RoomService/GetRoom", room(&private), room(&nobodys));
+    let clock = |id: &str| v1::GetClockRequest {
+        room_id: id.to_owned(),
+    };
+    check!("ServerService/GetClock", clock(&nobodys), clock(&nobodys));
+    check!("ServerService/GetClock", clock(&private), clock(&nobodys));
     let watch = |id: &str| v1::SpectatorServiceWatchRequest {
         room_id: id.to_owned(),
         ..v1::SpectatorServiceWatchRequest::default()

@@ -114,6 +114,7 @@ async fn no_bytes_harm_a_server_or_a_game() {
         "/chefshat.v1.SpectatorService/Watch",
         "/chefshat.v1.RecordService/GetRecord",
         "/chefshat.v1.ServerService/GetActionTable",
+        "/chefshat.v1.ServerService/GetClock",
     ];
     let mut grpc = tonic::client::Grpc::new(server.channel().await);
     let mut refused = 0;

@@ -10,8 +10,10 @@ use std::time::Duration;
 
 use chefshat_client::{Client, ConnectOptions, RandomAgent};
 use chefshat_proto::v1::analysis_service_client::AnalysisServiceClient;
+use chefshat_proto::v1::instrument_service_client::InstrumentServiceClient;
 use chefshat_proto::v1::record_service_client::RecordServiceClient;
 use chefshat_proto::v1::room_service_client::RoomServiceClient;
+use chefshat_proto::v1::server_service_client::ServerServiceClient;
 use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
 use chefshat_proto::v1::vector_service_client::VectorServiceClient;
@@ -377,6 +379,31 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
         rooms.close_room(v1::CloseRoomRequest {
             room_id: room_id.clone(),
             owner_token: wrong(room_id),
+        })
+    );
+    let mut servers = ServerServiceClient::new(client.channel());
+    ask!(
+        "GetClock",
+        servers.get_clock(v1::GetClockRequest {
+            room_id: room_id.clone(),
+        })
+    );
+    let mut instruments = InstrumentServiceClient::new(client.channel());
+    ask!(
+        "AddMarker",
+        instruments.add_marker(v1::AddMarkerRequest {
+            room_id: room_id.clone(),
+            owner_token: wrong(room_id),
+            label: "EEG on".into(),
+            elapsed_us: None,
+        })
+    );
+    ask!(
+        "FollowMarkers",
+        instruments.follow_markers(v1::FollowMarkersRequest {
+            room_id: room_id.clone(),
+            owner_token: wrong(room_id),
+            from_number: 0,
         })
     );
     let mut spectators = SpectatorServiceClient::new(client.channel());

@@ -33,6 +33,7 @@ pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command
     command.env("CHEFSHAT_BIN", places.chefshat());
     command.env("CHEFSHAT_PYTHON", places.python());
     command.env("CHEFSHAT_NODE_DIR", places.node());
+    command.env("CHEFSHAT_CPP_AGENT", places.cpp_agent());
     command.env("CHEFSHAT_WEB_DIR", places.web());
     command.env("CHEFSHAT_PROTO", places.root.join("proto"));
     // Otherwise Python would write its caches among the sources, also when a Rust test starts it.

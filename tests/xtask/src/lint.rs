@@ -45,6 +45,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         tool(places, "hadolint").arg("docker/Dockerfile"),
     )?;
 
+    let format = ["--dry-run", "--Werror", "clients/cpp/agent.cpp"];
+    steps.program("clang-format", tool(places, "clang-format").args(format))?;
+
     if places.python_packages().is_empty() {
         steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
     } else {

@@ -72,6 +72,21 @@ impl Places {
         self.node_package().join("package-lock.json").exists()
     }
 
+    /// The agent in C++.
+    pub(crate) fn cpp_source(&self) -> PathBuf {
+        self.root.join("clients/cpp")
+    }
+
+    /// Where the agent in C++ is built.
+    pub(crate) fn cpp_build(&self) -> PathBuf {
+        self.own.join("cpp")
+    }
+
+    /// The agent in C++, as a program.
+    pub(crate) fn cpp_agent(&self) -> PathBuf {
+        self.cpp_build().join("agent")
+    }
+
     /// The page for people.
     pub(crate) fn web_package(&self) -> PathBuf {
         self.root.join("clients/web")

@@ -17,6 +17,17 @@ const CARGO_DENY: &str = "0.20.2";
 /// Oldest major version of Node that the packages support.
 const OLDEST_NODE: u32 = 20;
 
+/// The Debian packages that the agent in C++ is built with.
+const CPP_PACKAGES: [&str; 7] = [
+    "cmake",
+    "g++",
+    "libgrpc++-dev",
+    "libprotobuf-dev",
+    "make",
+    "protobuf-compiler",
+    "protobuf-compiler-grpc",
+];
+
 /// A file in each created folder that lists its sources.
 const MADE_FROM: &str = ".made-from";
 
@@ -80,12 +91,37 @@ pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
     npm_package(&places.node_package(), &places.node())
 }
 
+/// The agent in C++, built with the system's gRPC.
+pub(crate) fn cpp_agent(places: &Places) -> Result<(), Failure> {
+    let (source, build) = (places.cpp_source(), places.cpp_build());
+    // CMake refuses a folder in which another source tree was built.
+    let made_from = source.display().to_string();
+    if !is_made_from(&build, &made_from) {
+        let _ = fs::remove_dir_all(&build);
+        fs::create_dir_all(&build).map_err(|error| at(&build, &error))?;
+        note_made_from(&build, &made_from)?;
+    }
+    let configure = || {
+        let mut cmake = Command::new("cmake");
+        cmake.arg("-S").arg(&source).arg("-B").arg(&build);
+        cmake
+    };
+    if read(&mut configure()).is_err() {
+        debian_packages(&CPP_PACKAGES)?;
+        run(&mut configure())?;
+    }
+    run(Command::new("cmake")
+        .arg("--build")
+        .arg(&build)
+        .args(["--parallel", "2"]))
+}
+
 /// The page for people, with its modules, in a folder in which the rest of the source tree is where
 /// the page expects it.
 pub(crate) fn web_package(places: &Places) -> Result<(), Failure> {
     let tree = places.web_tree();
     fs::create_dir_all(&tree).map_err(|error| at(&tree, &error))?;
-    for name in ["proto", "server", "tests"] {
+    for name in ["docs", "proto", "server", "tests"] {
         let link = tree.join(name);
         let source = places.root.join(name);
         if fs::read_link(&link).is_ok_and(|pointed| pointed == source) {
@@ -263,21 +299,22 @@ fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure>
 
 /// Installs a Debian package if it is missing, or names it if it cannot.
 fn debian_package(name: &str) -> Result<(), Failure> {
+    debian_packages(&[name])
+}
+
+/// Installs those of the Debian packages that are missing, or names them if it cannot.
+fn debian_packages(names: &[&str]) -> Result<(), Failure> {
     let root = read(Command::new("id").arg("-u")).is_ok_and(|id| id == "0");
     if !root || !succeeds("apt-get", &["--version"]) {
         return Err(Failure::new(format!(
-            "the Debian package `{name}` is missing; install it: apt-get install {name}"
+            "Debian packages are missing; install them: apt-get install {}",
+            names.join(" ")
         )));
     }
     run(Command::new("apt-get").args(["update", "--quiet"]))?;
     let mut install = Command::new("apt-get");
-    install.args([
-        "install",
-        "--yes",
-        "--quiet",
-        "--no-install-recommends",
-        name,
-    ]);
+    install.args(["install", "--yes", "--quiet", "--no-install-recommends"]);
+    install.args(names);
     // Services are not started: tests start servers of their own.
     run(install.env("RUNLEVEL", "1"))
 }

@@ -1,5 +1,5 @@
 //! `cargo xtask test`: the tests of every language, with the paths of the others. The system tests,
-//! in Rust, start agents in Python and JavaScript; the tests of those start the server.
+//! in Rust, start agents in Python, JavaScript and C++; the tests of those start the server.
 
 use std::process::Command;
 
@@ -19,7 +19,7 @@ use crate::wheels;
 /// The tests of a language, or of docker/, which can be run separately.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Part {
-    /// Engine, server, Rust SDK and system tests.
+    /// Engine, server, Rust SDK and system tests, with the agent in C++.
     Rust,
     /// The packages in clients/python and clients/robot.
     Python,
@@ -77,6 +77,7 @@ pub(crate) fn run(
     if wants(Part::Rust) {
         steps.run("PostgreSQL", setup::postgresql)?;
         steps.run("HAProxy", setup::haproxy)?;
+        steps.run("build the agent in C++", || setup::cpp_agent(places))?;
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from chefshat.backoff import Backoff
     from chefshat.batch import Batch
     from chefshat.client import Client, play
+    from chefshat.clock import ClockReading
     from chefshat.decision import Decision, SeatInfo
     from chefshat.errors import ChefsHatError
     from chefshat.local_server import LocalServer
@@ -35,6 +36,7 @@ __all__ = [
     "Batch",
     "ChefsHatError",
     "Client",
+    "ClockReading",
     "Decision",
     "LocalServer",
     "PlayOptions",
@@ -63,6 +65,7 @@ _HOMES = {
     "Batch": "batch",
     "ChefsHatError": "errors",
     "Client": "client",
+    "ClockReading": "clock",
     "Decision": "decision",
     "LocalServer": "local_server",
     "PlayOptions": "session",

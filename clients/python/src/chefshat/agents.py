@@ -40,7 +40,7 @@ class Agent(ABC):
         """Called when the server sends the current state instead of the events so far."""
 
     def on_awaited(self, awaited: pb.Awaited) -> None:
-        """Called when the game waits for another of the other seats, or for none (no `seat`).
+        """Called when the game waits for a different seat among the others, or for none of them (no `seat`).
 
         Only with events delivered at once.
         """

@@ -8,6 +8,7 @@ The .proto files document the fields; editors show them from the typed stubs. Th
 from chefshat._gen.chefshat.v1.analysis_service_pb2 import *
 from chefshat._gen.chefshat.v1.decision_pb2 import *
 from chefshat._gen.chefshat.v1.event_pb2 import *
+from chefshat._gen.chefshat.v1.instrument_service_pb2 import *
 from chefshat._gen.chefshat.v1.play_service_pb2 import *
 from chefshat._gen.chefshat.v1.record_pb2 import *
 from chefshat._gen.chefshat.v1.record_service_pb2 import *

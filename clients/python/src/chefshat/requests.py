@@ -30,13 +30,22 @@ REPEATABLE = (
     pb.CreateTournamentRequest,
     pb.JoinTournamentRequest,
     pb.AddTableParticipantRequest,
+    pb.ReplaceParticipantRequest,
 )
-# Requests that change nothing and are about a room or tournament.
+# Requests that change nothing. The Rust SDK repeats the same. Not `GetServerInfo`, which tells at once whether the server answers.
 READING = (
+    pb.GetActionTableRequest,
+    pb.GetClockRequest,
     pb.GetRoomRequest,
+    pb.ListRoomsRequest,
+    pb.ListRecordsRequest,
+    pb.GetRecordRequest,
     pb.GetTournamentRequest,
+    pb.ListTournamentsRequest,
     pb.GetTournamentResultsRequest,
     pb.ListTournamentGamesRequest,
+    pb.GetPhysicalTableRequest,
+    pb.GetLeaderboardRequest,
 )
 REQUEST_ID_BYTES = 32
 # Seconds before each further attempt of a request whose response was lost.
@@ -50,6 +59,26 @@ Answered = TypeVar("Answered")
 AskedPage = TypeVar("AskedPage", bound=PageRequest)
 AnsweredPage = TypeVar("AnsweredPage", bound=Page)
 Item = TypeVar("Item")
+Streaming = TypeVar("Streaming", covariant=True)
+
+
+class Streamed(Protocol[Streaming]):
+    """A call with several responses."""
+
+    def __iter__(self) -> Iterator[Streaming]: ...
+
+    def cancel(self) -> object:
+        """Ends the call."""
+
+
+class AsyncStreamed(Protocol[Streaming]):
+    """A call of asyncio with several responses."""
+
+    def __aiter__(self) -> AsyncIterator[Streaming]: ...
+
+    def cancel(self) -> object:
+        """Ends the call."""
+
 
 SeatSpec: TypeAlias = "pb.SeatConfig | pb.RecordedPlayer | pb.ParticipantKind.ValueType | str | None"
 """How to fill a seat: a built-in agent's name, a recorded player to imitate, the kind it is reserved for, None (open to all), or
@@ -173,10 +202,46 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
         await asyncio.sleep(pause)
 
 
+def streamed(method: Callable[[Asked], Streamed[Answered]], request: Asked) -> Iterator[Answered]:
+    """Yields the responses of a call. Before the first one, repeats the call like `called`."""
+    pauses = _pauses(request)
+    while True:
+        call = method(request)
+        try:
+            for response in call:
+                pauses = {}
+                yield response
+            return
+        except grpc.RpcError as error:
+            pause = _pause_after(error, pauses)
+        finally:
+            call.cancel()
+        time.sleep(pause)
+
+
+async def async_streamed(method: Callable[[Asked], AsyncStreamed[Answered]], request: Asked) -> AsyncIterator[Answered]:
+    """Yields the responses of a call of asyncio, like `streamed`."""
+    pauses = _pauses(request)
+    while True:
+        call = method(request)
+        try:
+            async for response in call:
+                pauses = {}
+                yield response
+            return
+        except grpc.RpcError as error:
+            pause = _pause_after(error, pauses)
+        finally:
+            call.cancel()
+        await asyncio.sleep(pause)
+
+
 def _pauses(request: object) -> dict[str, Iterator[float]]:
     """Returns the pauses in seconds between the attempts of a call, by the reason to repeat it; gives the request its id."""
     if isinstance(request, pb.ReportRequest):
         request.report_id = request.report_id or secrets.token_hex(REQUEST_ID_BYTES)
+    elif isinstance(request, pb.ReplaceParticipantRequest) and request.built_in_agent:
+        return {}  # Its id would be for the ticket, and a built-in agent has none.
     elif isinstance(request, REPEATABLE):
         request.request_id = request.request_id or secrets.token_bytes(REQUEST_ID_BYTES)
     elif not isinstance(request, READING):

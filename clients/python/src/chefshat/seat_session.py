@@ -39,6 +39,8 @@ class SeatSession:
         self.live_from = 0
         # A substitute plays for the connected seat, which has not resumed yet.
         self.substituted = False
+        # The agent knows of somebody whom the game waits for.
+        self.awaits = False
         # The decision that the agent is making.
         self.asked: Decision | None = None
         # The unacknowledged answer, and the decision it answers.

@@ -197,7 +197,7 @@ class PlaySession:
             elif what == "snapshot":
                 self._snapshot(seat, update.snapshot)
             elif what == "awaited":
-                seat.agent.on_awaited(update.awaited)
+                self._awaited(seat, update.awaited)
             elif what == "detached":
                 self._detached(seat, update.handle, update.detached)
             if seat.substituted:
@@ -299,8 +299,16 @@ class PlaySession:
         if seat.info is None:
             seat.info = SeatInfo(attached.room_id, attached.game_id, attached.seat, attached.next_sequence)
         seat.agent.on_attached(seat.info)
+        # Unless the server says so again, the game does not wait for whom it waited for before.
+        if seat.awaits:
+            self._awaited(seat, pb.Awaited())
         # The last answer may not have arrived. The server acknowledges a repeated answer in the same way.
         self._send_answer(seat)
+
+    @staticmethod
+    def _awaited(seat: SeatSession, awaited: pb.Awaited) -> None:
+        seat.awaits = awaited.HasField("seat")
+        seat.agent.on_awaited(awaited)
 
     def _refused(self, handle: int, refused: pb.Refused) -> None:
         if refused.request_id == REQUEST_ID and self._participant is not None:

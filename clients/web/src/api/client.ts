@@ -15,7 +15,11 @@ import { repeat } from "./repeat";
 import { showSecrets } from "./secrets";
 import { authorize } from "./token";
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat, authorize, showSecrets] });
+/** gRPC-web to the origin of the page. */
+export const transport = createGrpcWebTransport({
+  baseUrl: location.origin,
+  interceptors: [repeat, authorize, showSecrets],
+});
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);

@@ -3,6 +3,7 @@
 import { t } from "../i18n";
 import { CopyLine, useCopying } from "../lobby/Invite";
 import { Button } from "../parts/Button";
+import { download } from "../parts/download";
 import css from "./Experiment.module.css";
 
 /** The link of a participant. */
@@ -24,7 +25,9 @@ export function LinkList({ links }: { links: readonly StudyLink[] }) {
       {links.length > 1 && (
         <p class="row">
           {copy && <Button onClick={copy}>{copied ? `✓ ${t().common.copied}` : words.copyAll}</Button>}
-          <Button onClick={() => download(tableOf(links), "links.csv")}>{words.download}</Button>
+          <Button onClick={() => download(tableOf(links), "links.csv", "text/csv;charset=utf-8")}>
+            {words.download}
+          </Button>
         </p>
       )}
       <div class={css.list}>
@@ -44,13 +47,4 @@ export function tableOf(links: readonly StudyLink[]): string {
 
 function quoted(cell: string): string {
   return /[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
-}
-
-function download(text: string, name: string): void {
-  const address = URL.createObjectURL(new Blob([text], { type: "text/csv;charset=utf-8" }));
-  const link = document.createElement("a");
-  link.href = address;
-  link.download = name;
-  link.click();
-  URL.revokeObjectURL(address);
 }

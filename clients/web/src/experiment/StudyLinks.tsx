@@ -11,6 +11,7 @@ import { hostedRoom, invitation } from "../lobby/seat";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { seatNumber } from "../parts/SeatNumber";
+import { pathOf } from "../router";
 import css from "./Experiment.module.css";
 import { LinkList } from "./LinkList";
 import { OwnLinks, OwnRooms } from "./OwnRooms";
@@ -108,6 +109,9 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   return (
     <div class={css.study}>
       <p class="soft">{seats ? words.text : words.tournamentText}</p>
+      <p class="soft">
+        {words.hosted} <a href={pathOf({ page: "studies" })}>{t().studies.own.title}</a>
+      </p>
       {room && (
         <SelectField
           label={words.where}

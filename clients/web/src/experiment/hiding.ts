@@ -6,6 +6,8 @@ import { useLayoutEffect } from "preact/hooks";
 import type { Hideable, Study } from "./study";
 import "./hiding.css";
 
+export type { Hideable } from "./study";
+
 /** The hidden parts; empty outside a study. */
 export const hidden = signal<readonly Hideable[]>([]);
 

@@ -47,6 +47,11 @@ export async function startLanguage(): Promise<void> {
   await load(firstKnown([asked, recall("language"), ...navigator.languages]));
 }
 
+/** Shows the page in a language without storing it; nothing happens if it has no texts. */
+export async function showLanguage(asked: string): Promise<void> {
+  if ((asked === "en" || asked === "it") && asked !== language.peek()) await load(asked);
+}
+
 /** Changes the language and stores the choice on this device. */
 export async function setLanguage(chosen: Language): Promise<void> {
   remember("language", chosen);

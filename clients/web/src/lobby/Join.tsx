@@ -17,6 +17,7 @@ import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate, type Route } from "../router";
 import { heldPlace, takePlace } from "../tournaments/place";
+import { paceOf, storePace } from "../wizard/pace";
 import { lookUp } from "./code";
 import css from "./Join.module.css";
 import { JoinForm } from "./JoinForm";
@@ -213,12 +214,18 @@ export function NameForm({ code, room }: NameFormProps) {
   const [name, setName] = useState(lastName());
   const { busy, fault, run } = useAttempt();
   const [missing, setMissing] = useState(false);
+  const forRobots = room?.seats.some(({ kind, name, reservedFor }) => {
+    return name === "" && kind === ParticipantKind.UNSPECIFIED && reservedFor === ParticipantKind.ROBOT;
+  });
+  const [asRobot, setAsRobot] = useState(() => new URLSearchParams(location.search).get("as") === "robot");
   const taken = room?.seats.some((seat) => sameName(nameOf(seat), name)) ?? false;
   const join = (event: Event) => {
     event.preventDefault();
     setMissing(name.trim() === "");
     if (name.trim() === "" || taken) return;
-    run(async () => navigate(await comeIn(code, name)));
+    const pace = paceOf(new URLSearchParams(location.search).get("think") ?? "");
+    if (asRobot && pace) storePace(pace);
+    run(async () => navigate(await comeIn(code, name, asRobot)));
   };
   return (
     <form class={css.form} onSubmit={join}>
@@ -234,6 +241,15 @@ export function NameForm({ code, room }: NameFormProps) {
         maxLength={MAX_NAME}
         autoComplete="nickname"
       />
+      {(asRobot || forRobots) && (
+        <label class={css.asRobot} data-part="as-robot">
+          <input type="checkbox" checked={asRobot} onInput={(event) => setAsRobot(event.currentTarget.checked)} />
+          <span>
+            {t().wizard.asRobot}
+            <span class="soft small">{t().wizard.asRobotHint}</span>
+          </span>
+        </label>
+      )}
       {fault && <Notice kind="fault">{fault}</Notice>}
       <Button look="main" type="submit" busy={busy}>
         {words.sitDown}
@@ -250,9 +266,10 @@ function sameName(one: string, other: string): boolean {
 /**
  * Takes a seat in the room, or a place in the tournament, with this code; returns the route to it.
  */
-async function comeIn(code: string, name: string): Promise<Route> {
+async function comeIn(code: string, name: string, asRobot: boolean): Promise<Route> {
   try {
-    const { roomId } = await takeSeat(code, name);
+    const kind = asRobot ? ParticipantKind.ROBOT : ParticipantKind.HUMAN;
+    const { roomId } = await takeSeat(code, name, undefined, kind);
     return { page: "room", roomId };
   } catch (thrown) {
     if (faultOf(thrown).reason !== "JOIN_CODE_WRONG") throw thrown;

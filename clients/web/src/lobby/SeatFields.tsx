@@ -21,6 +21,7 @@ export function SeatFields({ form, faults, change, agents }: FormProps & { agent
     "anybody",
     "agent",
     "robot",
+    ...(real ? [] : (["wizard"] as const)),
     ...agents.map((agent): SeatChoice => `built-in ${agent}`).filter((choice) => !real || choice !== SEARCHING),
   ];
   const options = choices.map((value) => ({ value, label: choiceWord(value, real) }));
@@ -92,6 +93,8 @@ function choiceWord(choice: SeatChoice, real: boolean): string {
       return real ? words.remoteAgent : words.agent;
     case "robot":
       return real ? words.remoteRobot : words.robot;
+    case "wizard":
+      return words.wizard;
     default:
       return words.builtIn(choice.slice("built-in ".length));
   }

@@ -14,7 +14,7 @@ export const MAX_NAME = 64;
  * fills it.
  */
 export type SeatChoice = Remote | AtTable | `built-in ${string}`;
-type Remote = "human" | "robot" | "agent" | "anybody";
+type Remote = "human" | "robot" | "wizard" | "agent" | "anybody";
 export type AtTable = "at-table human" | "at-table robot";
 
 /** The form; numbers as typed. */
@@ -132,6 +132,8 @@ function seatConfig(choice: SeatChoice, name: string) {
       return { filledBy: { case: "atTable" as const, value: KINDS.human }, name: name.trim() };
     case "at-table robot":
       return { filledBy: { case: "atTable" as const, value: KINDS.robot }, name: name.trim() };
+    case "wizard":
+      return { filledBy: { case: "wizard" as const, value: KINDS.robot } };
     case "human":
     case "robot":
     case "agent":

@@ -67,13 +67,21 @@ export function roomOfCode(code: string): string | null {
   return roomId !== null && heldSeat(roomId) ? roomId : null;
 }
 
-/** Takes a seat for a person; the first free one without a number. Returns the room. */
-export async function takeSeat(code: string, name: string, seat?: number): Promise<Room> {
+/**
+ * Takes a seat for a person, or for one who plays as another kind; the first free one without a
+ * number. Returns the room.
+ */
+export async function takeSeat(
+  code: string,
+  name: string,
+  seat?: number,
+  kind: ParticipantKind = ParticipantKind.HUMAN,
+): Promise<Room> {
   const joined = await roomApi.joinRoom(
     {
       joinCode: canonical(code),
       name: name.trim(),
-      kind: ParticipantKind.HUMAN,
+      kind,
       ...(seat === undefined ? {} : { seat }),
     },
     { timeoutMs: CALL_LIMIT_MS },

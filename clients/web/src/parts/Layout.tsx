@@ -79,7 +79,11 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
   const words = t().common.nav;
   return [
     { href: "/", label: words.lobby, pages: ["lobby", "new", "join"] },
-    { href: "/tournaments", label: words.tournaments, pages: ["tournaments", "tournament", "newTournament"] },
+    {
+      href: "/tournaments",
+      label: words.tournaments,
+      pages: ["tournaments", "tournament", "results", "newTournament"],
+    },
     { href: "/leaderboard", label: words.leaderboard, pages: ["leaderboard", "person"] },
     { href: "/tutorial", label: words.tutorial, pages: ["tutorial", "rules"] },
   ];
@@ -106,8 +110,17 @@ function pageName(here: Route): string {
     case "tournaments":
     case "tournament":
       return words.common.nav.tournaments;
+    case "results":
+      return words.tournaments.results.title;
     case "newTournament":
       return words.organise.title;
+    case "study":
+      return words.studies.title;
+    case "studies":
+    case "ownStudy":
+      return words.studies.own.title;
+    case "newStudy":
+      return words.studies.make.title;
     case "leaderboard":
       return words.common.nav.leaderboard;
     case "person":

@@ -1,8 +1,10 @@
-// The table from a seat, with announcements, sounds and what calls a person back on their turn. The page knows where the seat comes from (a
-// room or a tournament) and shows problems with it in the banner.
+// The table from a seat, with announcements, sounds and what calls a person back on their turn. The
+// page knows where the seat comes from (a room or a tournament) and shows problems with it in the
+// banner.
 
 import type { ComponentChildren } from "preact";
 import { isOn } from "../preferences";
+import { Console, isWizard } from "../wizard/Console";
 import type { Acting } from "./acting";
 import { useAttention } from "./attention";
 import { useAutoPass } from "./auto-pass";
@@ -19,16 +21,19 @@ interface SeatedProps {
   tools?: ComponentChildren;
   /** The next step after the game. */
   onward?: ComponentChildren;
+  /** The person picked a card or put it back; its name is the face, or J for a joker. */
+  onPick?: (card: string, picked: boolean) => void;
   /** Shown below the seats while the room waits. */
   below?: ComponentChildren;
 }
 
 /** The table from a seat. */
-export function Seated({ acting, study, banner, tools, onward, below }: SeatedProps) {
+export function Seated({ acting, study, banner, tools, onward, below, onPick }: SeatedProps) {
   const { table, own, decision, awaited } = acting.live.value;
+  const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);
   useAttention(decision, table.phase !== "gameOver" && table.phase !== "aborted");
-  const autoPassing = useAutoPass(acting, !study && !table.physical && isOn("autoPass"));
+  const autoPassing = useAutoPass(acting, !study && !wizard && !table.physical && isOn("autoPass"));
   if (table.phase === "waiting") {
     return (
       <>
@@ -50,12 +55,25 @@ export function Seated({ acting, study, banner, tools, onward, below }: SeatedPr
       onward={onward}
       caption={table.roomName}
       hint={acting.hint.value}
-      plans={!study && isOn("plans")}
+      plans={!study && !wizard && isOn("plans")}
       autoPassing={autoPassing}
       onHint={table.policy?.hints ? acting.askHint : undefined}
       onAnswer={acting.answer}
-      onExpress={acting.express}
-      phrases={!study}
-    />
+      onPick={onPick}
+      onExpress={wizard ? undefined : acting.express}
+      phrases={!study && !wizard}
+    >
+      {wizard && table.phase !== "gameOver" && table.phase !== "aborted" && (
+        <Console
+          table={table}
+          decision={decision}
+          hint={acting.hint.value}
+          sending={acting.sending.value !== undefined}
+          onHint={table.policy?.hints ? acting.askHint : undefined}
+          onAnswer={acting.answer}
+          onExpress={acting.express}
+        />
+      )}
+    </TableView>
   );
 }

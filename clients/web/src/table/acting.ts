@@ -63,7 +63,7 @@ export interface Acting {
 }
 
 /** Starts acting with a seat's ticket; `timed` sends the decision time with each answer. */
-export function startActing(ticket: string, table: TableState, seat: number, timed: boolean): Acting {
+export function startActing(ticket: string, table: TableState, seat: number | undefined, timed: boolean): Acting {
   const live = signal(startLive(table, seat));
   const sending = signal<number | undefined>(undefined);
   const trouble = signal("");

@@ -15,6 +15,8 @@ export interface Gesture {
   valence?: number;
   /** -1..1 */
   arousal?: number;
+  /** The words of a robot's line, as a data URL. */
+  media?: string;
   source: ExpressionSource;
 }
 
@@ -50,6 +52,33 @@ export const PHRASES = {
 export type Phrase = keyof typeof PHRASES;
 
 const SAYS = "say:";
+
+/** A robot's line, and its request for help: the words are in `media`. */
+const SPOKEN = ["say", "help"];
+const WORDS = "data:,";
+/** The longest `media` that the protocol allows, bytes. */
+const MAX_MEDIA = 256;
+
+/** The expression for a line as a robot's program sends it. A text that does not fit is cut off. */
+export function lineGesture(text: string): Gesture {
+  const characters = Array.from(text);
+  let media = WORDS + encodeURIComponent(text);
+  while (media.length > MAX_MEDIA) {
+    characters.pop();
+    media = WORDS + encodeURIComponent(`${characters.join("").trimEnd()}…`);
+  }
+  return { label: "say", media, source: ExpressionSource.MODEL };
+}
+
+/** The label under which the page shows an expression: that of a robot's line has its words. */
+export function shownLabel({ label, media }: { label: string; media: string }): string {
+  if (!SPOKEN.includes(label) || !media.startsWith(WORDS)) return label;
+  try {
+    return `${SAYS}line ${decodeURIComponent(media.slice(WORDS.length))}`;
+  } catch {
+    return label;
+  }
+}
 
 export function phraseGesture(phrase: Phrase): Gesture {
   return { label: `${SAYS}${phrase} ${PHRASES[phrase]}`, source: ExpressionSource.UNSPECIFIED };

@@ -6,16 +6,13 @@ import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import type { OpenDecision } from "./model/live";
-import { isPresence, visibleLines } from "./model/log";
+import { isPresence, MOST_AT_ONCE, visibleLines } from "./model/log";
 import { isOpening } from "./model/requirement";
 import type { TableState } from "./model/state";
 import { createPresenceAnnouncer } from "./presence";
 import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
 import { spokenLine } from "./words";
-
-/** More events than this at once are a past that is caught up with. */
-const MOST_AT_ONCE = 14;
 
 /** Announces events, with sounds, while the table is rendered. */
 export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {

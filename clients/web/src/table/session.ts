@@ -15,10 +15,17 @@ export interface Session extends Acting {
   stop(): void;
 }
 
-/** Attaches to a seat. */
-export function startSession(held: HeldSeat, table: TableState): Session {
+/**
+ * Attaches to a seat; the server says which one it is. `timed` sends the decision time with each
+ * answer.
+ */
+export function startSession(
+  held: Pick<HeldSeat, "ticket"> & Partial<HeldSeat>,
+  table: TableState,
+  timed = asksForTimes(table.roomId),
+): Session {
   const { ticket } = held;
-  const acting = startActing(ticket, table, held.seat, asksForTimes(table.roomId));
+  const acting = startActing(ticket, table, held.seat, timed);
   const { live } = acting;
 
   const attach = () =>

@@ -198,7 +198,11 @@ function Overview({ live, mine, children }: OverviewProps) {
         </div>
         {!hidden.value.includes("pages") && (
           <div class={tournamentsCss.links}>
-            {tournament.round > 0 && <Button onClick={() => window.print()}>{words.print}</Button>}
+            {tournament.round > 0 && (
+              <ButtonLink href={pathOf({ page: "results", tournamentId: tournament.tournamentId })}>
+                {words.results.open}
+              </ButtonLink>
+            )}
             <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
           </div>
         )}

@@ -48,6 +48,11 @@ export function madeWords({ createdAtMs }: Tournament): string {
   return t().tournaments.made(moment(createdAtMs));
 }
 
+/** A date, without the time; milliseconds since the Unix epoch. */
+export function dateOf(ms: bigint): string {
+  return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "long" }).format(Number(ms));
+}
+
 /** A point in time, milliseconds since the Unix epoch. */
 function moment(ms: bigint): string {
   const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
@@ -67,10 +72,16 @@ function startWords({ startAtMs, startWhenJoined }: TournamentSettings): string 
  * time people have.
  */
 export function playWords(tournament: Tournament): string[] {
+  const { settings } = tournament;
+  return settings ? [startWords(settings), ...settingsWords(tournament)] : [];
+}
+
+/** How many games, and how much time people have. */
+export function settingsWords(tournament: Tournament): string[] {
   const words = t().tournaments.play;
   const { settings } = tournament;
   if (!settings) return [];
-  const parts = [startWords(settings)];
+  const parts: string[] = [];
   if (settings.format === TournamentFormat.KNOCKOUT) parts.push(words.knockout(settings.gamesPerPairing));
   else parts.push(words.rounds(settings.rounds, settings.gamesPerPairing));
   const stop = settings.rules?.stop;

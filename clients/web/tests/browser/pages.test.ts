@@ -131,6 +131,7 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   tournament: { path: () => `/tournaments/${tournamentId}`, ready: '[data-part~="standings"] tbody tr' },
   wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: '[data-part~="standings"] tbody tr' },
   "wall before": { path: () => `/tournaments/${ownId}?wall`, ready: '[data-part~="entrants"] li' },
+  results: { path: () => `/tournaments/${tournamentId}/results`, ready: '[data-part~="certificates"], footer' },
   leaderboard: { path: () => "/leaderboard", ready: "tbody tr" },
   "a person": { path: () => "/people/Gustav", ready: "h1" },
   tutorial: { path: () => "/tutorial", ready: '[data-part~="lesson"]' },

@@ -10,6 +10,7 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { type RecordLine, RecordLineSchema } from "../../src/gen/chefshat/v1/record_pb";
 import { ParticipantKind, type RoomPolicy } from "../../src/gen/chefshat/v1/room_pb";
 import { RoomService } from "../../src/gen/chefshat/v1/room_service_pb";
+import { StudyService } from "../../src/gen/chefshat/v1/study_service_pb";
 import { TableService } from "../../src/gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../../src/gen/chefshat/v1/tournament_service_pb";
 import { type Server, until } from "./stage";
@@ -25,6 +26,7 @@ export function clientsOf(server: Server) {
     rooms: createClient(RoomService, transport),
     tournaments: createClient(TournamentService, transport),
     tables: createClient(TableService, transport),
+    studies: createClient(StudyService, transport),
   };
 }
 

@@ -16,8 +16,8 @@ pub(crate) struct AwaitedSeat {
     away: bool,
     /// Since its decision was opened, when the message arrived.
     waited_ms: u64,
-    /// Until the server decides for it, when the message arrived.
-    left_ms: u64,
+    /// Until the server decides for it, when the message arrived. `None` if nobody may know.
+    left_ms: Option<u64>,
     /// Arrival of the message, by the caller's clock.
     since_ms: u64,
 }
@@ -29,7 +29,7 @@ impl AwaitedSeat {
             seat: awaited.seat?,
             away: awaited.away,
             waited_ms: awaited.waited_ms.into(),
-            left_ms: awaited.left_ms.into(),
+            left_ms: awaited.left_ms.map(u64::from),
             since_ms: now_ms,
         })
     }
@@ -45,8 +45,9 @@ impl AwaitedSeat {
         let passed = now_ms.saturating_sub(self.since_ms);
         let name = table.name(self.seat);
         if self.away {
-            let left = self.left_ms.saturating_sub(passed).div_ceil(1000);
-            return Some(format!("Waiting for {name} (away): {left} s"));
+            let left = |ms: u64| ms.saturating_sub(passed).div_ceil(1000);
+            let left = (self.left_ms).map_or_else(String::new, |ms| format!(": {} s", left(ms)));
+            return Some(format!("Waiting for {name} (away){left}"));
         }
         let waited = self.waited_ms + passed;
         (waited >= PATIENCE_MS).then(|| format!("Waiting for {name} for {} s", waited / 1000))
@@ -67,18 +68,24 @@ mod tests {
             seat: Some(2),
             away: true,
             waited_ms: 100,
-            left_ms: 12_000,
+            left_ms: Some(12_000),
         };
         for (now_ms, seconds) in [(1_000, 12), (1_001, 12), (2_000, 11), (99_000, 0)] {
-            let expected = format!("Waiting for seat 3 (away): {seconds} s");
+            let expected = format!("Waiting for seat 2 (away): {seconds} s");
             assert_eq!(words(away, now_ms), Some(expected));
         }
+        let unknown = v1::Awaited {
+            left_ms: None,
+            ..away
+        };
+        let expected = Some("Waiting for seat 2 (away)".to_owned());
+        assert_eq!(words(unknown, 2_000), expected);
         let here = v1::Awaited {
             away: false,
             ..away
         };
         assert_eq!(words(here, 5_899), None);
-        let expected = Some("Waiting for seat 3 for 5 s".to_owned());
+        let expected = Some("Waiting for seat 2 for 5 s".to_owned());
         assert_eq!(words(here, 5_900), expected);
         assert_eq!(words(v1::Awaited::default(), 9_000), None);
     }

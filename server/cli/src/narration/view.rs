@@ -125,7 +125,7 @@ impl GameView {
     pub(crate) fn name(&self, seat: u32) -> String {
         match self.seat(seat) {
             Some(place) if !place.name.is_empty() => place.name.clone(),
-            _ => format!("seat {}", seat.saturating_add(1)),
+            _ => format!("seat {seat}"),
         }
     }
 

@@ -35,9 +35,10 @@ pub(super) struct Create {
     server: ServerArg,
     /// How to fill the next seat: random, greedy, trained or monte_carlo (played by the server),
     /// replay:GAME-ID:SEAT (imitates the player who had that seat, from 0, in a recorded game), each
-    /// optionally with =NAME for another name; open, agent, human or robot (who may join); or, with
-    /// --physical, table=NAME or table_robot=NAME (a person or a robot at the table). Several seats
-    /// as in human*3. Repeatable; seats not listed are open.
+    /// optionally with =NAME for another name; open, agent, human or robot (who may join); wizard (a
+    /// person who plays as a robot, and joins as one); or, with --physical, table=NAME or
+    /// table_robot=NAME (a person or a robot at the table). Several seats as in human*3. Repeatable;
+    /// seats not listed are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seats)]
     seats: Vec<Seats>,
     /// Play with real cards: the server deals nothing, and what happens at the table is reported, by
@@ -217,9 +218,11 @@ impl Seats {
 }
 
 fn seats(word: &str) -> Result<Seats, String> {
+    // A name may contain an asterisk: only a number after the last one is a count.
+    let is_number = |count: &str| count.bytes().all(|byte| byte.is_ascii_digit());
     let (word, count) = match word.rsplit_once('*') {
-        Some((word, count)) => (word, count.parse().ok()),
-        None => (word, Some(1)),
+        Some((word, count)) if is_number(count) => (word, count.parse().ok()),
+        _ => (word, Some(1)),
     };
     let count = count.filter(|count| (1..=MAX_SEATS).contains(count));
     let count = count.ok_or_else(|| format!("after * give a number from 1 to {MAX_SEATS}"))?;
@@ -235,7 +238,8 @@ fn seat(word: &str) -> Result<v1::SeatConfig, String> {
         Some((agent, name)) => (filled_by(agent)?, name),
         None => (filled_by(word)?, ""),
     };
-    if !name.is_empty() && matches!(filled_by, FilledBy::ReservedFor(_)) {
+    let is_open = matches!(filled_by, FilledBy::ReservedFor(_) | FilledBy::Wizard(_));
+    if !name.is_empty() && is_open {
         return Err(
             "only a built-in agent or a player at the table can be named; participants bring their own names".into(),
         );
@@ -261,6 +265,9 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
     if let Some(kind) = at_table {
         return Ok(FilledBy::AtTable(kind.into()));
     }
+    if word == "wizard" {
+        return Ok(FilledBy::Wizard(v1::ParticipantKind::Robot.into()));
+    }
     let reserved = match word {
         "open" => Some(v1::ParticipantKind::Unspecified),
         _ => kind_from_name(word),
@@ -273,7 +280,7 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
         Err(AgentNameError::Unknown(_)) => {
             let known = NamedAgent::NAMES.join(", ");
             Err(format!(
-                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot"
+                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot, wizard"
             ))
         }
         Err(error) => Err(error.to_string()),
@@ -526,5 +533,18 @@ mod tests {
         for word in ["human*", "human*0", "human*x", "*3"] {
             assert!(seats(word).is_err(), "{word}");
         }
+        // A name may contain an asterisk.
+        for (word, name, count) in [("greedy=A*B", "A*B", 1), ("greedy=A*B*2", "A*B", 2)] {
+            let filled = seats(word).expect(word);
+            assert_eq!((&*filled.seat.name, filled.count), (name, count));
+        }
+    }
+
+    #[test]
+    fn a_person_plays_as_a_robot() {
+        let asked = request("--seat wizard").expect("a room");
+        let robot = v1::ParticipantKind::Robot.into();
+        assert_eq!(asked.seats[0].filled_by, Some(FilledBy::Wizard(robot)));
+        assert!(Only::try_parse_from(["test", "--seat", "wizard=Robbie"]).is_err());
     }
 }

@@ -104,6 +104,7 @@ fn a_dataset_is_exported_from_the_data_folder() {
         "SHA256SUMS",
         "decisions.parquet",
         "expressions.parquet",
+        "markers.parquet",
     ];
     assert_eq!(stage.out(), standard);
     let ended = stage
@@ -112,7 +113,7 @@ fn a_dataset_is_exported_from_the_data_folder() {
     let said = ended.json();
     assert_eq!(said["games"], 2);
     assert_eq!(said["finished"], 2);
-    assert_eq!(said["files"].as_array().unwrap().len(), 5);
+    assert_eq!(said["files"].as_array().unwrap().len(), 7);
     let files = [
         "README.md",
         "SHA256SUMS",
@@ -120,6 +121,8 @@ fn a_dataset_is_exported_from_the_data_folder() {
         "decisions.jsonl",
         "expressions.csv",
         "expressions.jsonl",
+        "markers.csv",
+        "markers.jsonl",
     ];
     assert_eq!(stage.out(), files);
     let rows = std::fs::read_to_string(stage.path("out/decisions.jsonl")).unwrap();
@@ -184,7 +187,7 @@ fn only_a_dataset_is_replaced() {
     let notes = stage.path("out/notes.txt");
     std::fs::write(&notes, "kept").unwrap();
     let before = contents(&stage.path("out"));
-    assert_eq!(before.len(), 5);
+    assert_eq!(before.len(), 6);
     let ended = stage.export("--force");
     ended.assert_failed(
         "it is not only a dataset: it contains notes.txt, which SHA256SUMS does not list",

@@ -1,7 +1,7 @@
 //! The files of a dataset: the formats agree, checksums, the card.
 
 use chefshat_dataset::{
-    ColumnInfo, Export, Format, decision_columns, expression_columns, markdown,
+    ColumnInfo, Export, Format, decision_columns, expression_columns, markdown, marker_columns,
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -58,6 +58,9 @@ fn every_format_has_every_row_and_exports_are_deterministic() {
             "expressions.parquet",
             "expressions.jsonl",
             "expressions.csv",
+            "markers.parquet",
+            "markers.jsonl",
+            "markers.csv",
             "README.md"
         ]
     );
@@ -102,6 +105,8 @@ fn the_card_is_readable_by_hubs_and_people() {
         "  default: true",
         "- config_name: expressions",
         "  data_files: expressions.parquet",
+        "- config_name: markers",
+        "  data_files: markers.parquet",
         "- n<1K",
     ] {
         assert!(front.lines().any(|of| of == line), "{line} in {front}");
@@ -109,6 +114,7 @@ fn the_card_is_readable_by_hubs_and_people() {
     for table in [
         markdown(&decision_columns()),
         markdown(&expression_columns()),
+        markdown(&marker_columns()),
     ] {
         assert!(card.contains(&table));
         assert!(
@@ -152,15 +158,31 @@ fn parquet_and_json_lines_have_the_same_values() {
             label: "joy".into(),
             valence: Some(0.7),
             record_only: true,
+            about: Some(v1::expression::About::Gaze(v1::GazePoint {
+                x: 0.25,
+                y: -0.5,
+                frame: v1::GazeFrame::Table.into(),
+            })),
             ..v1::Expression::default()
         }),
     };
-    let lines = with_lines(a_record(1), &[(3, Line::PrivateExpression(expression))]);
+    let marker = v1::Marker {
+        number: 1,
+        label: "EEG on".into(),
+        elapsed_us: 1_500,
+        received_ms: 0,
+    };
+    let added = [
+        (3, Line::PrivateExpression(expression)),
+        (4, Line::Marker(marker)),
+    ];
+    let lines = with_lines(a_record(1), &added);
     let stage = Stage::new(&[("a.jsonl", lines)]);
     stage.run(&stage.export()).unwrap();
-    let tables: [(&str, Vec<ColumnInfo>); 2] = [
+    let tables: [(&str, Vec<ColumnInfo>); 3] = [
         ("decisions", decision_columns()),
         ("expressions", expression_columns()),
+        ("markers", marker_columns()),
     ];
     for (table, columns) in tables {
         let path = stage.out().join(format!("{table}.parquet"));

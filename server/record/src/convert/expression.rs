@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, expression::About};
 
 use super::rules::FieldProblem;
 
@@ -18,11 +18,14 @@ const LAST_SECOND: i64 = 253_402_300_799;
 pub(crate) const LAST_MS: u64 = LAST_SECOND as u64 * 1000 + 999;
 const NANOS: RangeInclusive<i32> = 0..=999_999_999;
 
-/// Checks an expression.
+/// How far outside of its frame a point of gaze may be, in widths or heights of the frame.
+const GAZE: RangeInclusive<f32> = -10.0..=10.0;
+
+/// Checks an expression in a room with this number of seats.
 ///
 /// # Errors
 /// The first field out of range.
-pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem> {
+pub fn check_expression(expression: &v1::Expression, seats: usize) -> Result<(), FieldProblem> {
     let text = |field, text: &str, bytes: RangeInclusive<usize>| {
         if bytes.contains(&text.len()) {
             Ok(())
@@ -58,5 +61,27 @@ pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem>
     if v1::ExpressionSource::try_from(expression.source).is_err() {
         return Err(FieldProblem::new("source", "not a value of this enum"));
     }
-    Ok(())
+    match &expression.about {
+        Some(About::AboutSeat(seat))
+            if usize::try_from(*seat).map_or(true, |seat| seat >= seats) =>
+        {
+            let problem = format!("{seat} is not a seat of the room");
+            Err(FieldProblem::new("about_seat", problem))
+        }
+        Some(About::Gaze(gaze)) => check_gaze(gaze),
+        _ => Ok(()),
+    }
+}
+
+fn check_gaze(gaze: &v1::GazePoint) -> Result<(), FieldProblem> {
+    for (field, value) in [("gaze.x", gaze.x), ("gaze.y", gaze.y)] {
+        if !GAZE.contains(&value) {
+            let problem = format!("{value} is not in -10..=10");
+            return Err(FieldProblem::new(field, problem));
+        }
+    }
+    match v1::GazeFrame::try_from(gaze.frame) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(FieldProblem::new("gaze.frame", "not a value of this enum")),
+    }
 }

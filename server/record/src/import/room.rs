@@ -44,6 +44,8 @@ pub enum RoomEntry {
     },
     /// An expression for the record only.
     Private(v1::PrivateExpression),
+    /// A marker of the room's owner.
+    Marker(v1::Marker),
 }
 
 impl PhysicalRoom {
@@ -101,6 +103,11 @@ impl Importer {
                 self.elapsed_ms = self.elapsed_ms.max(private.elapsed_ms);
                 private.elapsed_ms = self.elapsed_ms;
                 self.push(Line::PrivateExpression(private));
+            }
+            RoomEntry::Marker(mut marker) => {
+                self.elapsed_ms = self.elapsed_ms.max(marker.received_ms);
+                marker.received_ms = self.elapsed_ms;
+                self.push(Line::Marker(marker));
             }
         }
         Ok(())

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::num::{IntErrorKind, ParseIntError};
 use std::str::FromStr;
 
-use chefshat_engine::{Action, Cards, RewardScheme, RuleSet, Seat};
+use chefshat_engine::{Action, Cards, MAX_SEATS, RewardScheme, RuleSet, Seat};
 use chefshat_proto::v1;
 
 use super::notation::{cards, kinds, play, rules};
@@ -362,7 +362,7 @@ fn expression(cells: &Cells<'_>) -> Result<v1::Expression, TranscriptError> {
         source: source.into(),
         ..v1::Expression::default()
     };
-    check_expression(&expression).map_err(|problem| cells.wrong(problem.to_string()))?;
+    check_expression(&expression, MAX_SEATS).map_err(|problem| cells.wrong(problem.to_string()))?;
     Ok(expression)
 }
 

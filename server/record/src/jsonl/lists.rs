@@ -28,7 +28,7 @@ pub fn excess(line: &Line) -> Option<Excess> {
         Line::Decision(decision) => of_decision(decision),
         Line::Event(event) => first([("rewards", event.rewards.len(), MAX_SEATS)])
             .or_else(|| of_event(event.kind.as_ref()?)),
-        Line::PrivateExpression(_) | Line::Footer(_) => None,
+        Line::PrivateExpression(_) | Line::Marker(_) | Line::Footer(_) => None,
     }
 }
 

@@ -35,8 +35,10 @@ pub(super) struct SeatClock {
     pub(super) lost_at_ms: u64,
     /// How long it was not connected since the last decision, in absences that have ended.
     pub(super) away_ms: u64,
-    /// Whether its last decision ended because it was away, so that it is substituted.
+    /// Whether its last decision certainly ended because it was away, so that it is substituted.
     pub(super) absent: bool,
+    /// Whether it may be substituted, because it was away when its last decision ended.
+    pub(super) absent_at_most: bool,
     /// Timeouts in a row, as far as they certainly count.
     pub(super) timeouts: u32,
     /// Timeouts in a row, if everything counts that may: servers differ in whether silent decisions
@@ -50,11 +52,13 @@ impl SeatClock {
     /// Counts a decision of the seat.
     pub(super) fn count(&mut self, kind: DecisionKind, record: &v1::DecisionRecord) {
         self.decisions += 1;
+        let own_ms = u64::from(self.decision_time_ms) + u64::from(self.bank_ms);
         self.bank_ms = record.bank_left_ms;
         self.annotation_bytes += (record.annotations.as_ref()).map_or(0, Message::encoded_len);
         let silent = u32::from(kind == DecisionKind::SpecialAction);
         let by_absence = record.source() == Source::Disconnected && self.absence_ms.is_some();
-        self.absent = by_absence && silent == 0;
+        self.absent_at_most = by_absence && silent == 0;
+        self.absent = self.absent_at_most && record.decision_time_us < own_ms * 1000;
         match record.source() {
             Source::Agent => {
                 self.timeouts = 0;
@@ -78,8 +82,8 @@ impl SeatClock {
         self.connected = Some(false);
     }
 
-    /// How long it was at most not connected since the last decision, until now. `None` if the events
-    /// do not tell.
+    /// How long it was at most not connected since the last decision, until now. `None` if the
+    /// events do not tell.
     pub(super) fn away_ms_at(&self, elapsed_ms: u64) -> Option<u64> {
         match self.connected? {
             true => Some(self.away_ms),
@@ -351,11 +355,16 @@ impl OpenDecision<'_> {
         let (own, bank) = (u64::from(clock.decision_time_ms), u64::from(clock.bank_ms));
         let absence = (clock.absence_ms).filter(|_| record.source() == Source::Disconnected);
         let unbanked = clock.unbanked_ms_at(record.elapsed_ms);
+        // The absence time counts from the loss of the connection.
+        let was_away = |absence: u32| {
+            let away = clock.away_ms_at(record.elapsed_ms);
+            away.is_none_or(|away| away >= absence.into())
+        };
         // The longest time of any seat limits a special action, without the bank.
         let (least, most) = match (special, absence) {
             (true, _) => (own, u64::from(self.longest_decision_ms).max(own + bank)),
-            (false, Some(absence)) => (absence.into(), own + bank),
-            (false, None) => (own + bank, own + bank + unbanked),
+            (false, Some(absence)) if was_away(absence) => (absence.into(), own + bank),
+            (false, _) => (own + bank, own + bank + unbanked),
         };
         match record.source() {
             Source::Timeout | Source::Disconnected if in_time(least) => Err(format!(

@@ -13,7 +13,9 @@ use super::fault::Fault;
 use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
-use crate::convert::{By, LAST_MS, event_kind, final_table, seat_number, with_rewards};
+use crate::convert::{
+    By, LAST_MS, check_marker, event_kind, final_table, seat_number, with_rewards,
+};
 use crate::import::facts_of_record;
 use crate::signature::PublicKey;
 
@@ -54,6 +56,7 @@ pub(super) struct Replay<'a> {
     lost: Option<u32>,
     pub(super) decisions: u64,
     pub(super) events: u64,
+    markers: u64,
     elapsed_ms: u64,
     last_decision_ms: u64,
     pub(super) over: Option<v1::RoomState>,
@@ -82,6 +85,7 @@ impl<'a> Replay<'a> {
             lost: None,
             decisions: 0,
             events: 0,
+            markers: 0,
             elapsed_ms: 0,
             last_decision_ms: 0,
             over: None,
@@ -134,6 +138,13 @@ impl<'a> Replay<'a> {
                 self.not_over()?;
                 self.time(private.elapsed_ms)?;
                 Ok(self.seats.private(private)?)
+            }
+            Line::Marker(marker) => {
+                self.not_over()?;
+                self.time(marker.received_ms)?;
+                self.markers += 1;
+                let checked = check_marker(marker, self.markers);
+                checked.map_err(|problem| format!("marker.{problem}").into())
             }
             Line::Footer(footer) => self.end(footer),
             Line::Header(_) | Line::Decision(_) => unreachable!("taken by the caller"),
@@ -188,8 +199,8 @@ impl<'a> Replay<'a> {
         };
         let action = open_decision.check(record)?;
         clock.count(open.kind, record);
-        // A seat that was away or late too often is substituted at once. In a physical room a correction
-        // may have voided some of its timeouts.
+        // A seat that was away or late too often is substituted at once. In a physical room a
+        // correction may have voided some of its timeouts.
         let limit = self
             .header
             .policy

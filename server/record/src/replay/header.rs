@@ -126,7 +126,11 @@ fn check_seats(seats: &[v1::Participant], players: usize) -> Result<(), String> 
         if seat.seat != number {
             return Err(must_be(&format!("seats[{index}].seat"), seat.seat, number));
         }
-        for (field, kind) in [("kind", seat.kind), ("reservedFor", seat.reserved_for)] {
+        for (field, kind) in [
+            ("kind", seat.kind),
+            ("reservedFor", seat.reserved_for),
+            ("shownKind", seat.shown_kind),
+        ] {
             if v1::ParticipantKind::try_from(kind).is_err() {
                 return Err(format!(
                     "seats[{index}].{field} is {kind}, which is not a kind of participant"

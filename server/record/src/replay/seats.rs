@@ -23,6 +23,14 @@ pub(super) struct Seats {
     connection_events: Vec<u32>,
 }
 
+/// As what a participant was shown: in the room it counts as this kind.
+fn shown_kind(seat: &v1::Participant) -> i32 {
+    match seat.shown_kind() {
+        v1::ParticipantKind::Unspecified => seat.kind,
+        shown => shown.into(),
+    }
+}
+
 impl Seats {
     pub(super) fn new(header: &v1::RecordHeader) -> Self {
         let policy = header.policy.clone().unwrap_or_default();
@@ -34,8 +42,8 @@ impl Seats {
                 .map(|seat| {
                     let built_in = !seat.built_in_agent.is_empty();
                     // Clocks by kind do not apply to built-in agents.
-                    let own =
-                        (policy.clocks.iter()).find(|clock| !built_in && clock.kind == seat.kind);
+                    let own = (policy.clocks.iter())
+                        .find(|clock| !built_in && clock.kind == shown_kind(seat));
                     let decision_time_ms = own
                         .and_then(|clock| clock.decision_time_ms)
                         .unwrap_or(policy.decision_time_ms());
@@ -56,6 +64,7 @@ impl Seats {
                         lost_at_ms: 0,
                         away_ms: 0,
                         absent: false,
+                        absent_at_most: false,
                         timeouts: 0,
                         timeouts_at_most: 0,
                         annotation_bytes: 0,
@@ -179,24 +188,29 @@ impl Seats {
                 }
                 let late = self.clocks[seat].timeouts_at_most;
                 let limit = (header.policy.as_ref()).map_or(0, v1::RoomPolicy::max_timeouts);
-                let lost = late >= limit || self.clocks[seat].absent;
+                let lost = late >= limit || self.clocks[seat].absent_at_most;
                 // In a physical room a correction may have voided its timeouts, or what ended them.
                 if !lost && !for_good && header.origin() != v1::GameOrigin::Physical {
                     return Err(format!(
                         "seat {seat} is substituted, but was late {late} times in a row of {limit}"
                     ));
                 }
+                // One absence gives one substitute.
+                self.clocks[seat].absent_at_most = false;
                 self.clocks[seat].substituted = true;
                 self.retired[seat] = for_good;
             }
             Kind::ServerRestarted(_) => {
-                for clock in &mut self.clocks {
-                    clock.lose(elapsed_ms);
+                for (clock, events) in self.clocks.iter_mut().zip(&self.connection_events) {
+                    // Its return would not be among the events.
+                    if *events < MAX_CONNECTION_EVENTS {
+                        clock.lose(elapsed_ms);
+                    }
                 }
             }
             Kind::ExpressionShown(shown) => {
                 self.seat("expressionShown", shown.seat)?;
-                check_shown("expressionShown", shown.expression.as_ref(), false)?;
+                self.check_shown("expressionShown", shown.expression.as_ref(), false)?;
             }
             Kind::HandReported(reported) => {
                 self.at_a_table(header)?;
@@ -233,7 +247,27 @@ impl Seats {
     /// Checks an expression for the record only.
     pub(super) fn private(&self, private: &v1::PrivateExpression) -> Result<(), String> {
         self.seat("privateExpression", private.seat)?;
-        check_shown("privateExpression", private.expression.as_ref(), true)
+        self.check_shown("privateExpression", private.expression.as_ref(), true)
+    }
+
+    fn check_shown(
+        &self,
+        event: &str,
+        expression: Option<&v1::Expression>,
+        record_only: bool,
+    ) -> Result<(), String> {
+        let expression = expression.ok_or_else(|| format!("{event} has no expression"))?;
+        check_expression(expression, self.clocks.len())
+            .map_err(|problem| format!("{event}.expression.{problem}"))?;
+        if expression.record_only == record_only {
+            Ok(())
+        } else {
+            Err(must_be(
+                &format!("{event}.expression.recordOnly"),
+                expression.record_only,
+                record_only,
+            ))
+        }
     }
 
     /// Checks the start of the game against the header.
@@ -244,7 +278,11 @@ impl Seats {
         rules: &RuleSet,
     ) -> Result<(), String> {
         self.check_occupants(header)?;
-        let expected = game_started(header, rules);
+        let mut expected = game_started(header, rules);
+        for seat in &mut expected.seats {
+            seat.kind = shown_kind(seat);
+            seat.shown_kind = v1::ParticipantKind::Unspecified.into();
+        }
         self.begun = true;
         // A game starts when every open seat is attached, also to a server that was restarted
         // before. Whether it is lost later is not recorded after too many events.
@@ -276,7 +314,7 @@ impl Seats {
 
     fn check_occupants(&self, header: &v1::RecordHeader) -> Result<(), String> {
         for (index, (seat, occupant)) in header.seats.iter().zip(&self.occupants).enumerate() {
-            let stated = (seat.name.as_str(), seat.kind);
+            let stated = (seat.name.as_str(), shown_kind(seat));
             let sits = match occupant {
                 Some((name, kind)) => (name.as_str(), *kind),
                 None if self.clocks[index].built_in => stated,
@@ -327,24 +365,6 @@ impl Seats {
     }
 }
 
-fn check_shown(
-    event: &str,
-    expression: Option<&v1::Expression>,
-    record_only: bool,
-) -> Result<(), String> {
-    let expression = expression.ok_or_else(|| format!("{event} has no expression"))?;
-    check_expression(expression).map_err(|problem| format!("{event}.expression.{problem}"))?;
-    if expression.record_only == record_only {
-        Ok(())
-    } else {
-        Err(must_be(
-            &format!("{event}.expression.recordOnly"),
-            expression.record_only,
-            record_only,
-        ))
-    }
-}
-
 /// The event that starts the game of a header.
 pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::GameStarted {
     v1::GameStarted {
@@ -364,5 +384,71 @@ pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::Ga
         action_space: header.action_space.clone(),
         hand_size: rules.hand_size().into(),
         seed_commitment: header.seed_commitment.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SEAT: u32 = 2;
+
+    fn header() -> v1::RecordHeader {
+        v1::RecordHeader {
+            seats: vec![v1::Participant::default(); 4],
+            policy: Some(v1::RoomPolicy {
+                absence_time_ms: Some(400),
+                max_timeouts: Some(3),
+                substitute: "greedy".into(),
+                ..v1::RoomPolicy::default()
+            }),
+            ..v1::RecordHeader::default()
+        }
+    }
+
+    fn playing(header: &v1::RecordHeader) -> Seats {
+        let mut seats = Seats::new(header);
+        seats.begun = true;
+        seats
+    }
+
+    fn substituted() -> Kind {
+        Kind::Substituted(v1::Substituted {
+            seat: SEAT,
+            built_in_agent: "greedy".into(),
+            for_good: false,
+        })
+    }
+
+    #[test]
+    fn one_absence_gives_one_substitute() {
+        let header = header();
+        let mut seats = playing(&header);
+        seats.clocks[2].absent_at_most = true;
+        let returned = Kind::Returned(v1::Returned { seat: SEAT });
+        assert_eq!(seats.take(&substituted(), 1, &header), Ok(true));
+        assert_eq!(seats.take(&returned, 2, &header), Ok(true));
+        let again = seats.take(&substituted(), 3, &header);
+        let problem = again.expect_err("it has not decided since");
+        assert!(problem.contains("late 0 times in a row of 3"), "{problem}");
+    }
+
+    #[test]
+    fn after_too_many_connection_events_a_restart_tells_nothing_of_a_seat() {
+        let header = header();
+        let mut seats = playing(&header);
+        let restarted = Kind::ServerRestarted(v1::ServerRestarted::default());
+        assert_eq!(seats.take(&restarted, 0, &header), Ok(true));
+        assert_eq!(seats.clocks[2].connected, Some(false));
+        for elapsed_ms in 0..u64::from(MAX_CONNECTION_EVENTS) {
+            let kind = match elapsed_ms % 2 {
+                0 => Kind::Disconnected(v1::Disconnected { seat: SEAT }),
+                _ => Kind::Returned(v1::Returned { seat: SEAT }),
+            };
+            assert_eq!(seats.take(&kind, elapsed_ms, &header), Ok(true));
+        }
+        assert_eq!(seats.take(&restarted, 5_000, &header), Ok(true));
+        assert_eq!(seats.clocks[2].connected, None, "it may be attached again");
+        assert_eq!(seats.clocks[2].away_ms_at(6_000), None);
     }
 }

@@ -31,7 +31,7 @@ type Forgery = (&'static str, Outcome, fn(&mut Lines));
 /// The forgeries. Numbers of lines are those of
 /// the fixture `committed.jsonl`, from 1.
 #[rustfmt::skip] // One row each.
-const FORGERIES: [Forgery; 44] = [
+const FORGERIES: [Forgery; 45] = [
     // The deal.
     ("a card of a hand", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[1].cards[0] = 4 }),
     ("the hands of two seats exchanged", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands.swap(0, 1) }),
@@ -68,6 +68,7 @@ const FORGERIES: [Forgery; 44] = [
     ("a substitution added", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: false }))),
     ("a participant left for good, where none can", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: true }))),
     ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3 }))),
+    ("a decision ended by an absence shorter than the absence time", Replay, short_absence),
     ("another name everywhere", Signature, rename),
     ("another name at one place", Replay, |lines| header(lines).seats[3].name = "Rosa".into()),
     ("another kind of participant everywhere", Signature, another_kind),
@@ -165,6 +166,36 @@ fn with_event(lines: &mut Lines, before: usize, kind: Kind) {
     };
     let line = Some(Line::Event(event));
     lines.insert(before - 1, v1::RecordLine { line });
+    number_events(lines);
+}
+
+/// The third agent loses its connection a millisecond before a pass, which so becomes the server's.
+fn short_absence(lines: &mut Lines) {
+    everywhere(lines, |_| {}, |policy| policy.absence_time_ms = Some(5));
+    shift_clock(lines, 56, 10);
+    time(lines, 56, 8_000);
+    source(lines, 56, v1::DecisionSource::Disconnected);
+    let lost = Kind::Disconnected(v1::Disconnected { seat: 3 });
+    let given = Kind::Substituted(v1::Substituted {
+        seat: 3,
+        built_in_agent: "random".into(),
+        for_good: false,
+    });
+    let back = Kind::Returned(v1::Returned { seat: 3 });
+    // From the last: after the events that follow from the pass, and before the decision.
+    for (before, elapsed_ms, kind) in [(59, 143, back), (59, 143, given), (56, 142, lost)] {
+        let event = v1::GameEvent {
+            elapsed_ms,
+            kind: Some(kind),
+            ..v1::GameEvent::default()
+        };
+        lines.insert(
+            before - 1,
+            v1::RecordLine {
+                line: Some(Line::Event(event)),
+            },
+        );
+    }
     number_events(lines);
 }
 

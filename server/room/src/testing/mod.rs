@@ -53,6 +53,7 @@ impl Table {
             rules_version: RULES_VERSION,
             policy,
             display_names: BTreeMap::new(),
+            wizards: std::collections::BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             fills,
@@ -62,6 +63,7 @@ impl Table {
             owner: SecretHash::of(b"owner"),
             tournament: None,
             table: None,
+            study: None,
         });
         Self {
             core: Core::new(header),

@@ -168,6 +168,28 @@ fn nobody_is_held_up_by_a_seat_that_nobody_waits_for() {
 }
 
 #[test]
+fn a_connection_lost_just_before_the_end_of_a_decision_costs_the_decision_alone() {
+    let mut table = Table::playing(Policy {
+        abort: AbortPolicy::AnyLost,
+        ..policy()
+    });
+    let (seat, _) = table.open();
+    table.pass_time(ms(1499));
+    lose(&mut table, seat);
+    table.pass_time(ms(1));
+    assert_eq!(table.last_decision().source, Source::Disconnected);
+    assert_eq!(table.core.state(), State::Playing);
+    // It is still away at its next decision.
+    play_until(&mut table, seat);
+    table.pass_time(ms(399));
+    assert_eq!(table.core.state(), State::Playing);
+    table.pass_time(ms(1));
+    let reason = AbortReason::ParticipantsLost;
+    assert_eq!(table.core.state(), State::Aborted(reason));
+    table.assert_replays();
+}
+
+#[test]
 fn the_policy_may_abort_the_game_instead() {
     let mut table = Table::playing(Policy {
         abort: AbortPolicy::AnyLost,
@@ -210,16 +232,35 @@ fn a_special_action_ends_as_if_its_seat_were_connected() {
         table.pass_time(ms(1));
         assert_eq!(table.last_decision().seat, holder);
         assert_eq!(substituted(&table), 0);
+        let next = table.core.awaited_in_public();
+        assert_eq!(next, Some(awaited), "the decision that follows was shown");
+        assert_eq!((awaited.since, awaited.until), (ms(0), None));
+        shown.push(awaited);
+        // From the second gift on, nothing is silent.
+        table.pass_time(ms(10));
+        table.play_one();
         let next = table.core.awaited_in_public().expect("somebody is awaited");
-        let same = |it: Awaited| (it.seat, it.decision, it.away);
-        assert_eq!(
-            same(next),
-            same(awaited),
-            "the decision that follows was shown"
-        );
-        shown.push(next);
+        assert_eq!(next.since, table.now);
+        assert!(next.until.is_some());
     }
     assert_eq!(shown[0], shown[1]);
+}
+
+#[test]
+fn everybody_is_told_when_an_absence_begins_to_count() {
+    let mut table = Table::playing(policy());
+    let (seat, _) = table.open();
+    let others: Vec<Seat> = (table.core.all_seats()).filter(|it| *it != seat).collect();
+    for other in &others {
+        lose(&mut table, *other);
+    }
+    lose(&mut table, seat);
+    let alone = table.core.awaited_in_public().expect("it is awaited");
+    assert_eq!(alone.until, Some(ms(1500)), "nobody waits");
+    table.attach(others[0]);
+    let waited_for = table.core.awaited_in_public().expect("it is awaited");
+    assert_eq!(waited_for.until, Some(ms(400)));
+    assert_ne!(alone.key(), waited_for.key());
 }
 
 #[test]
@@ -243,13 +284,15 @@ fn everybody_sees_whom_the_game_waits_for() {
         seat,
         decision,
         away: false,
+        absence_counts: false,
         since,
-        until: since + ms(1500),
+        until: Some(since + ms(1500)),
     };
     assert_eq!(table.core.awaited_in_public(), Some(awaited));
     table.pass_time(ms(100));
     lose(&mut table, seat);
-    (awaited.away, awaited.until) = (true, since + ms(500));
+    (awaited.away, awaited.absence_counts) = (true, true);
+    awaited.until = Some(since + ms(500));
     assert_eq!(table.core.awaited_in_public(), Some(awaited));
     table.pass_time(ms(400));
     assert_ne!(table.core.awaited_in_public().map(|it| it.seat), Some(seat));
@@ -266,7 +309,7 @@ fn the_absence_time_runs_after_the_time_to_return_from_a_restart() {
     }
     let awaited = table.core.awaited_in_public().expect("it is awaited");
     assert!(awaited.away);
-    assert_eq!(awaited.until, table.now + RECALL_TIME + ms(400));
+    assert_eq!(awaited.until, Some(table.now + RECALL_TIME + ms(400)));
     table.pass_time(RECALL_TIME + ms(399));
     assert_eq!(table.open(), (seat, id), "a millisecond is left");
     table.pass_time(ms(1));
@@ -415,7 +458,7 @@ impl RandomGame {
                 let over = self.table.core.state().is_over();
                 let given =
                     matches!(next, Some(Change::Substituted(seat)) if *seat == decided.seat);
-                assert!(given || over, "{next:?}");
+                assert!(given == away || over, "{next:?}");
             }
         }
         self.read = self.table.journal.len();

@@ -3,6 +3,7 @@
 mod absences;
 mod clocks;
 mod gateways;
+mod markers;
 mod physical;
 mod revival;
 mod searches;

@@ -147,7 +147,7 @@ fn expressions_are_public_or_recorded_only_and_limited() {
     let express = |table: &mut Table, record_only| {
         let said = table
             .core
-            .express(table.now, seat, record_only, Box::default());
+            .express(table.now, seat, record_only, None, Box::default());
         table.commit();
         said
     };
@@ -271,7 +271,7 @@ fn a_seat_cannot_be_taken_and_freed_without_limit() {
 fn a_seat_is_given_up_for_good_when_its_participant_leaves() {
     let mut table = Table::playing(Policy::default());
     let (seat, id) = table.open();
-    table.core.retire(table.now, seat);
+    table.core.retire(table.now, seat, None);
     table.commit();
     assert!(table.core.standing(seat).substituted);
     assert_eq!(
@@ -283,7 +283,7 @@ fn a_seat_is_given_up_for_good_when_its_participant_leaves() {
     table.commit();
     assert!(table.core.standing(seat).substituted, "it never returns");
     let journal = table.journal.len();
-    table.core.retire(table.now, seat);
+    table.core.retire(table.now, seat, None);
     table.commit();
     assert_eq!(table.journal.len(), journal, "it has left already");
     table.pass_time(ms(60_000));
@@ -297,10 +297,10 @@ fn the_ticket_of_a_participant_who_left_is_unknown() {
     // In these tests everybody has the same ticket.
     let known = |table: &Table| table.core.seat_of_ticket(b"ticket").map(Seat::index);
     assert_eq!(known(&table), Some(0));
-    table.core.retire(table.now, Seat::new(0));
+    table.core.retire(table.now, Seat::new(0), None);
     assert_eq!(known(&table), Some(1));
     let journal = table.core.pending().clone();
-    assert_eq!(journal.len(), 1, "{journal:?}");
+    assert_eq!(journal.len(), 2, "it loses its connection: {journal:?}");
 }
 
 #[test]
@@ -309,7 +309,7 @@ fn a_game_that_has_not_started_is_aborted_when_a_participant_leaves() {
     for _ in 0..4 {
         table.join(ParticipantKind::Agent).expect("a free seat");
     }
-    table.core.retire(table.now, Seat::new(2));
+    table.core.retire(table.now, Seat::new(2), None);
     table.commit();
     assert_eq!(
         table.core.state(),

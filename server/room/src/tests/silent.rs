@@ -160,10 +160,14 @@ fn leaving_does_not_tell_who_is_offered_a_special_action() {
         table.fill();
         let retired = |table: &Table| table.happened(|it| matches!(it, RoomEvent::Retired(_)));
         let (events, offered_at) = (table.core.log().len(), table.now);
-        table.core.retire(table.now, Seat::new(leaver));
+        table.core.retire(table.now, Seat::new(leaver), None);
         table.commit();
         table.pass_time(ms(999));
-        assert_eq!(table.core.log().len(), events, "nothing shows");
+        assert_eq!(
+            table.core.log().len(),
+            events + 1,
+            "only the lost connection shows"
+        );
         table.pass_time(ms(1));
         assert_eq!(table.now, offered_at + ms(1000));
         assert_eq!(retired(&table), 1);

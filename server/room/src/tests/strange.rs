@@ -70,9 +70,13 @@ fn step(table: &mut Table, input: &Input) {
             }
         }
         Input::Express(seat, record_only) => {
-            let _ = table
-                .core
-                .express(table.now, Seat::new(seat), record_only, Box::default());
+            let _ = table.core.express(
+                table.now,
+                Seat::new(seat),
+                record_only,
+                None,
+                Box::default(),
+            );
         }
         Input::Resume(seat) => table.core.resume(table.now, Seat::new(seat)),
         Input::Wait(time) => table.pass_time(ms(time)),

@@ -77,6 +77,13 @@ impl Database {
         Arc::make_mut(header).rules_version += 1;
     }
 
+    /// Makes a room one of this version again.
+    pub(super) fn make_native(&self, room: Id) {
+        let mut games = self.games.lock().expect("no test panics here");
+        let header = games.get_mut(&room).expect("it exists");
+        Arc::make_mut(header).rules_version -= 1;
+    }
+
     fn tables(&self) -> MutexGuard<'_, Tables<Id, Row>> {
         self.tables.lock().expect("no test panics here")
     }
@@ -140,6 +147,8 @@ pub(super) struct FakeStore {
     pub(super) loads: watch::Sender<u32>,
     /// Whether reading a unit takes until this is over.
     pub(super) loads_held: watch::Sender<bool>,
+    /// Whether new rooms are written but no answer comes.
+    pub(super) creations_unanswered: watch::Sender<bool>,
     /// Whether the ends of games are written but no answer comes.
     pub(super) ends_unanswered: watch::Sender<bool>,
     /// How often the end of a game was read.
@@ -162,6 +171,7 @@ impl FakeStore {
             beats_unanswered: watch::Sender::new(0),
             loads: watch::Sender::new(0),
             loads_held: watch::Sender::new(false),
+            creations_unanswered: watch::Sender::new(false),
             ends_unanswered: watch::Sender::new(false),
             ends_read: watch::Sender::new(0),
             ends_unreadable: watch::Sender::new(false),
@@ -312,8 +322,12 @@ impl Store for FakeStore {
                     epoch
                 }
             };
-            let mut games = self.database.games.lock().expect("no test panics here");
-            games.insert(room, Arc::clone(&header));
+            {
+                let mut games = self.database.games.lock().expect("no test panics here");
+                games.insert(room, Arc::clone(&header));
+            }
+            let mut unanswered = self.creations_unanswered.subscribe();
+            (unanswered.wait_for(|it| !it).await).expect("the sender is here");
             Ok(self.journal(&header, epoch, 1, entries))
         }
         .boxed()
@@ -595,6 +609,7 @@ impl ClusterStore for FakeStore {
 
     fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
         async move {
+            self.reached().await;
             let tables = self.database.tables();
             let epoch = tables.epoch(id);
             Ok(epoch.map(|epoch| Location {

@@ -16,8 +16,10 @@ use futures::FutureExt as _;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::TaskTracker;
 
+use super::located::LOOK_LIMIT;
+use super::node::LEFT_ALONE;
 use super::units::LOADS_AT_ONCE;
-use super::{ClusterNode, News, NodeLease, StoreDirectory};
+use super::{ClusterNode, FoundBy, Location, News, NodeLease, StoreDirectory};
 use crate::config::ServerConfig;
 use crate::convert;
 use crate::limits::Key;
@@ -93,6 +95,7 @@ impl TestNode {
             },
             fills: vec![Fill::Open { reserved_for: None }; 4],
             display_names: BTreeMap::new(),
+            wizards: std::collections::BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: None,
@@ -325,6 +328,28 @@ async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_be
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_room_whose_creation_is_answered_after_the_lease_has_ended_runs_when_it_is_back() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    first.store.creations_unanswered.send_replace(true);
+    let creating = first.create_room();
+    tokio::pin!(creating);
+    // Beats say meanwhile that the node owns it.
+    let beaten = timeout(Duration::from_secs(10), creating.as_mut());
+    assert!(beaten.await.is_err(), "no answer comes");
+    first.store.beats_lost.send_replace(true);
+    let expired = timeout(Duration::from_secs(20), creating.as_mut());
+    assert!(expired.await.is_err(), "no answer comes");
+    first.store.creations_unanswered.send_replace(false);
+    let room = soon(creating).await.id();
+    first.loses(room).await;
+    first.store.beats_lost.send_replace(false);
+
+    let resumed = first.has(room).await;
+    soon(join(&resumed, "Ada")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_database_that_was_away_for_long_ends_no_node() {
     let database = Database::new();
     let first = TestNode::start(&database).await;
@@ -443,6 +468,27 @@ async fn a_room_that_a_node_cannot_resume_is_left_to_others() {
     assert_eq!(*loads.borrow(), 1, "it does not try again");
     let other = second.create_room().await;
     soon(join(&other, "Ada")).await.expect("it runs");
+    // What prevented it has passed.
+    database.make_native(room);
+    sleep(LEFT_ALONE).await;
+    let resumed = second.has(room).await;
+    soon(join(&resumed, "Bo")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn looking_for_rooms_takes_no_longer_if_the_database_hangs_and_many_look() {
+    let database = Database::new();
+    let node = TestNode::start(&database).await;
+    node.store.cut_off.send_replace(true);
+    let began = Instant::now();
+    let rooms: Vec<_> = (0..100)
+        .map(|number| FoundBy::Id(Id([number; 16])))
+        .collect();
+    let looks = (rooms.iter()).map(|room| node.rooms.directory().locate(room, Key::Local));
+    for location in futures::future::join_all(looks).await {
+        assert_eq!(location, Location::Unknown);
+    }
+    assert!(began.elapsed() < 2 * LOOK_LIMIT, "{:?}", began.elapsed());
 }
 
 #[tokio::test(start_paused = true)]

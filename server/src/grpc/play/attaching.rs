@@ -4,18 +4,23 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::task::{Context, Poll};
 
 use chefshat_engine::MAX_ENTROPY;
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, seat_command::Command};
 use chefshat_record::convert::FieldProblem;
 use tokio::time::Instant;
+use tokio_util::task::AbortOnDropHandle;
 use tonic::{Code, Status};
 
+use super::parked::{Found, Parked, Parking, search};
 use super::reader::{BoundSeat, Contested, Reader};
-use super::remote::NodeGone;
+use super::remote::NotPassedOn;
+use crate::access::Caller;
 use crate::config::MAX_SEATS_PER_STREAM;
 use crate::grpc::reach::Reach;
-use crate::grpc::status::{is_elsewhere, status, ticket_unknown};
+use crate::grpc::status::{is_elsewhere, owner_unreachable, status, ticket_unknown};
+use crate::grpc::takeover::{is_changing, waits};
 use crate::outbox::StreamEnd;
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
@@ -49,38 +54,127 @@ impl Reader {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
-        if let Some(token) = Token::parse(&attach.ticket) {
-            let mut tournament = self.tournaments.get(token.room);
-            let reach = Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments));
-            let mut in_scope = Ok(());
-            if tournament.is_none() {
-                let room = reach.room_of_ticket(&self.caller, token.room, ticket_unknown);
-                in_scope = room.await.map(drop);
-                // This node may have taken it over meanwhile.
-                tournament = self.tournaments.get(token.room);
-            }
-            if let Some(handle) = &tournament {
-                in_scope = reach.check_ticket_of(&self.caller, handle, ticket_unknown);
-            }
-            if let Err(status) = in_scope {
-                return match (is_elsewhere(&status), &mut self.remote) {
-                    (Some(elsewhere), Some(remote)) => {
-                        if let Err(NodeGone) = remote.attach(elsewhere, handle, attach).await {
-                            self.outbox.end(StreamEnd::RoomGone);
-                        }
+        let Some(token) = Token::parse(&attach.ticket) else {
+            return self.refuse(handle, request_id, &ticket_unknown());
+        };
+        if !self.reach().has_in_memory(token.room) && waits(&self.rooms) {
+            let parking = self.parked.get_or_insert_with(|| Box::new(Parking::new()));
+            return parking.park(handle, attach);
+        }
+        let in_scope = look(&self.reach(), &self.caller, token).await;
+        let parked = Parked::new(attach);
+        self.attach_found(handle, parked, in_scope).await;
+    }
+
+    fn reach(&self) -> Reach {
+        Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments))
+    }
+
+    /// Attaches a seat or participant whose room or tournament has been found, here or at another
+    /// node, if the caller reaches it.
+    async fn attach_found(&mut self, handle: u32, parked: Parked, in_scope: Result<(), Status>) {
+        let attach = &parked.attach;
+        let request_id = attach.request_id;
+        if let Err(status) = in_scope {
+            return match (is_elsewhere(&status), &mut self.remote) {
+                (Some(elsewhere), Some(remote)) => {
+                    match remote.attach(elsewhere, handle, parked).await {
+                        Ok(()) => {}
+                        Err(NotPassedOn::NodeGone(parked)) => self.park_again(handle, *parked),
+                        Err(NotPassedOn::TooManyNodes) => self.outbox.end(StreamEnd::RoomGone),
                     }
-                    // Another node is about to take over.
-                    _ if status.code() == Code::Unavailable => {
-                        self.outbox.end(StreamEnd::RoomGone);
-                    }
-                    _ => self.refuse(handle, request_id, &status),
-                };
-            }
-            if let Some(tournament) = tournament {
-                return self.enter(tournament, token, attach, handle).await;
+                }
+                // Another node is about to take over.
+                _ if status.code() == Code::Unavailable => {
+                    self.outbox.end(StreamEnd::RoomGone);
+                }
+                _ => self.refuse(handle, request_id, &status),
+            };
+        }
+        let token = Token::parse(&attach.ticket).expect("it was parsed to find its room");
+        match self.tournaments.get(token.room) {
+            Some(tournament) => self.enter(tournament, token, parked.attach, handle).await,
+            None => {
+                let supersedes = self.supersedes();
+                self.bind(parked.attach, handle, None, supersedes).await;
             }
         }
-        self.bind(attach, handle, None, self.supersedes()).await;
+    }
+
+    fn park_again(&mut self, handle: u32, parked: Parked) {
+        let parking = self.parked.get_or_insert_with(|| Box::new(Parking::new()));
+        parking.park_again(handle, parked);
+    }
+
+    /// Waits until a search for parked attachments has ended.
+    pub(super) fn poll_found(&mut self, context: &mut Context<'_>) -> Poll<Vec<Found>> {
+        while let Some(remote) = &mut self.remote
+            && let Poll::Ready((handle, parked)) = remote.poll_given_back(context)
+        {
+            self.park_again(handle, *parked);
+        }
+        let Some(parking) = &mut self.parked else {
+            return Poll::Pending;
+        };
+        let (rooms, tournaments, caller) = (&self.rooms, &self.tournaments, &self.caller);
+        parking.poll_found(context, |first, all| {
+            let reach = Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
+            let caller = caller.clone();
+            AbortOnDropHandle::new(tokio::spawn(async move {
+                search(first, all, |token| look_once(&reach, &caller, token)).await
+            }))
+        })
+    }
+
+    /// Attaches what a search has found, in the order of the client.
+    pub(super) async fn attach_parked(&mut self, found: Vec<Found>) {
+        // As for one that comes late.
+        if !self.outbox.is_open() {
+            return;
+        }
+        for (handle, in_scope) in found {
+            let Some(mut parked) = (self.parked.as_mut()).and_then(|it| it.take(handle)) else {
+                continue;
+            };
+            let commands = std::mem::take(&mut parked.commands);
+            self.attach_found(handle, parked, in_scope).await;
+            if let Some(held_back) = self.held_back(handle) {
+                *held_back = commands;
+                continue;
+            }
+            for (command, arrived) in commands {
+                let command = v1::SeatCommand { handle, command };
+                self.execute_elsewhere(command, arrived).await;
+            }
+        }
+        let Some(parking) = self.parked.as_ref().filter(|it| it.count() > 0) else {
+            return;
+        };
+        // An agent gives up a refused seat, but reopens a stream that ends with this error, perhaps
+        // at a node that knows more. That would cost other seats their connection.
+        if !waits(&self.rooms) || (parking.is_overdue() && !self.has_live_seats()) {
+            self.outbox.end(StreamEnd::RoomGone);
+        }
+    }
+
+    /// The commands that are read until a seat is attached, if it waits for something.
+    pub(super) fn held_back(
+        &mut self,
+        handle: u32,
+    ) -> Option<&mut Vec<(Option<Command>, Instant)>> {
+        if let Some(contested) = self.contested.get_mut(&handle) {
+            return Some(&mut contested.commands);
+        }
+        let parked = self.parked.as_mut()?.get_mut(handle)?;
+        Some(&mut parked.commands)
+    }
+
+    /// Whether something of the stream is attached that its end would cost a connection.
+    fn has_live_seats(&self) -> bool {
+        self.seats.values().any(|bound| !bound.is_detached())
+            || !self.contested.is_empty()
+            || !self.participants.is_empty()
+            || self.remote.as_ref().is_some_and(|it| it.has_attached())
     }
 
     /// Whether a seat or participant is attached to the stream.
@@ -98,12 +192,13 @@ impl Reader {
 
     fn count(&self) -> usize {
         let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
-        self.seats.len() + self.contested.len() + self.participants.len() + remote
+        let parked = self.parked.as_ref().map_or(0, |parking| parking.count());
+        self.seats.len() + self.contested.len() + self.participants.len() + remote + parked
     }
 
     /// What may lose a seat to an attachment about which nobody has been asked.
     pub(super) fn supersedes(&self) -> Supersedes {
-        match self.by_gateway {
+        match self.asks_gateway {
             true => Supersedes::Only(None),
             false => Supersedes::Any,
         }
@@ -118,14 +213,19 @@ impl Reader {
         supersedes: Supersedes,
     ) {
         let request_id = attach.request_id;
+        let again = waits(&self.rooms).then(|| attach.clone());
         let bound = (self.try_bind(attach, handle, assigned_ticket, supersedes)).await;
         match bound {
             Ok(true) => {}
             // The game ended before the server attached its seat: there is nothing left to play.
             _ if assigned_ticket.is_some() => {}
             Ok(false) => self.refuse(handle, request_id, &ticket_unknown()),
-            // An agent gives up a refused seat, but reopens a stream that ends with this error.
-            Err(RoomGone) => self.outbox.end(StreamEnd::RoomGone),
+            Err(RoomGone) => match again {
+                // It has just stopped, to be resumed here or elsewhere.
+                Some(attach) => self.park_again(handle, Parked::new(attach)),
+                // An agent gives up a refused seat, but reopens a stream that ends with this error.
+                None => self.outbox.end(StreamEnd::RoomGone),
+            },
         }
     }
 
@@ -140,9 +240,8 @@ impl Reader {
         let Some(token) = Token::parse(&attach.ticket) else {
             return Ok(false);
         };
-        let Some(room) = self.rooms.get(token.room) else {
-            return Ok(false);
-        };
+        // It was found before. A node that has just stopped it is about to resume it, or another is.
+        let room = self.rooms.get(token.room).ok_or(RoomGone)?;
         let detached = Arc::new(AtomicBool::new(false));
         let from = attach.from_sequence.saturating_sub(1);
         let request = AttachRequest {
@@ -212,14 +311,37 @@ impl Reader {
         } = contested;
         let supersedes = Supersedes::Only(Some(holder));
         self.bind(attach, handle, assigned_ticket, supersedes).await;
-        if let Some(again) = self.contested.get_mut(&handle) {
-            again.commands = commands;
+        if let Some(held_back) = self.held_back(handle) {
+            *held_back = commands;
             return;
         }
         for (command, arrived) in commands {
             self.execute_command(handle, command, arrived).await;
         }
     }
+}
+
+/// Looks for the room or tournament of a ticket, which is still to be compared. An error says who
+/// else has it, that nobody can be asked now, or why the caller does not reach it.
+async fn look(reach: &Reach, caller: &Caller, token: Token) -> Result<(), Status> {
+    look_once(reach, caller, token)
+        .await
+        .unwrap_or_else(|| Err(owner_unreachable()))
+}
+
+/// As [`look`]; `None` if it changes hands.
+async fn look_once(reach: &Reach, caller: &Caller, token: Token) -> Option<Result<(), Status>> {
+    if let Some(in_scope) = reach.tournament_of_ticket(caller, token.room, ticket_unknown) {
+        return Some(in_scope);
+    }
+    let room = reach
+        .look_for_ticket(caller, token.room, ticket_unknown)
+        .await;
+    // This node may have taken a tournament over meanwhile.
+    if let Some(in_scope) = reach.tournament_of_ticket(caller, token.room, ticket_unknown) {
+        return Some(in_scope);
+    }
+    (!is_changing(&room)).then(|| room.map(drop))
 }
 
 pub(super) fn too_many_seats() -> Status {

@@ -14,13 +14,14 @@ use crate::access::Caller;
 use crate::config::ServerConfig;
 use crate::convert;
 use crate::limits::Key;
-use crate::outbox::{Outbox, OutboxStream};
+use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::{JoinRequest, Joined};
 use crate::rooms::{NewRoom, Rooms};
 use crate::store::MemoryStore;
 use crate::tournaments::{Call, Entry, Tournaments};
 use crate::wire::Received;
 use crate::wire::peer::{PlayInput, PlayRequest, play_input::Input};
+use chefshat_room::ids::Token;
 use chefshat_room::journal::{Fill, GameStart, ParticipantKind};
 use chefshat_room::policy::Policy;
 
@@ -67,6 +68,7 @@ impl Server {
             policy: Policy::default(),
             fills: vec![Fill::Open { reserved_for: None }; 4],
             display_names: BTreeMap::new(),
+            wizards: std::collections::BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: None,
@@ -147,6 +149,7 @@ impl Stream {
                 elapsed_us: None,
             }],
             first_assigned_handle: 0,
+            answers_contested: self.reader.by_gateway,
         };
         let executed = request.execute(&mut self.reader, Instant::now());
         executed.await.expect("a valid message");
@@ -204,6 +207,49 @@ async fn a_late_attachment_through_another_node_takes_no_seat_from_a_newer_strea
 }
 
 #[tokio::test]
+async fn a_gateway_that_answers_no_questions_is_asked_none() {
+    let server = Server::start();
+    let attach = server.seat().await;
+    let mut lost = server.stream();
+    lost.reader.attach(attach.clone()).await;
+    let mut next = server.stream_by_gateway();
+    let command = v1::SeatCommand {
+        handle: 3,
+        command: Some(Command::Attach(attach)),
+    };
+    let input = PlayInput {
+        input: Some(Input::Command(command)),
+        elapsed_us: None,
+    };
+    let request = PlayRequest {
+        inputs: vec![input],
+        ..PlayRequest::default()
+    };
+    let executed = request.execute(&mut next.reader, Instant::now());
+    executed.await.expect("a valid message");
+    assert!(next.reader.seats.contains_key(&3));
+    assert!(lost.reader.seats[&0].is_detached());
+}
+
+#[tokio::test]
+async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_another_stream() {
+    let server = Server::start();
+    let attach = server.seat().await;
+    let mut lost = server.stream();
+    lost.reader.attach(attach.clone()).await;
+    let mut next = server.stream_by_gateway();
+    next.receive(3, Command::Attach(attach.clone())).await;
+    assert_eq!(next.questions(), [3]);
+    // As a node does whose lease has ended. It, or another one, resumes the room later.
+    let ticket = Token::parse(&attach.ticket).expect("a ticket");
+    server.rooms.stop_unit(ticket.room).await;
+    next.read(Input::StillOpen(3)).await;
+    // An agent gives up a seat that is refused, and its game would wait for it.
+    let end = next.updates.next().now_or_never().flatten();
+    assert_eq!(end.expect("it is told").err(), Some(StreamEnd::RoomGone));
+}
+
+#[tokio::test]
 async fn a_late_attachment_through_another_node_takes_no_participant_from_a_newer_stream() {
     let server = Server::start();
     let attach = server.participant().await;
@@ -219,4 +265,23 @@ async fn a_late_attachment_through_another_node_takes_no_participant_from_a_newe
 
     late.read(Input::StillOpen(0)).await;
     assert_eq!(newer.called().await, (0, Call::Superseded));
+}
+
+#[tokio::test]
+async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_on_another_stream()
+{
+    let server = Server::start();
+    let attach = server.participant().await;
+    let mut lost = server.stream();
+    lost.reader.attach(attach.clone()).await;
+    let mut next = server.stream_by_gateway();
+    next.receive(3, Command::Attach(attach.clone())).await;
+    let (handle, call) = next.called().await;
+    next.reader.follow_call(handle, call).await;
+    assert_eq!(next.questions(), [3]);
+    let ticket = Token::parse(&attach.ticket).expect("a ticket");
+    server.tournaments.stop_one(ticket.room).await;
+    next.read(Input::StillOpen(3)).await;
+    let end = next.updates.next().now_or_never().flatten();
+    assert_eq!(end.expect("it is told").err(), Some(StreamEnd::RoomGone));
 }

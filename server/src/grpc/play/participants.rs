@@ -62,7 +62,11 @@ impl Reader {
             outbox: Arc::clone(&self.outbox),
             supersedes,
         };
-        let entering = (bound.tournament).enter(bound.participant, bound.connection, stream);
+        let Some(ticket) = Token::parse(&bound.attach.ticket) else {
+            return;
+        };
+        let entering =
+            (bound.tournament).enter(bound.participant, &ticket, bound.connection, stream);
         entering.await;
     }
 
@@ -107,9 +111,11 @@ impl Reader {
         let is_there = (self.seats.values()).any(|seat| {
             seat.secret == ticket.secret && seat.room.id() == room && !seat.is_detached()
         });
-        let mut contested = self.contested.values();
-        let is_about_to =
-            contested.any(|seat| Token::parse(&seat.attach.ticket).is_some_and(|it| it == ticket));
+        let contested = self.contested.values().map(|seat| &seat.attach);
+        let parked = self.parked.iter().flat_map(|it| it.attachments());
+        let is_about_to = contested
+            .chain(parked)
+            .any(|attach| Token::parse(&attach.ticket).is_some_and(|it| it == ticket));
         let is_newest = (bound.tournament).is_newest(bound.participant, bound.connection);
         if is_there || is_about_to || !is_newest {
             return;

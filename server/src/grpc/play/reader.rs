@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::future::{Future as _, poll_fn};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::task::Poll;
+use std::task::{Context, Poll};
 
+use chefshat_proto::v1::expression::About;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
 use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
@@ -15,9 +16,10 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
+use super::parked::{Found, Parking};
 use super::remote::{FIRST_CALLED, NodeGone, RemoteSeats};
 use crate::access::Caller;
-use crate::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING};
+use crate::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_CONTESTED};
 use crate::convert;
 use crate::grpc::forward::Gateway;
 use crate::grpc::refusals::count;
@@ -104,6 +106,8 @@ pub(super) struct Reader {
     pub(super) seats: BTreeMap<u32, BoundSeat>,
     /// The seats that other streams have, by handle.
     pub(super) contested: BTreeMap<u32, Contested>,
+    /// The attachments to what this node does not have in memory. Boxed, because it is rare.
+    pub(super) parked: Option<Box<Parking>>,
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
     pub(super) next_handle: u32,
     /// The handles of seats that the server attaches start here.
@@ -113,6 +117,8 @@ pub(super) struct Reader {
     pub(super) remote: Option<Box<RemoteSeats>>,
     /// Whether the stream comes from another node, at which its client is connected.
     pub(super) by_gateway: bool,
+    /// Whether that node is asked before a seat is taken from another stream.
+    pub(super) asks_gateway: bool,
     /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
@@ -123,7 +129,15 @@ pub(super) struct Reader {
 /// The next input of a reader.
 enum Next<R> {
     Message(Option<Result<R, Status>>),
+    Own(Own),
+}
+
+/// What a stream has to do without a message of its client.
+pub(super) enum Own {
+    /// A participant is called.
     Call(u32, Call),
+    /// A search for parked attachments has ended.
+    Found(Vec<Found>),
 }
 
 /// A message of a stream, for its reader.
@@ -156,12 +170,14 @@ impl Reader {
             outbox: Arc::clone(outbox),
             seats: BTreeMap::new(),
             contested: BTreeMap::new(),
+            parked: None,
             participants: BTreeMap::new(),
             next_handle: 0,
             first_called: FIRST_CALLED,
             next_called: FIRST_CALLED,
             remote: None,
             by_gateway: false,
+            asks_gateway: false,
             calls,
             called,
             with_decisions,
@@ -200,19 +216,15 @@ impl Reader {
                 if outbox.poll_reading_stopped(context) {
                     return Poll::Ready(Next::Message(None));
                 }
-                // Only participants are called. The reader has a sender itself, so the channel
-                // never closes.
-                if !self.participants.is_empty()
-                    && let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context)
-                {
-                    return Poll::Ready(Next::Call(handle, call));
+                if let Poll::Ready(own) = self.poll_own(context) {
+                    return Poll::Ready(Next::Own(own));
                 }
                 requests.poll_next_unpin(context).map(Next::Message)
             });
             let message = match next.await {
                 Next::Message(message) => message.transpose(),
-                Next::Call(handle, call) => {
-                    Box::pin(self.follow_call(handle, call)).await;
+                Next::Own(own) => {
+                    Box::pin(self.do_own(own)).await;
                     continue;
                 }
             };
@@ -241,6 +253,25 @@ impl Reader {
         });
     }
 
+    /// Waits for something to do without a message of the client.
+    pub(super) fn poll_own(&mut self, context: &mut Context<'_>) -> Poll<Own> {
+        // Only participants are called. The reader has a sender itself, so the channel never closes.
+        if !self.participants.is_empty()
+            && let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context)
+        {
+            return Poll::Ready(Own::Call(handle, call));
+        }
+        self.poll_found(context).map(Own::Found)
+    }
+
+    /// Does what [`Reader::poll_own`] has waited for.
+    pub(super) async fn do_own(&mut self, own: Own) {
+        match own {
+            Own::Call(handle, call) => self.follow_call(handle, call).await,
+            Own::Found(found) => self.attach_parked(found).await,
+        }
+    }
+
     pub(super) async fn execute(
         &mut self,
         command: v1::SeatCommand,
@@ -267,8 +298,14 @@ impl Reader {
         }
     }
 
-    /// Executes a command for a seat of another node there, and any other here.
-    async fn execute_elsewhere(&mut self, command: v1::SeatCommand, arrived: Instant) {
+    /// Executes a command for a seat of another node there, and any other here. One for a seat that
+    /// waits to be attached waits with it.
+    pub(super) async fn execute_elsewhere(&mut self, command: v1::SeatCommand, arrived: Instant) {
+        if let Some(held_back) = self.held_back(command.handle)
+            && held_back.len() < MAX_COMMANDS_CONTESTED
+        {
+            return held_back.push((command.command, arrived));
+        }
         let command = match &self.remote {
             None => Ok(Some(command)),
             Some(remote) => remote.pass_on(command, arrived).await,
@@ -362,11 +399,9 @@ impl Reader {
             self.detached(*handle, v1::DetachReason::ServerStopping);
         }
         // The seats of other nodes stay where they are, and their client connects to one of these.
-        if self
-            .remote
-            .as_ref()
-            .is_some_and(|remote| remote.count() > 0)
-        {
+        let remote = self.remote.as_ref().map_or(0, |remote| remote.count());
+        let parked = self.parked.as_ref().map_or(0, |parking| parking.count());
+        if remote + parked > 0 {
             self.outbox.end(StreamEnd::ShuttingDown);
         }
     }
@@ -419,8 +454,17 @@ fn silent() -> Status {
 /// # Errors
 /// A field is out of its range.
 pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {
+    if expression.source() == v1::ExpressionSource::Wizard {
+        // It would betray the seat.
+        let problem = "the server sets WIZARD in records; send what a robot would";
+        return Err(FieldProblem::new("source", problem));
+    }
     Ok(SeatAction::Express {
         record_only: expression.record_only,
+        about: match expression.about {
+            Some(About::AboutSeat(seat)) => Some(seat),
+            _ => None,
+        },
         expression: convert::expression_from_proto(expression)?,
     })
 }

@@ -5,7 +5,9 @@
 //! no seat its time.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::task::{Context, Poll};
 
 use chefshat_proto::v1::{self, seat_command::Command};
 use futures::StreamExt as _;
@@ -18,8 +20,10 @@ use tonic::transport::Channel;
 use tonic::{Request, Status};
 use tracing::debug;
 
+use super::parked::Parked;
 use crate::cluster::{Directory, Elsewhere, FoundBy};
-use crate::config::MAX_PEER_MESSAGE_BYTES;
+
+use crate::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
 use crate::grpc::forward::Gateway;
 use crate::grpc::takeover::awaited;
 use crate::outbox::{OnHandover, OnSpace, Outbox, StreamEnd};
@@ -46,6 +50,9 @@ pub(super) struct RemoteSeats {
     streams: Vec<PeerStream>,
     /// The number of the stream of each seat that the client attached.
     attached: BTreeMap<u32, usize>,
+    /// Attachments that reached no node.
+    give_back: mpsc::Sender<(u32, Box<Parked>)>,
+    given_back: mpsc::Receiver<(u32, Box<Parked>)>,
 }
 
 /// A stream to another node.
@@ -63,6 +70,9 @@ struct Shared {
     seats: Mutex<BTreeMap<u32, RemoteSeat>>,
     /// What the client attached there.
     ids: Mutex<BTreeSet<Id>>,
+    /// Whether the stream has ended and its attachments were given back. Changes while `seats` are
+    /// locked.
+    is_over: AtomicBool,
 }
 
 impl Shared {
@@ -73,12 +83,39 @@ impl Shared {
     fn ids(&self) -> MutexGuard<'_, BTreeSet<Id>> {
         (self.ids.lock()).expect("nothing panics under this lock")
     }
+
+    fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
+    fn has_attached(&self) -> bool {
+        self.seats().values().any(|seat| seat.is_attached)
+    }
+
+    /// Ends the stream and returns its attachments, if none of them was successful: the client does
+    /// not need to know that there was a stream.
+    fn end_unattached(&self) -> Option<Vec<(u32, Box<Parked>)>> {
+        let mut seats = self.seats();
+        // A client whose seats were detached because the other node stops waits for the end.
+        if seats.is_empty() || seats.values().any(|seat| seat.parked.is_none()) {
+            return None;
+        }
+        self.is_over.store(true, Ordering::Relaxed);
+        let ended = std::mem::take(&mut *seats).into_iter();
+        Some(
+            ended
+                .filter_map(|(handle, seat)| Some((handle, seat.parked?)))
+                .collect(),
+        )
+    }
 }
 
 /// A seat or participant at another node that is attached, or about to be.
 #[derive(Default)]
 struct RemoteSeat {
     is_attached: bool,
+    /// Its attachment, until it is attached. `None` if the other node attaches it by itself.
+    parked: Option<Box<Parked>>,
     /// The last decision request.
     decision: Option<Arc<Handover>>,
 }
@@ -111,11 +148,14 @@ impl OnHandover for Handover {
 impl RemoteSeats {
     /// No seats yet, for the client whose stream has this outbox.
     pub(super) fn new(gateway: Gateway, outbox: &Arc<Outbox>) -> Self {
+        let (give_back, given_back) = mpsc::channel(MAX_SEATS_PER_STREAM);
         Self {
             gateway,
             outbox: Arc::clone(outbox),
             streams: Vec::new(),
             attached: BTreeMap::new(),
+            give_back,
+            given_back,
         }
     }
 
@@ -128,7 +168,14 @@ impl RemoteSeats {
         counts.sum()
     }
 
-    /// Attaches a seat or participant of another node.
+    /// Whether a seat or participant is attached.
+    pub(super) fn has_attached(&self) -> bool {
+        let attached = |stream: &PeerStream| stream.shared.has_attached();
+        self.streams.iter().any(attached)
+    }
+
+    /// Attaches a seat or participant of another node. If that node turns out to be gone, and the
+    /// stream has nothing else there, [`RemoteSeats::poll_given_back`] gives the attachment back.
     ///
     /// # Errors
     /// The stream to that node has ended, or there are too many.
@@ -136,30 +183,66 @@ impl RemoteSeats {
         &mut self,
         elsewhere: &Elsewhere,
         handle: u32,
-        attach: v1::Attach,
-    ) -> Result<(), NodeGone> {
+        parked: Parked,
+    ) -> Result<(), NotPassedOn> {
         let endpoint = &elsewhere.peer.endpoint;
-        let open = |stream: &PeerStream| stream.endpoint == *endpoint;
+        let is_over = |stream: &PeerStream| stream.shared.is_over();
+        let open = |stream: &PeerStream| stream.endpoint == *endpoint && !is_over(stream);
         let number = match self.streams.iter().position(open) {
             Some(number) => number,
-            None if self.streams.len() == MAX_NODES => return Err(NodeGone),
             None => {
-                let stream = self.open(elsewhere);
-                self.streams.push(stream);
-                self.streams.len() - 1
+                let free = self.streams.iter().position(is_over);
+                let number = free.unwrap_or(self.streams.len());
+                if number == MAX_NODES {
+                    return Err(NotPassedOn::TooManyNodes);
+                }
+                let stream = self.open(elsewhere, number);
+                match free {
+                    Some(number) => self.streams[number] = stream,
+                    None => self.streams.push(stream),
+                }
+                number
             }
         };
         let stream = &self.streams[number];
+        let command = v1::SeatCommand {
+            handle,
+            command: Some(Command::Attach(parked.attach.clone())),
+        };
+        let parked = Box::new(parked);
+        {
+            let mut seats = stream.shared.seats();
+            if stream.shared.is_over() {
+                return Err(NotPassedOn::NodeGone(parked));
+            }
+            let seat = RemoteSeat {
+                parked: Some(parked),
+                ..RemoteSeat::default()
+            };
+            seats.insert(handle, seat);
+        }
         if let FoundBy::Id(id) = elsewhere.found_by {
             stream.shared.ids().insert(id);
         }
-        stream.shared.seats().insert(handle, RemoteSeat::default());
         self.attached.insert(handle, number);
-        let command = v1::SeatCommand {
-            handle,
-            command: Some(Command::Attach(attach)),
-        };
-        stream.send(command, None).await
+        // If the stream has ended, what becomes of the attachment depends on its other seats.
+        let _ = stream.send(command, None).await;
+        Ok(())
+    }
+
+    /// Waits for an attachment that reached no node.
+    pub(super) fn poll_given_back(
+        &mut self,
+        context: &mut Context<'_>,
+    ) -> Poll<(u32, Box<Parked>)> {
+        match self.given_back.poll_recv(context) {
+            Poll::Ready(Some((handle, parked))) => {
+                self.attached.remove(&handle);
+                Poll::Ready((handle, parked))
+            }
+            // There is a sender here.
+            Poll::Ready(None) | Poll::Pending => Poll::Pending,
+        }
     }
 
     /// Passes a command on; gives it back if no other node has its seat.
@@ -189,7 +272,8 @@ impl RemoteSeats {
             // The first handles are those of this node.
             Some(offset) => usize::try_from(offset / CALLED).ok()?.checked_sub(1)?,
         };
-        self.streams.get(number)
+        let stream = self.streams.get(number)?;
+        (!stream.shared.is_over()).then_some(stream)
     }
 
     /// Ends the streams to other nodes, and waits until their last updates are queued.
@@ -207,10 +291,10 @@ impl RemoteSeats {
     }
 
     /// Opens a stream to the node that has something.
-    fn open(&self, elsewhere: &Elsewhere) -> PeerStream {
+    fn open(&self, elsewhere: &Elsewhere, number: usize) -> PeerStream {
         let (inputs, waiting) = mpsc::channel(INPUTS_WAITING);
         let shared = Arc::new(Shared::default());
-        let number = u32::try_from(self.streams.len()).expect("at most MAX_NODES");
+        let number = u32::try_from(number).expect("at most MAX_NODES");
         let receiver = Receiver {
             shared: Arc::clone(&shared),
             inputs: inputs.downgrade(),
@@ -219,14 +303,19 @@ impl RemoteSeats {
         };
         let mut first_assigned_handle = FIRST_CALLED + (number + 1) * CALLED;
         let batches = ReceiverStream::new(waiting).ready_chunks(INPUTS_PER_MESSAGE);
-        let requests = batches.map(move |inputs| PlayRequest {
-            inputs,
-            first_assigned_handle: std::mem::take(&mut first_assigned_handle),
+        let requests = batches.map(move |inputs| {
+            let first_assigned_handle = std::mem::take(&mut first_assigned_handle);
+            PlayRequest {
+                inputs,
+                first_assigned_handle,
+                answers_contested: first_assigned_handle > 0,
+            }
         });
         let request = self.gateway.request(requests);
         let peer = elsewhere.peer.clone();
         let channel = self.gateway.peers().channel(&peer);
         let directory = Arc::clone(self.gateway.directory());
+        let give_back = self.give_back.clone();
         PeerStream {
             endpoint: Arc::clone(&elsewhere.peer.endpoint),
             inputs: Some(inputs),
@@ -235,6 +324,19 @@ impl RemoteSeats {
                 let ended = receiver.receive(channel.clone(), request).await;
                 if receiver.inputs.upgrade().is_some() {
                     let ids = receiver.shared.ids().clone();
+                    if let Some(attachments) = receiver.shared.end_unattached() {
+                        debug!(
+                            ?ended,
+                            "a stream to another node has ended, which had no seats"
+                        );
+                        for id in &ids {
+                            directory.forget(&FoundBy::Id(*id));
+                        }
+                        for attachment in attachments {
+                            let _ = give_back.try_send(attachment);
+                        }
+                        return;
+                    }
                     awaited(&*directory, &peer, channel, ids).await;
                 }
                 receiver.ended(ended, &*directory);
@@ -245,6 +347,14 @@ impl RemoteSeats {
 
 /// The stream to another node has ended; so does the client's.
 pub(super) struct NodeGone;
+
+/// Why an attachment was not passed on.
+pub(super) enum NotPassedOn {
+    /// The stream to its node has just ended.
+    NodeGone(Box<Parked>),
+    /// The client's stream has seats at too many nodes.
+    TooManyNodes,
+}
 
 impl PeerStream {
     async fn send(
@@ -344,7 +454,10 @@ impl Receiver {
     fn follow(&self, handle: u32, update: Received) -> Option<Arc<Handover>> {
         let mut seats = self.shared.seats();
         match update {
-            Received::Attached => seats.entry(handle).or_default().is_attached = true,
+            Received::Attached => {
+                let seat = seats.entry(handle).or_default();
+                (seat.is_attached, seat.parked) = (true, None);
+            }
             Received::Detached => drop(seats.remove(&handle)),
             // Of its attachment, or of another command.
             Received::Refused => {
@@ -378,5 +491,38 @@ impl Receiver {
             directory.forget(&FoundBy::Id(*id));
         }
         self.outbox.end(StreamEnd::RoomGone);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_a_stream_whose_seats_a_node_that_stops_has_detached_is_told() {
+        let (inputs, _waiting) = mpsc::channel(1);
+        let (outbox, _updates) = Outbox::new();
+        let receiver = Receiver {
+            shared: Arc::default(),
+            inputs: inputs.downgrade(),
+            outbox,
+            space: Arc::default(),
+        };
+        let parked = || RemoteSeat {
+            parked: Some(Box::new(Parked::new(v1::Attach::default()))),
+            ..RemoteSeat::default()
+        };
+        receiver.shared.seats().insert(3, parked());
+        receiver.follow(3, Received::Attached);
+        assert!(receiver.shared.end_unattached().is_none());
+        receiver.follow(3, Received::Detached);
+        assert!(receiver.shared.end_unattached().is_none());
+
+        receiver.shared.seats().insert(4, parked());
+        let given_back = receiver
+            .shared
+            .end_unattached()
+            .expect("it never had a seat");
+        assert!(given_back.iter().map(|(handle, _)| *handle).eq([4]));
     }
 }

@@ -40,6 +40,7 @@ impl Requests for PlayRequest {
             reader.first_called = self.first_assigned_handle;
             reader.next_called = self.first_assigned_handle;
         }
+        reader.asks_gateway |= self.answers_contested;
         let in_place = self.inputs.len() == 1;
         for PlayInput {
             mut input,
@@ -48,10 +49,10 @@ impl Requests for PlayRequest {
         {
             tokio::task::consume_budget().await;
             if let Some(Input::Command(command)) = &mut input
-                && let Some(contested) = reader.contested.get_mut(&command.handle)
-                && contested.commands.len() < MAX_COMMANDS_CONTESTED
+                && let Some(held_back) = reader.held_back(command.handle)
+                && held_back.len() < MAX_COMMANDS_CONTESTED
             {
-                contested.commands.push((command.command.take(), arrived));
+                held_back.push((command.command.take(), arrived));
                 continue;
             }
             match input {

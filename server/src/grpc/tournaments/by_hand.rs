@@ -11,8 +11,9 @@ use super::{TournamentCalls, join_problem, refused, stopped};
 use crate::access::Caller;
 use crate::convert;
 use crate::grpc::status::{field, request_id, request_id_used, status, ticket_unknown};
-use crate::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle};
-use chefshat_room::ids::Token;
+use crate::limits::Key;
+use crate::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle, Who};
+use chefshat_room::ids::{SecretHash, Token};
 
 impl TournamentCalls {
     pub(super) async fn withdraw(
@@ -24,12 +25,9 @@ impl TournamentCalls {
         let (handle, by) = self
             .find_by_ticket_or_owner(caller, id, &request.ticket, &request.owner_token)
             .await?;
-        let participant = by.unwrap_or_else(|| index(request.participant));
-        let removed = false;
-        let what = ByHand::Withdraw {
-            participant,
-            removed,
-        };
+        let who = by.map_or_else(|| Who::Number(index(request.participant)), Who::Ticket);
+        let charged = Key::of_caller(caller);
+        let what = ByHand::Withdraw { who, charged };
         change(&handle, what).await?;
         let tournament = Some(handle.describe());
         Ok(v1::WithdrawParticipantResponse { tournament })
@@ -42,9 +40,8 @@ impl TournamentCalls {
     ) -> Result<v1::RemoveParticipantResponse, Status> {
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(caller, id, owner).await?;
-        let what = ByHand::Withdraw {
+        let what = ByHand::Remove {
             participant: index(request.participant),
-            removed: true,
         };
         change(&handle, what).await?;
         let tournament = Some(handle.describe());
@@ -121,23 +118,24 @@ impl TournamentCalls {
         Ok(v1::CallGameResponse { game })
     }
 
-    /// The tournament, with the participant who has the ticket; without a ticket, the owner asks.
+    /// The tournament, with the ticket of a participant; without a ticket, the owner asks.
     async fn find_by_ticket_or_owner(
         &self,
         caller: &Caller,
         id: &str,
         ticket: &str,
         owner_token: &str,
-    ) -> Result<(Arc<TournamentHandle>, Option<usize>), Status> {
+    ) -> Result<(Arc<TournamentHandle>, Option<SecretHash>), Status> {
         if ticket.is_empty() {
             let handle = self.find_owned(caller, id, owner_token).await?;
             return Ok((handle, None));
         }
         let handle = self.find(&caller.showing(ticket), id).await?;
         let token = Token::parse(ticket).filter(|token| token.room == handle.id());
-        let participant = token.and_then(|token| handle.participant_of(&token.secret));
-        let participant = participant.ok_or_else(ticket_unknown)?;
-        Ok((handle, Some(participant)))
+        let token = token.filter(|token| handle.participant_of(&token.secret).is_some());
+        let token = token.ok_or_else(ticket_unknown)?;
+        // Whose it is then, is decided where the change is made.
+        Ok((handle, Some(token.hash())))
     }
 }
 
@@ -157,7 +155,11 @@ fn newcomer(
             convert::check_real_cards("built_in_agent", agent)
                 .map_err(|problem| refused(&problem))?;
         }
-        return Ok(Newcomer::BuiltIn { agent, name });
+        return Ok(Newcomer::BuiltIn {
+            agent,
+            name,
+            request_id: request_id(&request.request_id)?,
+        });
     }
     let kind = convert::kind_from_proto("kind", request.kind)
         .map_err(|problem| field("KIND_REFUSED", &problem))?;
@@ -182,6 +184,7 @@ async fn change(handle: &TournamentHandle, what: ByHand) -> Result<Option<Token>
     changed.map_err(|refusal| match refusal {
         ByHandRefusal::Rules(problem) => by_hand_problem(problem),
         ByHandRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
+        ByHandRefusal::TicketUnknown => ticket_unknown(),
     })
 }
 
@@ -197,7 +200,8 @@ fn by_hand_problem(problem: ByHandProblem) -> Status {
         ByHandProblem::NotDue => (Code::FailedPrecondition, "GAME_NOT_DUE"),
         ByHandProblem::NotInGame => (Code::PermissionDenied, "NOT_IN_GAME"),
         ByHandProblem::PostponedTooOften(_) => (Code::FailedPrecondition, "POSTPONED_TOO_OFTEN"),
-        ByHandProblem::TooMany => (Code::ResourceExhausted, "TOO_MANY_CHANGES"),
+        ByHandProblem::NobodyLeft => (Code::FailedPrecondition, "NOBODY_LEFT"),
+        ByHandProblem::TooMany(_) => (Code::ResourceExhausted, "TOO_MANY_CHANGES"),
     };
     status(code, reason, problem.to_string(), [])
 }

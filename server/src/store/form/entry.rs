@@ -11,7 +11,7 @@ use super::{Unreadable, action, array};
 use crate::convert::{self, Deck};
 use chefshat_room::ids::SecretHash;
 use chefshat_room::journal::{
-    AbortReason, Change, Decided, Entry, ParticipantKind, SeatedParticipant, Source,
+    AbortReason, Change, Decided, Entry, Marked, ParticipantKind, SeatedParticipant, Source,
 };
 
 /// Typical size of an encoded entry.
@@ -24,7 +24,7 @@ struct EntryForm {
     at_us: u64,
     #[prost(
         oneof = "ChangeForm",
-        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15"
+        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16"
     )]
     change: Option<ChangeForm>,
 }
@@ -59,6 +59,14 @@ enum ChangeForm {
     Hinted(u32),
     #[prost(uint32, tag = "15")]
     Retired(u32),
+    #[prost(message, tag = "16")]
+    Marked(MarkedForm),
+}
+
+/// Whether these bytes are an entry of a kind that this version knows.
+#[cfg(test)]
+pub(super) fn is_known(bytes: &[u8]) -> bool {
+    EntryForm::decode(bytes).is_ok_and(|entry| entry.change.is_some())
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -111,6 +119,14 @@ struct ExpressedForm {
     record_only: bool,
     #[prost(bytes = "vec", tag = "3")]
     expression: Vec<u8>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct MarkedForm {
+    #[prost(string, tag = "1")]
+    label: String,
+    #[prost(uint64, tag = "2")]
+    moment_us: u64,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -214,6 +230,10 @@ pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
             record_only: *record_only,
             expression: expression.to_vec(),
         }),
+        Change::Marked(marked) => ChangeForm::Marked(MarkedForm {
+            label: marked.label.clone(),
+            moment_us: u64::try_from(marked.moment.as_micros()).unwrap_or(u64::MAX),
+        }),
         Change::Aborted(reason) => ChangeForm::Aborted(number_of(&REASONS, reason)),
         Change::ServerRestarted => ChangeForm::ServerRestarted(true),
         Change::Reported(reported) => ChangeForm::Reported(ReportedForm {
@@ -286,6 +306,10 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             record_only: form.record_only,
             expression: form.expression.into_boxed_slice(),
         },
+        ChangeForm::Marked(form) => Change::Marked(Box::new(Marked {
+            label: form.label,
+            moment: Duration::from_micros(form.moment_us),
+        })),
         ChangeForm::Aborted(number) => {
             Change::Aborted(value_of(&REASONS, number, "reason of an abort")?)
         }

@@ -1,17 +1,18 @@
 //! The header of a game.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use chefshat_engine::ActionId;
-use chefshat_engine::SeedPlan;
+use chefshat_engine::{ActionId, MAX_SEATS, Seat, SeedPlan};
 use chefshat_proto::v1;
-use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto, seat_number};
 use prost::Message;
 
+use super::entry::{number_of, value_of};
 use super::{Unreadable, action, array};
 use crate::convert;
 use chefshat_room::ids::{Id, SecretHash};
-use chefshat_room::journal::{GameHeader, TournamentGame};
+use chefshat_room::journal::{GameHeader, SeatLabels, StudyGame, TournamentGame};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {
@@ -52,7 +53,46 @@ struct HeaderForm {
     /// The hash of the table's ticket; empty unless the room is physical.
     #[prost(bytes = "vec", tag = "18")]
     table: Vec<u8>,
+    #[prost(message, optional, tag = "19")]
+    study: Option<StudyForm>,
 }
+
+#[derive(Clone, PartialEq, Message)]
+struct StudyForm {
+    #[prost(bytes = "vec", tag = "1")]
+    study: Vec<u8>,
+    #[prost(string, tag = "2")]
+    name: String,
+    #[prost(string, tag = "3")]
+    condition: String,
+    #[prost(btree_map = "string, string", tag = "4")]
+    levels: BTreeMap<String, String>,
+    #[prost(uint32, tag = "5")]
+    number: u32,
+    #[prost(string, tag = "6")]
+    participant: String,
+    #[prost(uint32, tag = "7")]
+    session: u32,
+    #[prost(uint32, tag = "8")]
+    step: u32,
+    #[prost(bool, tag = "9")]
+    practice: bool,
+    #[prost(uint32, optional, tag = "10")]
+    seed_index: Option<u32>,
+    #[prost(uint32, tag = "11")]
+    seat: u32,
+    #[prost(uint32, tag = "12")]
+    attempt: u32,
+    #[prost(uint32, tag = "13")]
+    labels: u32,
+}
+
+/// The labels of seats, with their numbers.
+const LABELS: [(u32, SeatLabels); 3] = [
+    (1, SeatLabels::AsTheyAre),
+    (2, SeatLabels::Kinds),
+    (3, SeatLabels::Players),
+];
 
 /// Encodes a header.
 pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
@@ -85,8 +125,50 @@ pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
         tournament: (header.tournament).map_or_else(Vec::new, |game| game.tournament.0.to_vec()),
         series: (header.series()).map_or_else(Vec::new, |series| series.0.to_vec()),
         table: (header.table).map_or_else(Vec::new, |table| table.bytes().to_vec()),
+        study: header.study.as_deref().map(study_to_form),
     }
     .encode_to_vec()
+}
+
+fn study_to_form(game: &StudyGame) -> StudyForm {
+    StudyForm {
+        study: game.study.0.to_vec(),
+        name: game.name.clone(),
+        condition: game.condition.clone(),
+        levels: game.levels.clone(),
+        number: game.number,
+        participant: game.participant.clone(),
+        session: game.session,
+        step: game.step,
+        practice: game.practice,
+        seed_index: game.seed_index,
+        seat: seat_number(game.seat),
+        attempt: game.attempt,
+        labels: number_of(&LABELS, &game.labels),
+    }
+}
+
+fn study_from_form(form: StudyForm) -> Result<StudyGame, Unreadable> {
+    let seat = usize::try_from(form.seat)
+        .ok()
+        .filter(|seat| *seat < MAX_SEATS);
+    Ok(StudyGame {
+        study: Id(array(&form.study, "the study's id")?),
+        name: form.name,
+        condition: form.condition,
+        levels: form.levels,
+        number: form.number,
+        participant: form.participant,
+        session: form.session,
+        step: form.step,
+        practice: form.practice,
+        seed_index: form.seed_index,
+        seat: seat
+            .map(Seat::new)
+            .ok_or_else(|| Unreadable::new("the participant's seat does not exist"))?,
+        attempt: form.attempt,
+        labels: value_of(&LABELS, form.labels, "labels of seats")?,
+    })
 }
 
 /// Decodes the header of a hosted game.
@@ -115,6 +197,7 @@ pub(in crate::store) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Un
         rules_version: form.rules_version,
         policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
         fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
+        wizards: convert::wizards_from_proto(&form.seats),
         // Not checked again: stored games stay readable even if the rules for names change.
         display_names: (form.seats.into_iter().enumerate())
             .filter(|(_, seat)| !seat.name.is_empty())
@@ -140,6 +223,7 @@ pub(in crate::store) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Un
             [] => None,
             hash => Some(SecretHash::from_bytes(array(hash, "the table's hash")?)),
         },
+        study: (form.study.map(study_from_form).transpose()?).map(Arc::new),
         tournament: if form.tournament.is_empty() {
             None
         } else {

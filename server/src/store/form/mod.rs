@@ -1,11 +1,14 @@
 //! The encoding of headers and journals in the database: separate protocol buffers, so that stored
 //! games do not depend on the engine's types or the protocol's messages. Fields are only ever
-//! added. Messages of the protocol that never change (rule sets, policies, annotations,
-//! expressions) are stored as they are.
+//! added. Messages of the protocol that only grow (rule sets, policies, annotations, expressions) are
+//! stored as they are.
 
 mod entry;
+#[cfg(test)]
+mod forms;
 mod header;
 mod signed;
+mod study;
 mod tournament;
 
 use chefshat_engine::ActionId;
@@ -15,13 +18,20 @@ use prost::Message as _;
 pub(super) use entry::{entries_to_bytes, put_entries, put_entry, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes, stored_header};
 pub(super) use signed::{signed_from_bytes, signed_to_bytes};
+pub(super) use study::{
+    stored_study, stored_traces, study_changes_to_bytes, study_to_bytes, traces_to_bytes,
+};
 pub(super) use tournament::{
     stored_tournament, tournament_entries_from_bytes, tournament_entries_to_bytes,
     tournament_from_bytes, tournament_to_bytes,
 };
 
-/// Version of the encoding.
-pub(super) const FORM: i64 = 1;
+/// Version of the encoding. It is raised by every new kind of entry and every new field, so that nodes
+/// of the version before leave alone what they would read without it; `forms.rs` knows what each
+/// version has.
+///
+/// 2: absence times; participants who leave during a game; tournaments that are changed by hand.
+pub(super) const FORM: i64 = 2;
 /// The oldest version that this one reads.
 const OLDEST_FORM: i64 = 1;
 

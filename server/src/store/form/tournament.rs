@@ -49,7 +49,7 @@ enum KindForm {
     #[prost(message, tag = "6")]
     Placed(PlacedForm),
     #[prost(message, tag = "7")]
-    Rescheduled(GameForm),
+    Rescheduled(RescheduledForm),
     #[prost(message, tag = "8")]
     Counted(CountedForm),
     #[prost(uint64, tag = "9")]
@@ -70,6 +70,12 @@ enum KindForm {
     Postponed(GameForm),
     #[prost(uint64, tag = "16")]
     Recalled(u64),
+}
+
+/// Whether these bytes are an entry of a kind that this version knows.
+#[cfg(test)]
+pub(super) fn is_known(bytes: &[u8]) -> bool {
+    EntryForm::decode(bytes).is_ok_and(|entry| entry.kind.is_some())
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -132,6 +138,17 @@ struct GameForm {
     game: u64,
     #[prost(uint64, repeated, tag = "2")]
     participants: Vec<u64>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct RescheduledForm {
+    #[prost(uint64, tag = "1")]
+    game: u64,
+    #[prost(uint64, repeated, tag = "2")]
+    missing: Vec<u64>,
+    /// Earlier versions did not store it.
+    #[prost(bool, tag = "3")]
+    never_started: bool,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -293,9 +310,15 @@ fn kind_of(entry: &TournamentEntry) -> KindForm {
                 byes: byes.iter().map(|participant| wide(*participant)).collect(),
             }),
             Change::Called { game, forfeited } => KindForm::Called(game_form(*game, forfeited)),
-            Change::Rescheduled { game, missing } => {
-                KindForm::Rescheduled(game_form(*game, missing))
-            }
+            Change::Rescheduled {
+                game,
+                missing,
+                never_started,
+            } => KindForm::Rescheduled(RescheduledForm {
+                game: wide(*game),
+                missing: missing.iter().map(|number| wide(*number)).collect(),
+                never_started: *never_started,
+            }),
             Change::Counted { game, result } => KindForm::Counted(CountedForm {
                 game: wide(*game),
                 shifts: result.shifts,
@@ -355,7 +378,8 @@ fn entry_of(kind: KindForm) -> Result<TournamentEntry, Unreadable> {
         },
         KindForm::Rescheduled(form) => Change::Rescheduled {
             game: narrow(form.game)?,
-            missing: numbers(&form.participants)?,
+            missing: numbers(&form.missing)?,
+            never_started: form.never_started,
         },
         KindForm::Counted(form) => Change::Counted {
             game: narrow(form.game)?,

@@ -13,7 +13,9 @@ use tokio::time::timeout;
 use super::errors::explain;
 use crate::store::StoreError;
 
-/// The migrations, oldest first. A released one never changes.
+/// The migrations, oldest first. A released one never changes: sqlx refuses a database in which it ran
+/// with another text. Before the first release, changes go into the first one, since no database
+/// outlives its tests.
 const MIGRATIONS: [(i64, &str, &str); 1] =
     [(1, "games", include_str!("migrations/0001_games.sql"))];
 /// How long connecting may take.

@@ -56,12 +56,32 @@ pub(super) struct Reader {
 
 /// A connection of the pool, which waits for its answer without limit when it is given back: one that
 /// hangs would keep its place.
-struct Lent(PoolConnection<Postgres>);
+struct Lent {
+    connection: Option<PoolConnection<Postgres>>,
+    /// Whether its work has ended.
+    has_ended: bool,
+}
 
 impl Drop for Lent {
     fn drop(&mut self) {
-        tokio::spawn(timeout(RETURN_LIMIT, self.0.return_to_pool()));
+        if let Some(connection) = self.connection.take() {
+            tokio::spawn(give_back(connection, self.has_ended));
+        }
     }
+}
+
+async fn give_back(mut connection: PoolConnection<Postgres>, has_ended: bool) {
+    if !has_ended {
+        // A transaction whose BEGIN has no answer yet is open, and the connection does not know: what
+        // others do next would belong to it.
+        let rollback = sqlx::raw_sql("ROLLBACK").execute(&mut *connection);
+        if !matches!(timeout(RETURN_LIMIT, rollback).await, Ok(Ok(_))) {
+            drop(connection.detach());
+            return;
+        }
+    }
+    // One that does not answer is dropped.
+    let _ = timeout(RETURN_LIMIT, connection.return_to_pool()).await;
 }
 
 /// A game that is or was a room's, as stored.
@@ -83,9 +103,16 @@ impl Reader {
         work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, sqlx::Result<T>>,
     ) -> Result<T, StoreError> {
         let failed = |error: sqlx::Error| failure(&error);
-        let mut connection = Lent(self.pool.acquire().await.map_err(failed)?);
-        match timeout(READ_LIMIT, work(&mut connection.0)).await {
-            Ok(read) => read.map_err(failed),
+        let mut lent = Lent {
+            connection: Some(self.pool.acquire().await.map_err(failed)?),
+            has_ended: false,
+        };
+        let connection = lent.connection.as_mut().expect("it was just lent");
+        match timeout(READ_LIMIT, work(connection)).await {
+            Ok(read) => {
+                lent.has_ended = true;
+                read.map_err(failed)
+            }
             Err(_) => {
                 let late = std::io::Error::from(std::io::ErrorKind::TimedOut);
                 Err(failed(late.into()))

@@ -107,6 +107,7 @@ fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameH
         rules_version: RULES_VERSION,
         fills: vec![Fill::Open { reserved_for: None }; 4],
         display_names: Default::default(),
+        wizards: std::collections::BTreeSet::new(),
         recorded: Default::default(),
         start: GameStart::default(),
         seed: SeedPlan::Fixed {
@@ -120,6 +121,7 @@ fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameH
             series: None,
         }),
         table: None,
+        study: None,
     })
 }
 

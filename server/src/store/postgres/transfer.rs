@@ -51,6 +51,11 @@ pub enum TransferError {
         "the database already has games or tournaments; nothing was changed: create an empty database and name that"
     )]
     NotEmpty,
+    /// The folder has studies, which a cluster does not host.
+    #[error(
+        "the folder has {0} studies, and servers of a cluster host none; nothing was moved: keep a server on this folder for them"
+    )]
+    Studies(u64),
     /// Reading or writing failed.
     #[error("{0}; nothing was moved")]
     Store(#[from] StoreError),
@@ -78,6 +83,10 @@ pub async fn transfer(
     }
     let address = open::address(url)?;
     let contents = Contents::open(data_dir).await?;
+    let studies = contents.studies().await?;
+    if studies > 0 {
+        return Err(TransferError::Studies(studies));
+    }
     open::migrate(url).await?;
     let mut connection = open::connect(&address).await?;
     let mut transaction = connection.begin().await?;

@@ -80,6 +80,15 @@ impl Contents {
         Ok(count.cast_unsigned())
     }
 
+    /// Number of studies.
+    pub(in crate::store) async fn studies(&self) -> Result<u64, StoreError> {
+        let count: i64 = sqlx::query_scalar("SELECT count(*) FROM studies")
+            .fetch_one(&self.0.readers)
+            .await
+            .map_err(failure)?;
+        Ok(count.cast_unsigned())
+    }
+
     /// The games, in the order of their numbers.
     pub(in crate::store) fn games(&self) -> Rows<'_, GameRow> {
         self.rows(

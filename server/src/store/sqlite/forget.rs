@@ -3,6 +3,7 @@
 //! handled here.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
@@ -208,6 +209,10 @@ async fn forget_game(
     if let Some(header) = game.get::<Option<Vec<u8>>, _>("header") {
         let mut header = form::header_from_bytes(&header).map_err(unreadable)?;
         redactions.names += who.in_text(&mut header.name);
+        if let Some(study) = (header.study.as_mut()).filter(|it| it.participant == who.name) {
+            Arc::make_mut(study).participant.clone_from(&who.pseudonym);
+            redactions.names += 1;
+        }
         sqlx::query("UPDATE games SET header = $2 WHERE number = $1")
             .bind(number)
             .bind(form::header_to_bytes(&header))

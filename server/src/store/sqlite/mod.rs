@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use chefshat_proto::v1;
+use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{mpsc, watch};
@@ -34,6 +35,7 @@ pub use open::{LOCK_FILE, OpenError};
 use super::codec::Codec;
 use super::ephemeral::EphemeralJournal;
 use super::form;
+use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{DiskUsage, Journal, Part, ResumableGame, Store, StoreError, StoredGame};
 use crate::metrics::StoreMetrics;
@@ -283,6 +285,65 @@ impl Store for SqliteStore {
         self.reader.tournaments(newest_over).boxed()
     }
 
+    fn hosts_studies(&self) -> bool {
+        true
+    }
+
+    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
+        let study = WriteCommand::Study {
+            id: header.id,
+            header: form::study_to_bytes(&header),
+        };
+        self.commands.send(study).boxed()
+    }
+
+    fn append_study(
+        &self,
+        study: Id,
+        row: u64,
+        changes: Vec<StudyChange>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let row = study_row(study, row, &changes);
+        self.commands.send(WriteCommand::StudyChanges(row)).boxed()
+    }
+
+    fn rewrite_study(
+        &self,
+        study: Id,
+        changes: Vec<StudyChange>,
+        forgotten: u32,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let row = study_row(study, 0, &changes);
+        let rewritten = WriteCommand::StudyRewritten { row, forgotten };
+        self.commands.send(rewritten).boxed()
+    }
+
+    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+        self.reader.study(study).boxed()
+    }
+
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.reader.studies().boxed()
+    }
+
+    fn append_traces(
+        &self,
+        study: Id,
+        traces: StoredTraces,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let traces = WriteCommand::Traces {
+            study,
+            participant: traces.number,
+            game: traces.game,
+            traces: form::traces_to_bytes(traces.traces),
+        };
+        self.commands.send(traces).boxed()
+    }
+
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        self.reader.traces(study).boxed()
+    }
+
     fn failed(&self) -> BoxFuture<'static, StoreError> {
         let mut failed = self.failed.clone();
         let closed = Arc::clone(&self.closed);
@@ -320,5 +381,13 @@ impl Store for SqliteStore {
             }
         }
         .boxed()
+    }
+}
+
+fn study_row(id: Id, position: u64, changes: &[StudyChange]) -> writer::StudyRow {
+    writer::StudyRow {
+        id,
+        position,
+        changes: form::study_changes_to_bytes(changes),
     }
 }

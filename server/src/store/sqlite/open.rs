@@ -25,7 +25,7 @@ const READERS: u32 = 4;
 /// Prepared statements per connection.
 const STATEMENTS: usize = 64;
 /// The migrations, oldest first. A released one never changes.
-const MIGRATIONS: [(i64, &str, &str); 5] = [
+const MIGRATIONS: [(i64, &str, &str); 6] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (
         2,
@@ -43,6 +43,7 @@ const MIGRATIONS: [(i64, &str, &str); 5] = [
         "import time",
         include_str!("migrations/0005_import_time.sql"),
     ),
+    (6, "studies", include_str!("migrations/0006_studies.sql")),
 ];
 
 /// Why a data directory cannot be used.

@@ -16,6 +16,7 @@ use super::rows::{self, Read};
 use crate::store::Keep;
 use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
+use crate::store::studies::{StoredStudy, StoredTraces};
 use crate::store::tournaments::StoredTournament;
 use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
@@ -178,6 +179,54 @@ impl Reader {
         Ok(stored)
     }
 
+    /// See `Store::study`.
+    pub(super) async fn study(&self, study: Id) -> Result<Option<StoredStudy>, StoreError> {
+        let row = sqlx::query("SELECT number, form, header FROM studies WHERE study_id = $1")
+            .bind(study.0.as_slice())
+            .fetch_optional(&self.pool)
+            .await
+            .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let parts: Vec<Vec<u8>> = sqlx::query_scalar(
+            "SELECT changes FROM study_changes WHERE study = $1 ORDER BY position",
+        )
+        .bind(row.get::<i64, _>(0))
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let stored = form::stored_study(row.get(1), row.get(2), &parts);
+        stored
+            .map(Some)
+            .map_err(|problem| unreadable_study(study, &problem))
+    }
+
+    /// See `Store::studies`.
+    pub(super) async fn studies(&self) -> Result<Vec<Id>, StoreError> {
+        let ids: Vec<Vec<u8>> = sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number")
+            .fetch_all(&self.pool)
+            .await
+            .map_err(failure)?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+
+    /// See `Store::traces`.
+    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT participant, game_id, traces FROM study_traces
+             WHERE study = (SELECT number FROM studies WHERE study_id = $1) ORDER BY number",
+        )
+        .bind(study.0.as_slice())
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let read = rows
+            .iter()
+            .map(|row| form::stored_traces(row.get(0), row.get(1), row.get(2)));
+        read.collect::<Result<_, _>>()
+            .map_err(|problem| unreadable_study(study, &problem))
+    }
+
     /// The journals of all running games, by game number; the inner result says why one cannot be
     /// read. Reads everything stored since the oldest of them was created.
     async fn running_journals(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
@@ -293,4 +342,8 @@ impl Reader {
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
     }
+}
+
+fn unreadable_study(study: Id, problem: &Unreadable) -> StoreError {
+    StoreError::Failed(format!("study {study} cannot be read: {problem}"))
 }

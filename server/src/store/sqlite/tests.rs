@@ -25,8 +25,8 @@ use crate::store::{Keep, Part, Store, StoredGame};
 use crate::tournaments::restored;
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
-    AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
-    RecordedSeat, SeatedParticipant, Source, TakenOver,
+    AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
+    ParticipantKind, RecordedSeat, SeatedParticipant, Source, TakenOver,
 };
 use chefshat_room::policy::{Durability, Policy};
 
@@ -58,6 +58,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
             }),
         ],
         display_names: BTreeMap::new(),
+        wizards: std::collections::BTreeSet::new(),
         recorded: BTreeMap::new(),
         start: GameStart {
             script: None,
@@ -85,6 +86,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         owner: SecretHash::of(b"owner"),
         tournament: None,
         table: None,
+        study: None,
     }
 }
 
@@ -128,6 +130,10 @@ fn entries() -> Vec<Entry> {
         Change::Aborted(AbortReason::TooLong),
         // Newer than the changes above.
         Change::Retired(Seat::new(3)),
+        Change::Marked(Box::new(Marked {
+            label: "EEG on".into(),
+            moment: Duration::from_micros(1_234_567),
+        })),
     ];
     (1..)
         .zip(changes)
@@ -164,7 +170,7 @@ fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
     })
 }
 
-fn shown(value: &impl std::fmt::Debug) -> String {
+fn shown(value: &(impl std::fmt::Debug + ?Sized)) -> String {
     format!("{value:?}")
 }
 
@@ -507,7 +513,8 @@ async fn an_import_of_an_earlier_version_is_kept_from_the_first_start_of_this_on
     drop(store);
     edit(
         folder.path(),
-        "UPDATE games SET ended_at_ms = 1; DELETE FROM _sqlx_migrations WHERE version > 4",
+        "UPDATE games SET ended_at_ms = 1; DELETE FROM _sqlx_migrations WHERE version > 4;
+         DROP TABLE study_traces; DROP TABLE study_changes; DROP TABLE studies",
     )
     .await;
     let store = opened(folder.path()).await;
@@ -534,7 +541,15 @@ fn the_encoding_of_stored_data_does_not_change() {
         hex::encode(form::header_to_bytes(&header)),
         hex::encode(&journal)
     );
-    assert_eq!(written, include_str!("fixtures/form1.hex"));
+    assert_eq!(written, include_str!("fixtures/form2.hex"));
+    let former = include_str!("fixtures/form1.hex");
+    let (first, second) = former.split_once('\n').expect("two lines");
+    let bytes = hex::decode(first).expect("hexadecimal digits");
+    form::header_from_bytes(&bytes).expect("readable");
+    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+    let mut read = Vec::new();
+    form::read_entries(&bytes, &mut read).expect("readable");
+    assert_eq!(shown(&read), shown(&entries()[..read.len()]));
     let (first, second) = written.split_once('\n').expect("two lines");
     let bytes = hex::decode(first).expect("hexadecimal digits");
     let read = form::header_from_bytes(&bytes).expect("readable");

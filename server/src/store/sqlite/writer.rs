@@ -83,6 +83,19 @@ pub(super) enum WriteCommand {
     },
     /// Adds a row to a tournament.
     TournamentEntries(TournamentRow),
+    /// Creates a study.
+    Study { id: Id, header: Vec<u8> },
+    /// Adds a row to a study.
+    StudyChanges(StudyRow),
+    /// Replaces the rows of a study by one and deletes the interface traces of a participant.
+    StudyRewritten { row: StudyRow, forgotten: u32 },
+    /// Adds interface traces.
+    Traces {
+        study: Id,
+        participant: u32,
+        game: Id,
+        traces: Vec<u8>,
+    },
     /// No command follows.
     Close,
 }
@@ -118,6 +131,14 @@ impl TournamentRow {
             over: entries.iter().any(TournamentEntry::is_end),
         }
     }
+}
+
+/// A row of a study's journal.
+pub(super) struct StudyRow {
+    pub(super) id: Id,
+    /// Its number in its study, from 0.
+    pub(super) position: u64,
+    pub(super) changes: Vec<u8>,
 }
 
 /// A command and the sender of its result.
@@ -320,6 +341,42 @@ async fn write(
                 }
             }
             WriteCommand::TournamentEntries(row) => move_tournament(connection, row).await?,
+            WriteCommand::Study { id, header } => {
+                let added = sqlx::query(
+                    "INSERT INTO studies (study_id, form, header) VALUES ($1, $2, $3)
+                     ON CONFLICT (study_id) DO NOTHING",
+                )
+                .bind(id.0.as_slice())
+                .bind(FORM)
+                .bind(header.as_slice())
+                .execute(&mut *connection)
+                .await?;
+                if added.rows_affected() == 0 {
+                    taken.insert(index, *id);
+                }
+            }
+            WriteCommand::StudyChanges(row) => change_study(connection, row).await?,
+            WriteCommand::StudyRewritten { row, forgotten } => {
+                forget_in_study(connection, row.id, *forgotten).await?;
+                change_study(connection, row).await?;
+            }
+            WriteCommand::Traces {
+                study,
+                participant,
+                game,
+                traces,
+            } => {
+                sqlx::query(
+                    "INSERT INTO study_traces (study, participant, game_id, traces)
+                     VALUES ((SELECT number FROM studies WHERE study_id = $1), $2, $3, $4)",
+                )
+                .bind(study.0.as_slice())
+                .bind(*participant)
+                .bind(game.0.as_slice())
+                .bind(traces.as_slice())
+                .execute(&mut *connection)
+                .await?;
+            }
             WriteCommand::Delete { games } => {
                 for game in games {
                     delete(connection, *game).await?;
@@ -440,6 +497,43 @@ async fn move_tournament(
             .await?;
     }
     Ok(())
+}
+
+async fn change_study(connection: &mut SqliteConnection, row: &StudyRow) -> sqlx::Result<()> {
+    sqlx::query(
+        "INSERT INTO study_changes (study, position, changes)
+         VALUES ((SELECT number FROM studies WHERE study_id = $1), $2, $3)",
+    )
+    .bind(row.id.0.as_slice())
+    .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
+    .bind(row.changes.as_slice())
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+/// Deletes the journal of a study, which is written again, and the interface traces of a
+/// participant.
+async fn forget_in_study(
+    connection: &mut SqliteConnection,
+    study: Id,
+    participant: u32,
+) -> sqlx::Result<()> {
+    sqlx::query(
+        "DELETE FROM study_changes WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
+    )
+    .bind(study.0.as_slice())
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query(
+        "DELETE FROM study_traces
+         WHERE study = (SELECT number FROM studies WHERE study_id = $1) AND participant = $2",
+    )
+    .bind(study.0.as_slice())
+    .bind(participant)
+    .execute(connection)
+    .await
+    .map(drop)
 }
 
 /// Writes the end and the search fields of a game, and adds it to the list of finished games.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::chance::Chance;
-use super::super::{Entrant, Format, Settings, testing};
+use super::super::{Entrant, Format, Leaving, Settings, testing};
 use super::*;
 use chefshat_agents::AgentKind;
 
@@ -83,7 +83,7 @@ impl Scan {
         if state.phase != State::Playing {
             return None;
         }
-        if state.is_round_over() {
+        if state.is_round_over() && !state.paused {
             return Some(Change::Finished);
         }
         let was_full = self.full;
@@ -107,7 +107,11 @@ impl Scan {
                     }
                     let game = index;
                     return Some(if state.games[game].calls + 1 < settings.max_calls {
-                        Change::Rescheduled { game, missing }
+                        Change::Rescheduled {
+                            game,
+                            missing,
+                            never_started: false,
+                        }
                     } else {
                         called(game, &state.games[game], missing)
                     });
@@ -157,7 +161,7 @@ fn by_hand(tournament: &Tournament, chance: &mut Chance) -> Option<(&'static str
             "paused or resumed",
             tournament.set_paused(!tournament.is_paused()).ok()?,
         ),
-        1 => ("withdrawn", tournament.withdraw(who, false).ok()?),
+        1 => ("withdrawn", tournament.withdraw(who, Leaving::Itself).ok()?),
         2 | 3 => {
             let by = Entrant {
                 built_in: (chance.below(3) == 0).then_some(AgentKind::Random.into()),

@@ -3,8 +3,9 @@
 
 use chefshat_agents::AgentKind;
 use chefshat_tournament::{
-    ByHandProblem, Change, Ended, Entrant, Format, GameState, JoinProblem, MAX_REPLACEMENTS,
-    Settings, State, Tournament,
+    ByHandProblem, Change, Deals, Ended, Entrant, Format, GameState, JoinProblem, Leaving,
+    MAX_CHANGES_BY_HAND, MAX_EARLY_WITHDRAWALS, MAX_POSTPONEMENTS, MAX_REPLACEMENTS, Settings,
+    State, Tournament,
 };
 
 use super::support::{
@@ -18,7 +19,7 @@ fn fold(tournament: &mut Tournament, change: Change) {
 }
 
 fn withdraw(tournament: &mut Tournament, who: usize) {
-    let change = tournament.withdraw(who, false).unwrap().unwrap();
+    let change = tournament.withdraw(who, Leaving::Itself).unwrap().unwrap();
     fold(tournament, change);
 }
 
@@ -51,26 +52,29 @@ fn two_tables(change: impl FnOnce(&mut Settings)) -> Tournament {
 }
 
 #[test]
-fn before_the_start_a_place_becomes_free_with_its_number_and_name() {
+fn before_the_start_a_place_and_its_name_become_free_but_not_its_number() {
     let mut tournament = joined(settings(Format::Knockout), 4);
     withdraw(&mut tournament, 1);
     assert!(tournament.is_withdrawn(1));
-    assert_eq!(tournament.withdraw(1, true), Ok(None), "it has left");
+    let again = tournament.withdraw(1, Leaving::ByOrganiser);
+    assert_eq!(again, Ok(None), "it has left");
     assert_eq!(tournament.standings().len(), 3);
-    assert_eq!(tournament.next_number(), 1);
+    assert_eq!(tournament.next_number(), 4);
     let back = tournament.join(entrant("agent 1")).unwrap();
     fold(&mut tournament, back);
-    assert!(!tournament.is_withdrawn(1) && !tournament.is_present(1));
-    assert_eq!(tournament.next_number(), 4);
+    assert!(tournament.is_withdrawn(1) && !tournament.is_withdrawn(4));
+    assert_eq!(tournament.standings().len(), 4);
     withdraw(&mut tournament, 3);
     withdraw(&mut tournament, 0);
     for change in tournament.begin().unwrap() {
         fold(&mut tournament, change);
     }
-    let names: Vec<_> = (tournament.participants().iter())
-        .map(|it| it.name.as_str())
+    let lines = tournament.standings();
+    let mut field: Vec<_> = (lines.iter())
+        .map(|line| tournament.participants()[line.participant].name.as_str())
         .collect();
-    assert_eq!(names, ["Filler 1", "agent 1", "agent 2", "Filler 2"]);
+    field.sort_unstable();
+    assert_eq!(field, ["Filler 1", "Filler 2", "agent 1", "agent 2"]);
 }
 
 #[test]
@@ -314,7 +318,7 @@ fn a_built_in_agent_plays_on_at_once_and_somebody_can_take_the_place_of_a_filler
     let mut tournament = begun(settings(Format::Knockout), 3);
     let filler = 3;
     assert_eq!(
-        tournament.withdraw(filler, true),
+        tournament.withdraw(filler, Leaving::Removed),
         Err(ByHandProblem::Filler)
     );
     tournament.set_present(0, false);
@@ -340,7 +344,7 @@ fn nothing_changes_by_hand_before_the_start_or_after_the_end() {
     assert_eq!(tournament.set_paused(true), Err(ByHandProblem::NotPlaying));
     assert_eq!(tournament.recall(0), Err(ByHandProblem::NotPlaying));
     assert_eq!(
-        tournament.withdraw(4, false),
+        tournament.withdraw(4, Leaving::Itself),
         Err(ByHandProblem::NoParticipant)
     );
     for change in tournament.begin().unwrap() {
@@ -348,7 +352,10 @@ fn nothing_changes_by_hand_before_the_start_or_after_the_end() {
     }
     assert_eq!(tournament.postpone(99, None), Err(ByHandProblem::NoGame));
     play_through(&mut tournament);
-    assert_eq!(tournament.withdraw(0, false), Err(ByHandProblem::Over));
+    assert_eq!(
+        tournament.withdraw(0, Leaving::Itself),
+        Err(ByHandProblem::Over)
+    );
     let someone = entrant("someone");
     assert_eq!(tournament.replace(0, someone), Err(ByHandProblem::Over));
 }
@@ -382,7 +389,11 @@ fn a_finalist_is_waited_for_as_long_as_it_waited_for_the_final() {
         assert_eq!(tournament.wake_at(), Some(now + patience_ms));
         assert_eq!(follow(&mut tournament, now + patience_ms - 1), []);
         let missing = vec![finalist];
-        let change = Change::Rescheduled { game: 2, missing };
+        let change = Change::Rescheduled {
+            game: 2,
+            missing,
+            never_started: false,
+        };
         assert_eq!(follow(&mut tournament, now + patience_ms), [change]);
         // The second call is an ordinary one.
         let later = now + patience_ms + NO_SHOW_MS;
@@ -432,4 +443,219 @@ fn who_has_not_played_stands_behind_who_has() {
     let mut expected = absent;
     expected.sort_unstable();
     assert_eq!(last, expected);
+}
+
+/// Joins and withdraws this often.
+fn come_and_go(tournament: &mut Tournament, times: u32) {
+    for _ in 0..times {
+        let who = tournament.next_number();
+        let joined = tournament.join(entrant("fickle")).unwrap();
+        fold(tournament, joined);
+        withdraw(tournament, who);
+    }
+}
+
+#[test]
+fn participants_who_come_and_go_take_nothing_from_the_organiser() {
+    let mut tournament = joined(settings(Format::Knockout), 4);
+    come_and_go(&mut tournament, MAX_EARLY_WITHDRAWALS);
+    let too_many = Err(ByHandProblem::TooMany(MAX_EARLY_WITHDRAWALS));
+    assert_eq!(tournament.withdraw(0, Leaving::Itself), too_many);
+    for leaving in [Leaving::ByOrganiser, Leaving::Removed] {
+        assert!(matches!(tournament.withdraw(0, leaving), Ok(Some(_))));
+    }
+    for change in tournament.begin().unwrap() {
+        fold(&mut tournament, change);
+    }
+    pause(&mut tournament, true);
+    pause(&mut tournament, false);
+    // After the beginning everybody can leave, once.
+    withdraw(&mut tournament, 0);
+}
+
+#[test]
+fn an_organiser_who_has_changed_too_much_can_still_resume_remove_and_close() {
+    let mut tournament = two_tables(|_| {});
+    for _ in 0..MAX_CHANGES_BY_HAND - 1 {
+        let change = tournament.postpone(0, None).unwrap();
+        fold(&mut tournament, change);
+    }
+    pause(&mut tournament, true);
+    let too_many = ByHandProblem::TooMany(MAX_CHANGES_BY_HAND);
+    assert_eq!(tournament.postpone(0, None), Err(too_many));
+    assert_eq!(tournament.recall(0), Err(too_many));
+    assert_eq!(tournament.replace(0, entrant("Bo")), Err(too_many));
+    let removed = tournament.withdraw(0, Leaving::Removed).unwrap().unwrap();
+    fold(&mut tournament, removed);
+    pause(&mut tournament, false);
+    assert_eq!(tournament.set_paused(true), Err(too_many));
+    withdraw(&mut tournament, 1);
+    assert!(tournament.close().is_some());
+}
+
+#[test]
+fn a_participant_postpones_a_bounded_number_of_games() {
+    let mut tournament = two_tables(|settings| settings.games_per_pairing = 100);
+    let who = tournament.games()[0].seats[0];
+    let its: Vec<usize> = (0..tournament.games().len())
+        .filter(|&game| tournament.games()[game].seats.contains(&who))
+        .collect();
+    for &game in &its[..MAX_POSTPONEMENTS as usize] {
+        let change = tournament.postpone(game, Some(who)).unwrap();
+        fold(&mut tournament, change);
+    }
+    assert_eq!(
+        tournament.postpone(its[0], Some(who)),
+        Err(ByHandProblem::TooMany(MAX_POSTPONEMENTS))
+    );
+    let other = tournament.games()[its[0]].seats[1];
+    assert!(tournament.postpone(its[0], Some(other)).is_ok());
+    assert!(tournament.postpone(its[0], None).is_ok());
+}
+
+#[test]
+fn who_left_can_still_be_removed_once() {
+    let mut tournament = two_tables(|_| {});
+    withdraw(&mut tournament, 2);
+    assert_eq!(tournament.withdraw(2, Leaving::ByOrganiser), Ok(None));
+    let removed = tournament.withdraw(2, Leaving::Removed).unwrap().unwrap();
+    fold(&mut tournament, removed);
+    assert_eq!(tournament.withdraw(2, Leaving::Removed), Ok(None));
+}
+
+#[test]
+fn what_a_former_participant_forfeited_is_not_forfeited_by_the_next() {
+    // Replaced while the game that it forfeited is due again, or is being played.
+    for is_due in [true, false] {
+        let mut tournament = two_tables(|settings| settings.max_calls = 2);
+        let away = tournament.games()[0].seats[0];
+        tournament.set_present(away, false);
+        follow(&mut tournament, 0);
+        end(&mut tournament, 2, played(&[1, 2, 3, 4]));
+        // The first call is missed in the queue, the second starts it without the absent.
+        follow(&mut tournament, NO_SHOW_MS);
+        end(&mut tournament, 3, played(&[1, 2, 3, 4]));
+        follow(&mut tournament, 2 * NO_SHOW_MS);
+        follow(&mut tournament, 3 * NO_SHOW_MS);
+        let played = tournament.playing().next().unwrap();
+        assert_eq!(tournament.games()[played].forfeited, [away]);
+        let recall = |tournament: &mut Tournament| {
+            // It never started, for another reason.
+            let change = Change::Rescheduled {
+                game: played,
+                missing: vec![],
+                never_started: true,
+            };
+            fold(tournament, change);
+            assert_eq!(tournament.games()[played].state, GameState::Due);
+        };
+        if is_due {
+            recall(&mut tournament);
+        }
+        let by = tournament.replace(away, entrant("Bo")).unwrap();
+        fold(&mut tournament, by);
+        tournament.set_present(away, true);
+        if !is_due {
+            // As long as it is being played, the filler has the seat.
+            assert!(!tournament.games()[played].is_played_by(away));
+            recall(&mut tournament);
+        }
+        let forfeited = loop {
+            let calls = called(&follow(&mut tournament, 3 * NO_SHOW_MS));
+            let [(game, forfeited)] = &calls[..] else {
+                panic!("one game at a time: {calls:?}");
+            };
+            if *game == played {
+                break forfeited.clone();
+            }
+            play(&mut tournament, *game);
+        };
+        assert!(forfeited.is_empty(), "{forfeited:?}");
+    }
+}
+
+#[test]
+fn a_game_that_never_started_keeps_its_deal_when_somebody_was_replaced() {
+    let mut tournament = two_tables(|settings| settings.deals = Deals::SameAtAllTables);
+    follow(&mut tournament, 0);
+    let deal = tournament.games()[0].deal;
+    assert!(deal.is_some() && deal == tournament.games()[2].deal);
+    let place = tournament.games()[0].seats[0];
+    let by = tournament.replace(place, entrant("Bo")).unwrap();
+    fold(&mut tournament, by);
+    let missing = vec![place];
+    end(&mut tournament, 0, Ended::NeverStarted { missing });
+    assert_eq!(tournament.games()[0].deal, deal, "nobody has seen it");
+    tournament.set_present(place, true);
+    follow(&mut tournament, 0);
+    // At the other table it was seen.
+    end(&mut tournament, 2, Ended::Aborted);
+    assert_eq!(tournament.games()[2].deal, None);
+}
+
+#[test]
+fn while_it_is_paused_the_last_void_game_can_be_called() {
+    for format in Format::ALL {
+        let mut settings = settings(format);
+        settings.max_calls = 1;
+        settings.rounds = (format != Format::Knockout).then_some(1);
+        let mut tournament = begun(settings, 8);
+        follow(&mut tournament, 0);
+        play(&mut tournament, 1);
+        pause(&mut tournament, true);
+        end(&mut tournament, 0, Ended::Aborted);
+        assert_eq!(follow(&mut tournament, 0), [], "it neither ends nor draws");
+        let change = tournament.recall(0).unwrap();
+        fold(&mut tournament, change);
+        pause(&mut tournament, false);
+        assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![])]);
+        play_through(&mut tournament);
+        assert!(
+            (tournament.games().iter()).all(|game| matches!(game.state, GameState::Counted(_)))
+        );
+    }
+}
+
+#[test]
+fn a_game_of_which_all_have_left_cannot_be_called() {
+    let mut tournament = two_tables(|settings| settings.max_parallel = 1);
+    let seats = tournament.games()[2].seats.clone();
+    seats.iter().for_each(|&who| withdraw(&mut tournament, who));
+    assert_eq!(tournament.recall(2), Err(ByHandProblem::NobodyLeft));
+    let by = tournament.replace(seats[0], entrant("Bo")).unwrap();
+    fold(&mut tournament, by);
+    assert!(tournament.recall(2).is_ok());
+}
+
+#[test]
+fn a_void_game_whose_deal_was_seen_gets_a_new_one() {
+    // Aborted at its last call, or nobody came: the other table still has the deal to play.
+    for is_kept in [false, true] {
+        let mut tournament = two_tables(|settings| {
+            settings.deals = Deals::SameAtAllTables;
+            settings.max_calls = 1;
+        });
+        let seats = tournament.games()[0].seats.clone();
+        seats
+            .iter()
+            .for_each(|&who| tournament.set_present(who, !is_kept));
+        let deal = tournament.games()[0].deal;
+        follow(&mut tournament, 0);
+        if is_kept {
+            follow(&mut tournament, NO_SHOW_MS);
+            seats
+                .iter()
+                .for_each(|&who| tournament.set_present(who, true));
+        } else {
+            end(&mut tournament, 0, Ended::Aborted);
+        }
+        assert_eq!(tournament.games()[0].state, GameState::Void);
+        let change = tournament.recall(0).unwrap();
+        fold(&mut tournament, change);
+        let expected = deal.filter(|_| is_kept);
+        assert_eq!(tournament.games()[0].deal, expected);
+        // The count of what is left to play of the deal holds.
+        play_through(&mut tournament);
+        assert!(deal.is_some_and(|deal| tournament.is_deal_open(deal)));
+    }
 }

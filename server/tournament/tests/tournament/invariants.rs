@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 
 use chefshat_agents::AgentKind;
 use chefshat_tournament::{
-    Change, Deals, Ended, Entrant, Format, GameState, ParticipantKind, Settings, State, Tournament,
+    Change, Deals, Ended, Entrant, Format, GameState, Leaving, ParticipantKind, Settings, State,
+    Tournament,
 };
 use proptest::prelude::*;
 
@@ -173,7 +174,14 @@ impl Run {
         let game = (usize::from(self.die(255)) * 7 + usize::from(self.die(255))) % games;
         let (built_in, max_games) = (self.die(2) == 0, usize::from(self.die(3)) + 1);
         let change = match self.die(10) {
-            0..3 => self.tournament.withdraw(who, built_in).ok().flatten(),
+            0..3 => {
+                let leaving = if built_in {
+                    Leaving::Removed
+                } else {
+                    Leaving::Itself
+                };
+                self.tournament.withdraw(who, leaving).ok().flatten()
+            }
             3..5 => {
                 let name = format!("other {}", self.rolls);
                 let by = Entrant {

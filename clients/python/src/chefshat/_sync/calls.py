@@ -14,6 +14,7 @@ from typing import Self
 
 from chefshat import pb, requests
 from chefshat._gen.chefshat.v1.analysis_service_pb2_grpc import AnalysisServiceStub
+from chefshat._gen.chefshat.v1.instrument_service_pb2_grpc import InstrumentServiceStub
 from chefshat._gen.chefshat.v1.play_service_pb2_grpc import PlayServiceStub
 from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
@@ -25,10 +26,11 @@ from chefshat.address import ServerAddress, server_address
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.channels import channel
+from chefshat.clock import READINGS, TIME_OF_DAY, ClockReading, LocalClock
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
 from chefshat.participant import MakeAgent, OnEntered
-from chefshat.requests import called, pages
+from chefshat.requests import called, pages, streamed
 from chefshat.result import SeatResult
 from chefshat.session import PlayOptions, PlaySession
 
@@ -61,7 +63,10 @@ class Calls(ABC):
                 read and watched, lists contain unlisted and private ones, and so do lists of records.
             backoff: delays between connection attempts while playing or watching.
         """
-        self._channel = channel(server_address(address, token, ca, secrets))
+        server = server_address(address, token, ca, secrets)
+        #: The address of the server, without what it requires.
+        self.address = server.address
+        self._channel = channel(server)
         self._backoff = backoff or Backoff()
         self._rng = random.Random()
         self._rooms = RoomServiceStub(self._channel)
@@ -70,6 +75,7 @@ class Calls(ABC):
         self._records = RecordServiceStub(self._channel)
         self._spectators = SpectatorServiceStub(self._channel)
         self._table = TableServiceStub(self._channel)
+        self._instruments = InstrumentServiceStub(self._channel)
         self._tournaments = TournamentServiceStub(self._channel)
         self._analysis = AnalysisServiceStub(self._channel)
 
@@ -130,9 +136,9 @@ class Calls(ABC):
         request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat)
         return called(self._rooms.JoinRoom, request)
 
-    def get_room(self, room_id: str) -> pb.Room:
-        """Returns the public view of a room."""
-        return (called(self._rooms.GetRoom, pb.GetRoomRequest(room_id=room_id))).room
+    def get_room(self, room_id: str = "", *, join_code: str = "") -> pb.Room:
+        """Returns the public view of a room, by its id or its join code."""
+        return (called(self._rooms.GetRoom, pb.GetRoomRequest(room_id=room_id, join_code=join_code))).room
 
     def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> Iterator[pb.Room]:
         """Iterates over the server's rooms, newest first, optionally only those in one state. Fetches pages on demand."""
@@ -155,6 +161,24 @@ class Calls(ABC):
         """Returns the text of every action for decks of `faces` faces (0: the default, 11)."""
         return called(self._server.GetActionTable, pb.GetActionTableRequest(faces=faces))
 
+    def clock(self, room_id: str = "", *, local: LocalClock = TIME_OF_DAY, readings: int = READINGS) -> ClockReading:
+        """Reads the server's clocks several times and returns the reading with the shortest round trip.
+
+        Args:
+            room_id: the room whose clock is read, too: the one that measures the times of its events and record. Empty: none.
+            local: the clock of this machine to compare with, in seconds; default: the time of day.
+            readings: how often the clocks are read.
+        """
+        best: ClockReading | None = None
+        for _ in range(max(readings, 1)):
+            sent = local()
+            response = called(self._server.GetClock, pb.GetClockRequest(room_id=room_id))
+            reading = ClockReading.of(response, sent, local())
+            if best is None or reading.round_trip < best.round_trip:
+                best = reading
+        assert best is not None
+        return best
+
     def records(self, wanted: pb.RecordFilter | None = None, *, newest_first: bool = False) -> Iterator[pb.RecordSummary]:
         """Iterates over the server's records that match a filter, oldest first by default. Fetches pages on demand."""
         request = pb.ListRecordsRequest(filter=wanted, newest_first=newest_first)
@@ -162,15 +186,9 @@ class Calls(ABC):
 
     def record(self, game_id: str) -> Iterator[pb.RecordLine]:
         """Iterates over the lines of a finished game's record."""
-        call = self._records.GetRecord(pb.GetRecordRequest(game_id=game_id))
-        try:
-            for response in call:
-                for line in response.lines:
-                    yield line
-        except grpc.RpcError as error:
-            raise from_rpc_error(error) from error
-        finally:
-            call.cancel()
+        for response in streamed(self._records.GetRecord, pb.GetRecordRequest(game_id=game_id)):
+            for line in response.lines:
+                yield line
 
     def evaluate(self, request: pb.EvaluateRequest) -> Iterator[pb.EvaluateResponse]:
         """Iterates over estimates of the actions of a decision, each from more rollouts than the one before.
@@ -205,6 +223,45 @@ class Calls(ABC):
                         last = event.sequence
                         failures = 0
                         yield event
+                return
+            except grpc.RpcError as error:
+                failures += 1
+                self._wait(failures, from_rpc_error(error))
+            finally:
+                call.cancel()
+
+    def add_marker(self, room_id: str, owner_token: str, label: str, *, elapsed_us: int | None = None) -> pb.Marker:
+        """Puts a marker into the record of a room. Nobody but the owner of the room learns of it.
+
+        Args:
+            room_id: the room.
+            owner_token: its creator's token.
+            label: what the marker says, 1..=128 characters.
+            elapsed_us: the marked moment on the room's clock, microseconds since the room was created (see `clock`); None: when the
+                server reads the request.
+        """
+        request = pb.AddMarkerRequest(room_id=room_id, owner_token=owner_token, label=label, elapsed_us=elapsed_us)
+        return (called(self._instruments.AddMarker, request)).marker
+
+    def follow_markers(self, room_id: str, owner_token: str, *, from_number: int = 0) -> Iterator[pb.Marker]:
+        """Iterates over the markers of a room until its game is over. Reconnects; each marker arrives once and in order.
+
+        Args:
+            room_id: the room.
+            owner_token: its creator's token.
+            from_number: number of the first marker wanted; 0: all.
+        """
+        last = max(from_number - 1, 0)
+        failures = 0
+        while True:
+            request = pb.FollowMarkersRequest(room_id=room_id, owner_token=owner_token, from_number=last + 1)
+            call = self._instruments.FollowMarkers(request)
+            try:
+                for response in call:
+                    failures = 0
+                    for marker in response.markers:
+                        last = marker.number
+                        yield marker
                 return
             except grpc.RpcError as error:
                 failures += 1

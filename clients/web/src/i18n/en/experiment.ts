@@ -57,6 +57,8 @@ export const experiment = {
     text: "A link that sets who takes part, in which seat and language, and what they see. The link itself contains all of this; the server stores none of it.",
     tournamentText:
       "A link that sets who takes part, in which language, and what they see in every game. The link itself contains all of this; the server stores none of it.",
+    hosted:
+      "For conditions that the server assigns, recorded consent and built-in questionnaires, create a study instead:",
     where: "Where they play",
     here: "all in this room",
     names: "Participants, one per line",

@@ -9,9 +9,11 @@ import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
 import { rules } from "./rules";
+import { studies } from "./studies";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
+import { wizard } from "./wizard";
 
 export const en = {
   attend,
@@ -23,9 +25,11 @@ export const en = {
   people,
   replay,
   rules,
+  studies,
   table,
   tournaments,
   tutorial,
+  wizard,
 };
 
 /** The form of a language's texts. */

@@ -139,6 +139,7 @@ export const lobby = {
       anybody: "Free for anyone",
       agent: "Free for an agent",
       robot: "Free for a robot",
+      wizard: "A person who plays as a robot (Wizard of Oz)",
       builtIn: (name: string) => `Built-in agent: ${name}`,
     },
     clock: "Clock",

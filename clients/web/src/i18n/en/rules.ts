@@ -43,7 +43,7 @@ export const rules = {
     },
     finishing: {
       title: "Finishing",
-      text: "Whoever plays their last card takes the best place that is still free. The Shift ends when only one player has cards left.",
+      text: "A player who plays their last card takes the best place that is still free. The Shift ends when only one player has cards left.",
     },
     roles: {
       title: "Roles",

@@ -115,7 +115,8 @@ export const table = {
     declareOf: (name: string) => `${name} may declare`,
     wait: "Waiting for the others",
     awaited: (name: string, seconds: number) => `Waiting for ${name} for ${seconds} s`,
-    awaitedAway: (name: string, seconds: number) => `Waiting for ${name} (away): ${seconds} s`,
+    awaitedAway: (name: string, seconds: number | undefined) =>
+      seconds === undefined ? `Waiting for ${name} (away)` : `Waiting for ${name} (away): ${seconds} s`,
     waitExchange: "The cards have been dealt",
     youGive: "You give a card",
     youGiveOf: (number: number, of: number) => `You give card ${number} of ${of}`,
@@ -201,7 +202,7 @@ export const table = {
     },
     lastCard: {
       title: (name: string) => `${name} has one card left`,
-      text: "Whoever plays their last card takes the best free place.",
+      text: "A player who plays their last card takes the best free place.",
     },
   },
   clock: {

@@ -1,9 +1,10 @@
 // English texts of tournaments/.
 
-import { plurals } from "../plural";
+import { ordinals, plurals } from "../plural";
 import { time } from "./time";
 
 const plural = plurals("en");
+const th = ordinals("en", { one: "st", two: "nd", few: "rd", other: "th" });
 
 export const tournaments = {
   title: "Tournaments",
@@ -38,6 +39,32 @@ export const tournaments = {
     orCode: "or enter the code",
   },
   print: "Print",
+  results: {
+    title: "Results",
+    open: "Results and certificates",
+    controls: "Results",
+    back: "Back to the tournament",
+    provisional: (date: string) => `As of ${date}; the tournament is not over.`,
+    settings: "How it was played",
+    table: "Table",
+    game: "Game",
+    result: "Result",
+    foot: (id: string) => `Chef’s Hat · tournament ${id}`,
+  },
+  certificate: {
+    heading: "Certificates",
+    text: "Made on this device, as PDF. Sign them by hand.",
+    all: (count: number) => plural(count, { one: "Save # certificate", other: "Save all # certificates in one file" }),
+    of: "Save the certificate of",
+    title: "Certificate",
+    placed: (place: number, of: number) => `took ${th(place)} place of ${of} in the tournament`,
+    tookPart: "took part in the tournament",
+    rounds: (count: number) => plural(count, { one: "# round", other: "# rounds" }),
+    games: (count: number) => plural(count, { one: "# game played", other: "# games played" }),
+    score: (mean: string) => `mean score ${mean}`,
+    wins: (count: number) => plural(count, { one: "first in # game", other: "first in # games" }),
+    signature: "Signature of the organiser",
+  },
   countdown: {
     label: "Starts in",
     due: "Starts as soon as two have joined",
@@ -135,7 +162,7 @@ export const tournaments = {
     waitOpen:
       "Stay on this page. The tournament starts when the organiser starts it or when enough participants have joined.",
     waitNext: "Stay on this page: your next game starts here automatically.",
-    waitPaused: "The organiser has paused the tournament. Your next game starts here when it goes on.",
+    waitPaused: "The organiser has paused the tournament. Your next game starts here when it is resumed.",
     postpone: (place: string) => `Postpone my next game (${place})`,
     leave: "Leave the tournament…",
     leaveDo: "Leave it now",

@@ -58,6 +58,7 @@ export const experiment: Texts["experiment"] = {
     text: "Un link che stabilisce chi partecipa, in quale posto e lingua, e che cosa vede. Tutto questo è contenuto nel link; il server non ne conserva nulla.",
     tournamentText:
       "Un link che stabilisce chi partecipa, in quale lingua e che cosa vede in ogni partita. Tutto questo è contenuto nel link; il server non ne conserva nulla.",
+    hosted: "Per condizioni assegnate dal server, consenso registrato e questionari integrati, crea invece uno studio:",
     where: "Dove giocano",
     here: "tutti in questa stanza",
     names: "Partecipanti, uno per riga",

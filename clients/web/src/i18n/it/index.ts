@@ -10,9 +10,11 @@ import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
 import { rules } from "./rules";
+import { studies } from "./studies";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
+import { wizard } from "./wizard";
 
 export const it: Texts = {
   attend,
@@ -24,7 +26,9 @@ export const it: Texts = {
   people,
   replay,
   rules,
+  studies,
   table,
   tournaments,
   tutorial,
+  wizard,
 };

@@ -140,6 +140,7 @@ export const lobby: Texts["lobby"] = {
       anybody: "Libero per chiunque",
       agent: "Libero per un agente",
       robot: "Libero per un robot",
+      wizard: "Una persona che gioca come robot (Mago di Oz)",
       builtIn: (name) => `Agente integrato: ${name}`,
     },
     clock: "Orologio",

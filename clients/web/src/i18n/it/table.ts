@@ -120,7 +120,8 @@ export const table: Texts["table"] = {
     declareOf: (name) => `${name} può dichiarare`,
     wait: "Decidono gli altri",
     awaited: (name, seconds) => `Si aspetta ${name} da ${seconds} s`,
-    awaitedAway: (name, seconds) => `Si aspetta ${name} (assente): ${seconds} s`,
+    awaitedAway: (name, seconds) =>
+      seconds === undefined ? `Si aspetta ${name} (assente)` : `Si aspetta ${name} (assente): ${seconds} s`,
     waitExchange: "Le carte sono distribuite",
     youGive: "Dai una carta",
     youGiveOf: (number, of) => `Dai la carta ${number} di ${of}`,

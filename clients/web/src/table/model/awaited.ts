@@ -9,8 +9,8 @@ export interface AwaitedSeat {
   readonly away: boolean;
   /** Milliseconds since its decision was opened, when the message arrived. */
   readonly waitedMs: number;
-  /** Milliseconds until the server decides for it, when the message arrived. */
-  readonly leftMs: number;
+  /** Milliseconds until the server decides for it, when the message arrived; undefined if nobody may know. */
+  readonly leftMs: number | undefined;
   /** Arrival time of the message, by the page's clock. */
   readonly receivedAtMs: number;
 }
@@ -25,11 +25,13 @@ export const PATIENCE_SECONDS = 5;
 
 /**
  * The whole seconds to show at `nowMs`: those left for a seat that is away, those that have passed for
- * one that is connected. Undefined if there is nothing to say yet.
+ * one that is connected. Undefined if there are none to show, or not yet.
  */
 export function awaitedSeconds(awaited: AwaitedSeat, nowMs: number): number | undefined {
   const sinceMs = Math.max(0, nowMs - awaited.receivedAtMs);
-  if (awaited.away) return Math.max(0, Math.ceil((awaited.leftMs - sinceMs) / 1000));
+  if (awaited.away) {
+    return awaited.leftMs === undefined ? undefined : Math.max(0, Math.ceil((awaited.leftMs - sinceMs) / 1000));
+  }
   const waited = Math.floor((awaited.waitedMs + sinceMs) / 1000);
   return waited < PATIENCE_SECONDS ? undefined : waited;
 }

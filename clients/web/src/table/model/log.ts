@@ -4,6 +4,9 @@
 
 import type { LogEntry, LogLine } from "./state";
 
+/** More events than this at once are a past that is caught up with. */
+export const MOST_AT_ONCE = 14;
+
 /** Events about a seat's connection. */
 const PRESENCE = ["lost", "back", "substituted"] as const;
 

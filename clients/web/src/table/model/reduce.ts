@@ -4,6 +4,7 @@
 import type { GameEvent, Play } from "../../gen/chefshat/v1/event_pb";
 import { DecisionSource } from "../../gen/chefshat/v1/event_pb";
 import { Opening, PassScope, Role } from "../../gen/chefshat/v1/rules_pb";
+import { shownLabel } from "../expressions";
 import { type Card, cardsFromNumbers, countOf, faceOf, playedCards, together, without } from "./cards";
 import { publicRequirement } from "./requirement";
 import {
@@ -169,7 +170,7 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
       return [{ ...table, phase: "aborted", abortReason: kind.value.reason, next: undefined }, { kind: "aborted" }];
     case "expressionShown": {
       const { seat, expression } = kind.value;
-      const label = expression?.label ?? "";
+      const label = expression ? shownLabel(expression) : "";
       return [withSeat(table, seat, { expression: { label, sequence } }), { kind: "expressed", seat, label }];
     }
     case "serverRestarted":

@@ -1,5 +1,5 @@
-// The line that says whom the game waits for: how long it still waits for a seat that is away, how long
-// it has waited for one that is connected.
+// The line that says whom the game waits for: how long it still waits for a seat that is away, how
+// long it has waited for one that is connected.
 
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../../i18n";
@@ -21,12 +21,13 @@ export function AwaitedLine({ table, awaited }: AwaitedLineProps) {
     return () => clearInterval(timer);
   }, []);
   const seconds = awaitedSeconds(awaited, Math.max(nowMs, awaited.receivedAtMs));
-  if (seconds === undefined) return null;
   const words = t().table.now;
   const name = distinctName(table, awaited.seat);
+  const line = awaited.away ? words.awaitedAway(name, seconds) : seconds !== undefined && words.awaited(name, seconds);
+  if (!line) return null;
   return (
     <p class="number" data-part="awaited" data-away={awaited.away ? "" : undefined}>
-      {awaited.away ? words.awaitedAway(name, seconds) : words.awaited(name, seconds)}
+      {line}
     </p>
   );
 }

@@ -7,13 +7,12 @@ import { t } from "../../i18n";
 import { announce } from "../../parts/Announcer";
 import { Drawing } from "../../parts/Drawing";
 import { isOn } from "../../preferences";
-import { type Moment as Happening, type MomentKind, momentSince } from "../model/moments";
+import { MOST_AT_ONCE } from "../model/log";
+import { type Moment as GameMoment, type MomentKind, momentSince } from "../model/moments";
 import type { TableState } from "../model/state";
 import { distinctName } from "../words";
 import css from "./Moment.module.css";
 
-/** More events than this at once are a past that is caught up with. */
-const MOST_AT_ONCE = 14;
 /** How long a moment is shown, milliseconds. */
 const SHOWN_MS = 4500;
 
@@ -25,7 +24,7 @@ const DRAWINGS: Record<MomentKind, string> = {
 };
 
 export function Moment({ table }: { table: TableState }) {
-  const [shown, setShown] = useState<Happening | undefined>(undefined);
+  const [shown, setShown] = useState<GameMoment | undefined>(undefined);
   // The past of a table that has just been opened is no moment.
   const last = table.log.at(-1)?.sequence ?? 0;
   const seen = useRef(last);

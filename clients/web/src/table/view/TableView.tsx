@@ -72,7 +72,9 @@ interface TableViewProps {
   /** Whether the page is about to pass by itself. */
   autoPassing?: boolean;
   onAnswer?: (action: number, automatic?: Automatic) => void;
-  onExpress?: (gesture: Gesture) => void;
+  /** The person picked a card or put it back. */
+  onPick?: ((card: string, picked: boolean) => void) | undefined;
+  onExpress?: ((gesture: Gesture) => void) | undefined;
   /** Whether there are quick phrases beside the expressions. */
   phrases?: boolean;
 }
@@ -97,6 +99,7 @@ export function TableView(props: TableViewProps) {
     refusal: props.refusal,
     plans: props.plans ?? false,
     onAnswer: props.onAnswer,
+    onPick: props.onPick,
   });
   const { hand, moves } = deciding;
   const [helped, setHelped] = useState(false);

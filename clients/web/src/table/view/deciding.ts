@@ -40,6 +40,8 @@ interface DecidingUse {
   /** Whether a play can be chosen before the turn. */
   plans: boolean;
   onAnswer: ((action: number, automatic?: Automatic) => void) | undefined;
+  /** The person picked a card or put it back; its name is the face, or J for a joker. */
+  onPick?: ((card: string, picked: boolean) => void) | undefined;
 }
 
 export interface Deciding {
@@ -98,10 +100,16 @@ export function useDeciding(use: DecidingUse): Deciding {
   const picked = phase !== undefined && choice.id === phase ? choice.picked : NOTHING;
   const [remark, setRemark] = useState("");
   const [plan, setPlan] = useState<Plan | undefined>(undefined);
+  const report = (index: number, isPicked: boolean) => {
+    const card = hand[index];
+    if (card) use.onPick?.(String(faceOf(card) ?? "J"), isPicked);
+  };
   // Other cards mean another play: the one chosen before is not sent.
   const setPicked = (next: Picked) => {
     if (next !== picked) setPlan(undefined);
     setChoice({ id: phase, picked: next });
+    for (const index of picked) if (!next.has(index)) report(index, false);
+    for (const index of next) if (!picked.has(index)) report(index, true);
   };
 
   // A given card has left the hand, although the table's hand keeps it until the exchange is
@@ -134,7 +142,9 @@ export function useDeciding(use: DecidingUse): Deciding {
   // The suggested cards are picked, so that one click plays them.
   useEffect(() => {
     const suggested = use.given?.hint && moveOf(use.given.hint.action, table.faces);
-    if (decision && suggested) setPicked(picksOf(decision.hand, suggested, golden));
+    if (!decision || !suggested) return;
+    setPlan(undefined);
+    setChoice({ id: decision.id, picked: picksOf(decision.hand, suggested, golden) });
   }, [use.given?.hint]);
 
   const holds = plan !== undefined && isPossible(plan, table, decision);

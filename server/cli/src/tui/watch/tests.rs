@@ -46,15 +46,15 @@ fn a_live_game_shows_whom_it_waits_for() {
         seat: Some(1),
         away: true,
         waited_ms: 0,
-        left_ms: 12_000,
+        left_ms: Some(12_000),
     };
     reel.wait_for(&awaited, 500);
-    assert!(screen(&reel).contains("Waiting for seat 2 (away): 12 s"));
+    assert!(screen(&reel).contains("Waiting for seat 1 (away): 12 s"));
     assert!(!reel.tick(501), "the same second");
     assert!(reel.tick(1_500));
-    assert!(screen(&reel).contains("Waiting for seat 2 (away): 11 s"));
+    assert!(screen(&reel).contains("Waiting for seat 1 (away): 11 s"));
     reel.wait_for(&v1::Awaited::default(), 1_600);
-    assert!(!screen(&reel).contains("Waiting"));
+    assert!(!screen(&reel).contains("Waiting for seat"));
 }
 
 #[test]

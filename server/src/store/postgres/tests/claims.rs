@@ -5,6 +5,8 @@ use super::*;
 
 const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
+/// How often the database is asked whether something has happened.
+const LOOKS: u32 = 10_000;
 
 async fn create(store: &PostgresStore, rooms: impl IntoIterator<Item = u8>) {
     for room in rooms {
@@ -74,10 +76,15 @@ async fn a_released_unit_is_offered_to_another_node() {
     let listens = "SELECT EXISTS (SELECT FROM pg_stat_activity
                    WHERE datname = current_database() AND query LIKE 'LISTEN%' AND state = 'idle')";
     let mut is_listening = false;
-    while !is_listening {
+    for _ in 0..LOOKS {
         let listens = sqlx::query_scalar(listens).fetch_one(&mut observer);
         is_listening = listens.await.expect("readable");
+        if is_listening {
+            break;
+        }
+        tokio::task::yield_now().await;
     }
+    assert!(is_listening);
     let released = pair.first.release(Id([1; 16]), FIRST);
     released.await.expect("released");
     assert_eq!(pair.second.handed_over().await, (Id([1; 16]), FIRST));

@@ -1,12 +1,14 @@
 //! Work that is tried again because no answer came: what an earlier attempt has committed, or still
 //! commits, counts as done once it is safe; and a connection that hangs is replaced.
 
+use std::future::pending;
 use std::pin::pin;
 
 use chefshat_postgres::Server;
+use sqlx::Connection as _;
 use tokio::io::copy_bidirectional;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::watch;
+use tokio::sync::{oneshot, watch};
 
 use super::*;
 
@@ -314,5 +316,43 @@ async fn one_row_that_cannot_be_written_does_not_hold_up_others() {
     }
     database.run("DROP TRIGGER damaged ON journal");
     assert_eq!(late.await, Ok(()));
+    store.close().await;
+}
+
+#[tokio::test]
+async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    let pool = &store.beats.pool;
+    let mut others = Vec::new();
+    for _ in 1..BEATERS {
+        others.push(pool.acquire().await.expect("the database answers"));
+    }
+    let (sent, is_sent) = oneshot::channel();
+    let given_up = store.beats.read::<()>(move |connection| {
+        async move {
+            let begun = connection.begin().now_or_never();
+            assert!(begun.is_none(), "an answer takes a moment");
+            sent.send(()).expect("the test waits");
+            pending().await
+        }
+        .boxed()
+    });
+    tokio::select! {
+        _ = given_up => unreachable!("it never ends"),
+        sent = is_sent => sent.expect("it is sent"),
+    }
+    // Over the same connection: there is no place for another.
+    let transaction = || {
+        store.beats.read(|connection| {
+            sqlx::query_scalar::<_, String>("SELECT pg_current_xact_id()::text")
+                .fetch_one(connection)
+                .boxed()
+        })
+    };
+    let first = transaction().await.expect("it answers");
+    let second = transaction().await.expect("it answers");
+    assert_ne!(first, second, "each by itself");
+    drop(others);
     store.close().await;
 }

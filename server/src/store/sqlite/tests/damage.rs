@@ -100,6 +100,7 @@ fn tournament() -> (Vec<u8>, Vec<u8>) {
         Change::Rescheduled {
             game: 0,
             missing: vec![1],
+            never_started: false,
         },
         call(0),
         Change::Counted { game: 0, result },

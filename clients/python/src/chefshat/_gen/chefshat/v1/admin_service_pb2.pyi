@@ -321,8 +321,8 @@ class PruneRecordsRequest(_message.Message):
     ENDED_BEFORE_MS_FIELD_NUMBER: _builtins.int
     KEEP_FIELD_NUMBER: _builtins.int
     ended_before_ms: _builtins.int
-    """Only games that ended before this time, milliseconds since the Unix epoch; 0: no such condition.
-    For an imported game the time of its import counts.
+    """Only games that ended before this time, milliseconds since the Unix epoch; 0: no such
+    condition. For an imported game the time of its import counts.
     """
     keep: _builtins.int
     """Number of newest games to keep, in the order in which they ended or were imported; 0: no such

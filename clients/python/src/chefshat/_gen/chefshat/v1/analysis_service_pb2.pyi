@@ -107,8 +107,8 @@ class EvaluateRequest(_message.Message):
     UPDATE_MS_FIELD_NUMBER: _builtins.int
     rollouts: _builtins.int
     """Rollouts in all, at most 1,000,000; 0: as many as the time allows. With a number of rollouts
-    and a seed the result is always the same, if the time suffices. Every legal action is tried in 4
-    deals at least, even if that costs more rollouts or time.
+    and a seed the result is always the same, if the time suffices. Every legal action is tried in
+    4 deals at least, even if that costs more rollouts or time.
     """
     time_ms: _builtins.int
     """Milliseconds, at most 10,000; 0: 1,000. Counting the possible deals is included."""
@@ -119,8 +119,8 @@ class EvaluateRequest(_message.Message):
     seed: _builtins.int
     """Seed of the random choices."""
     update_ms: _builtins.int
-    """Milliseconds between messages with estimates so far, 50 to 10,000; 0: only the last one is sent.
-    A message is left out if the client has not received the one before.
+    """Milliseconds between messages with estimates so far, 50 to 10,000; 0: only the last one is
+    sent. A message is left out if the client has not received the one before.
     """
     @_builtins.property
     def moment(self) -> Global___RecordedMoment:

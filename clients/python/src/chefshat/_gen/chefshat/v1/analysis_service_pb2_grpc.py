@@ -52,11 +52,11 @@ class AnalysisServiceServicer(object):
     """
 
     def Evaluate(self, request, context):
-        """Estimates each legal action of a decision and the likely hands. The last message of the stream is
-        sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
-        work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
-        (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
-        (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
+        """Estimates each legal action of a decision and the likely hands. The last message of the stream
+        is sent when the budget is spent; with `update_ms`, others with estimates so far come before
+        it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
+        RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
+        RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

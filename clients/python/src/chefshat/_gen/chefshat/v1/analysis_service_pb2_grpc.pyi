@@ -37,11 +37,11 @@ class AnalysisServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> AnalysisServiceAsyncStub: ...
     Evaluate: _grpc.UnaryStreamMultiCallable[_analysis_service_pb2.EvaluateRequest, _analysis_service_pb2.EvaluateResponse]
-    """Estimates each legal action of a decision and the likely hands. The last message of the stream is
-    sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
-    work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
-    (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
-    (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
+    """Estimates each legal action of a decision and the likely hands. The last message of the stream
+    is sent when the budget is spent; with `update_ms`, others with estimates so far come before
+    it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
+    RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
+    RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
     """
     LegalActions: _grpc.UnaryUnaryMultiCallable[_analysis_service_pb2.LegalActionsRequest, _analysis_service_pb2.LegalActionsResponse]
     """The legal actions of a decision of a recorded game. Errors as for Evaluate."""
@@ -52,11 +52,11 @@ class AnalysisServiceAsyncStub(AnalysisServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     Evaluate: _aio.UnaryStreamMultiCallable[_analysis_service_pb2.EvaluateRequest, _analysis_service_pb2.EvaluateResponse]  # type: ignore[assignment]
-    """Estimates each legal action of a decision and the likely hands. The last message of the stream is
-    sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
-    work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
-    (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
-    (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
+    """Estimates each legal action of a decision and the likely hands. The last message of the stream
+    is sent when the budget is spent; with `update_ms`, others with estimates so far come before
+    it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
+    RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
+    RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
     """
     LegalActions: _aio.UnaryUnaryMultiCallable[_analysis_service_pb2.LegalActionsRequest, _analysis_service_pb2.LegalActionsResponse]  # type: ignore[assignment]
     """The legal actions of a decision of a recorded game. Errors as for Evaluate."""
@@ -70,11 +70,11 @@ class AnalysisServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _analysis_service_pb2.EvaluateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_analysis_service_pb2.EvaluateResponse], _abc.AsyncIterator[_analysis_service_pb2.EvaluateResponse]]:
-        """Estimates each legal action of a decision and the likely hands. The last message of the stream is
-        sent when the budget is spent; with `update_ms`, others with estimates so far come before it. The
-        work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED, RULE_SET_REFUSED), NOT_FOUND
-        (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN), RESOURCE_EXHAUSTED
-        (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
+        """Estimates each legal action of a decision and the likely hands. The last message of the stream
+        is sent when the budget is spent; with `update_ms`, others with estimates so far come before
+        it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
+        RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
+        RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod

@@ -105,6 +105,10 @@ class _ExpressionSourceEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Expr
     """The participant's own report."""
     EXPRESSION_SOURCE_MODEL: _ExpressionSource.ValueType  # 4
     """A model's output."""
+    EXPRESSION_SOURCE_WIZARD: _ExpressionSource.ValueType  # 5
+    """A person who plays the seat as another kind (`SeatConfig.wizard`). Only in records: the server
+    sets it for every expression of such a seat. Must not be sent.
+    """
 
 class ExpressionSource(_ExpressionSource, metaclass=_ExpressionSourceEnumTypeWrapper):
     """The source of an expression."""
@@ -119,7 +123,39 @@ EXPRESSION_SOURCE_SELF_REPORT: ExpressionSource.ValueType  # 3
 """The participant's own report."""
 EXPRESSION_SOURCE_MODEL: ExpressionSource.ValueType  # 4
 """A model's output."""
+EXPRESSION_SOURCE_WIZARD: ExpressionSource.ValueType  # 5
+"""A person who plays the seat as another kind (`SeatConfig.wizard`). Only in records: the server
+sets it for every expression of such a seat. Must not be sent.
+"""
 Global___ExpressionSource: _TypeAlias = ExpressionSource  # noqa: Y015
+
+class _GazeFrame:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _GazeFrameEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_GazeFrame.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    GAZE_FRAME_UNSPECIFIED: _GazeFrame.ValueType  # 0
+    """Not specified."""
+    GAZE_FRAME_SCREEN: _GazeFrame.ValueType  # 1
+    """The screen of the participant."""
+    GAZE_FRAME_CAMERA: _GazeFrame.ValueType  # 2
+    """The picture of a camera that the participant wears or is."""
+    GAZE_FRAME_TABLE: _GazeFrame.ValueType  # 3
+    """A physical table, seen from above with seat 0 at the bottom."""
+
+class GazeFrame(_GazeFrame, metaclass=_GazeFrameEnumTypeWrapper):
+    """What the coordinates of a point of gaze belong to."""
+
+GAZE_FRAME_UNSPECIFIED: GazeFrame.ValueType  # 0
+"""Not specified."""
+GAZE_FRAME_SCREEN: GazeFrame.ValueType  # 1
+"""The screen of the participant."""
+GAZE_FRAME_CAMERA: GazeFrame.ValueType  # 2
+"""The picture of a camera that the participant wears or is."""
+GAZE_FRAME_TABLE: GazeFrame.ValueType  # 3
+"""A physical table, seen from above with seat 0 at the bottom."""
+Global___GazeFrame: _TypeAlias = GazeFrame  # noqa: Y015
 
 @_typing.final
 class Observation(_message.Message):
@@ -257,8 +293,8 @@ class DecisionRequest(_message.Message):
     time_left_ms: _builtins.int
     """Milliseconds left for this decision before the time bank is used, when the request was written."""
     bank_left_ms: _builtins.int
-    """Milliseconds left in the seat's time bank, when the request was written. 0 for a special action,
-    which does not use the bank.
+    """Milliseconds left in the seat's time bank, when the request was written. 0 for a special
+    action, which does not use the bank.
     """
     invalid_attempts_left: _builtins.int
     """Invalid attempts left before the server takes the default decision; unset if unlimited."""
@@ -546,6 +582,36 @@ class AnswerResult(_message.Message):
 Global___AnswerResult: _TypeAlias = AnswerResult  # noqa: Y015
 
 @_typing.final
+class GazePoint(_message.Message):
+    """A point that a participant looks at."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    X_FIELD_NUMBER: _builtins.int
+    Y_FIELD_NUMBER: _builtins.int
+    FRAME_FIELD_NUMBER: _builtins.int
+    x: _builtins.float
+    """From the left edge (0) to the right edge (1) of the frame; -10..10, outside of 0..1 beyond it."""
+    y: _builtins.float
+    """From the top edge (0) to the bottom edge (1) of the frame; -10..10."""
+    frame: Global___GazeFrame.ValueType
+    """What the coordinates belong to."""
+    def __init__(
+        self,
+        *,
+        x: _builtins.float = ...,
+        y: _builtins.float = ...,
+        frame: Global___GazeFrame.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["frame", b"frame", "x", b"x", "y", b"y"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GazePoint: _TypeAlias = GazePoint  # noqa: Y015
+
+@_typing.final
 class Expression(_message.Message):
     """A signal of affect or attention by a seat, at any time. All viewers of the room see it unless
     `record_only` is set.
@@ -562,6 +628,8 @@ class Expression(_message.Message):
     TAKEN_AT_FIELD_NUMBER: _builtins.int
     MEDIA_FIELD_NUMBER: _builtins.int
     RECORD_ONLY_FIELD_NUMBER: _builtins.int
+    ABOUT_SEAT_FIELD_NUMBER: _builtins.int
+    GAZE_FIELD_NUMBER: _builtins.int
     label: _builtins.str
     """Short label, for instance "joy"; 1..=64 bytes."""
     valence: _builtins.float
@@ -578,9 +646,15 @@ class Expression(_message.Message):
     """Reference to recorded media, at most 256 bytes."""
     record_only: _builtins.bool
     """Only for the record: nobody in the room sees it."""
+    about_seat: _builtins.int
+    """A seat: somebody whom the participant reacts to or looks at, maybe itself."""
     @_builtins.property
     def taken_at(self) -> _timestamp_pb2.Timestamp:
         """When the sender captured it, by its own clock; years 1 to 9999."""
+
+    @_builtins.property
+    def gaze(self) -> Global___GazePoint:
+        """A point that the participant looks at."""
 
     def __init__(
         self,
@@ -594,10 +668,12 @@ class Expression(_message.Message):
         taken_at: _timestamp_pb2.Timestamp | None = ...,
         media: _builtins.str = ...,
         record_only: _builtins.bool = ...,
+        about_seat: _builtins.int = ...,
+        gaze: Global___GazePoint | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_arousal", b"_arousal", "_confidence", b"_confidence", "_dominance", b"_dominance", "_valence", b"_valence", "arousal", b"arousal", "confidence", b"confidence", "dominance", b"dominance", "taken_at", b"taken_at", "valence", b"valence"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_arousal", b"_arousal", "_confidence", b"_confidence", "_dominance", b"_dominance", "_valence", b"_valence", "about", b"about", "about_seat", b"about_seat", "arousal", b"arousal", "confidence", b"confidence", "dominance", b"dominance", "gaze", b"gaze", "taken_at", b"taken_at", "valence", b"valence"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_arousal", b"_arousal", "_confidence", b"_confidence", "_dominance", b"_dominance", "_valence", b"_valence", "arousal", b"arousal", "confidence", b"confidence", "dominance", b"dominance", "label", b"label", "media", b"media", "record_only", b"record_only", "source", b"source", "taken_at", b"taken_at", "valence", b"valence"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_arousal", b"_arousal", "_confidence", b"_confidence", "_dominance", b"_dominance", "_valence", b"_valence", "about", b"about", "about_seat", b"about_seat", "arousal", b"arousal", "confidence", b"confidence", "dominance", b"dominance", "gaze", b"gaze", "label", b"label", "media", b"media", "record_only", b"record_only", "source", b"source", "taken_at", b"taken_at", "valence", b"valence"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__arousal: _TypeAlias = _typing.Literal["arousal"]  # noqa: Y015
     _WhichOneofArgType__arousal: _TypeAlias = _typing.Literal["_arousal", b"_arousal"]  # noqa: Y015
@@ -607,6 +683,8 @@ class Expression(_message.Message):
     _WhichOneofArgType__dominance: _TypeAlias = _typing.Literal["_dominance", b"_dominance"]  # noqa: Y015
     _WhichOneofReturnType__valence: _TypeAlias = _typing.Literal["valence"]  # noqa: Y015
     _WhichOneofArgType__valence: _TypeAlias = _typing.Literal["_valence", b"_valence"]  # noqa: Y015
+    _WhichOneofReturnType_about: _TypeAlias = _typing.Literal["about_seat", "gaze"]  # noqa: Y015
+    _WhichOneofArgType_about: _TypeAlias = _typing.Literal["about", b"about"]  # noqa: Y015
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__arousal) -> _WhichOneofReturnType__arousal | None: ...
     @_typing.overload
@@ -615,5 +693,7 @@ class Expression(_message.Message):
     def WhichOneof(self, oneof_group: _WhichOneofArgType__dominance) -> _WhichOneofReturnType__dominance | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__valence) -> _WhichOneofReturnType__valence | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType_about) -> _WhichOneofReturnType_about | None: ...
 
 Global___Expression: _TypeAlias = Expression  # noqa: Y015

@@ -385,7 +385,7 @@ Global___ServerRestarted: _TypeAlias = ServerRestarted  # noqa: Y015
 @_typing.final
 class Substituted(_message.Message):
     """A built-in agent plays for a seat from here on, until Returned. Follows the default decision with
-    which the seat reached its limit of timeouts, or that ended while it was away
+    which the seat reached its limit of timeouts, or its absence time was over
     (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
     participant has left the tournament (`for_good`), it comes at any time, and the built-in agent plays
     until the end of the game.
@@ -837,17 +837,17 @@ class SeedReveal(_message.Message):
 
     The server commits to its part before any seat is taken: `Room.seed_commitment` is
     SHA-256("chefshat.v1 seed" || game id, 16 bytes || nonce || server seed). The game seed is
-    SHA-256("chefshat.v1 game" || server seed || for each seat in order the length of its bytes as one
-    byte, and the bytes).
+    SHA-256("chefshat.v1 game" || server seed || for each seat in order the length of its bytes as
+    one byte, and the bytes).
 
-    A Shift is dealt from the stream of ChaCha20 (the original one: 64-bit counter and nonce) with the
-    game seed as key, counter 0 and the number of the Shift, from 1, as nonce, little-endian. Read as
-    little-endian 32-bit numbers x, below(n) takes the next x with x < n * floor(2^32 / n), and is x
-    mod n. The deck is ordered: face 1 once, face 2 twice, to face F F times, the last of them the
-    Golden card, then the jokers. For last = size-1 down to 1, cards `last` and below(last + 1) swap
-    places. Seat 0 gets the first cards, then seat 1, and so on. If the Golden card is set aside, it
-    swaps places with card below(number dealt). With OPENING_ANY_TOP_FACE, below(players) then draws a
-    seat.
+    A Shift is dealt from the stream of ChaCha20 (the original one: 64-bit counter and nonce) with
+    the game seed as key, counter 0 and the number of the Shift, from 1, as nonce, little-endian.
+    Read as little-endian 32-bit numbers x, below(n) takes the next x with x < n * floor(2^32 / n),
+    and is x mod n. The deck is ordered: face 1 once, face 2 twice, to face F F times, the last of
+    them the Golden card, then the jokers. For last = size-1 down to 1, cards `last` and below(last +
+    1) swap places. Seat 0 gets the first cards, then seat 1, and so on. If the Golden card is set
+    aside, it swaps places with card below(number dealt). With OPENING_ANY_TOP_FACE, below(players)
+    then draws a seat.
 
     So nobody who committed or contributed before knowing all other parts chose the deals. The server
     learns the seats' bytes before the game starts, but is bound by its commitment. What is not

@@ -66,8 +66,8 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
     """The game is over and all its events have been sent."""
     DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
-    """The tournament is over, at least for the participant: it withdrew, was removed or replaced. It is
-    not seated again.
+    """The tournament is over, at least for the participant: it withdrew, was removed or replaced. It
+    is not seated again.
     """
     DETACH_REASON_SERVER_STOPPING: _DetachReason.ValueType  # 6
     """The server stops, and the game continues when it is started again. The stream ends after this:
@@ -86,8 +86,8 @@ DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
 """The game is over and all its events have been sent."""
 DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
-"""The tournament is over, at least for the participant: it withdrew, was removed or replaced. It is
-not seated again.
+"""The tournament is over, at least for the participant: it withdrew, was removed or replaced. It
+is not seated again.
 """
 DETACH_REASON_SERVER_STOPPING: DetachReason.ValueType  # 6
 """The server stops, and the game continues when it is started again. The stream ends after this:
@@ -99,7 +99,8 @@ Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 class Attach(_message.Message):
     """Attaches a seat to the stream. The newest attachment of a seat wins; the older one receives
     Detached (SUPERSEDED). The server replies with Attached or Refused, then sends the requested
-    events and the seat's open decision, if any, with the time left for it.
+    events and the seat's open decision, if any, with the time left for it. If the room is just being
+    taken over from a lost server, the reply waits for that, and the other seats play meanwhile.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -132,8 +133,8 @@ class Attach(_message.Message):
     no_mask: _builtins.bool
     """Leave `action_mask` out of decision requests."""
     entropy: _builtins.bytes
-    """The seat's contribution to the game seed, 0..=32 bytes; best 32 random ones, of which it keeps a
-    copy. Used if sent before the game starts, except in games of a series. SeedReveal has the
+    """The seat's contribution to the game seed, 0..=32 bytes; best 32 random ones, of which it keeps
+    a copy. Used if sent before the game starts, except in games of a series. SeedReveal has the
     formula, and what it proves.
     """
     def __init__(
@@ -701,8 +702,8 @@ Global___ActRequest: _TypeAlias = ActRequest  # noqa: Y015
 
 @_typing.final
 class AskHint(_message.Message):
-    """Asks for a hint for the open decision of the seat, where RoomPolicy.hints allows it: at most three
-    times for a decision, once at a time. It takes about half a second of the seat's time.
+    """Asks for a hint for the open decision of the seat, where RoomPolicy.hints allows it: at most
+    three times for a decision, once at a time. It takes about half a second of the seat's time.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

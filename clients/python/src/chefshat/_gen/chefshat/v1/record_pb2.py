@@ -28,7 +28,7 @@ from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18\x63hefshat/v1/record.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\x86\x02\n\nRecordLine\x12+\n\x06header\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordHeaderH\x00\x12/\n\x08\x64\x65\x63ision\x18\x02 \x01(\x0b\x32\x1b.chefshat.v1.DecisionRecordH\x00\x12\'\n\x05\x65vent\x18\x03 \x01(\x0b\x32\x16.chefshat.v1.GameEventH\x00\x12<\n\x12private_expression\x18\x04 \x01(\x0b\x32\x1e.chefshat.v1.PrivateExpressionH\x00\x12+\n\x06\x66ooter\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.RecordFooterH\x00\x42\x06\n\x04line\"\xdb\x03\n\x0cRecordHeader\x12\x16\n\x0e\x66ormat_version\x18\x01 \x01(\r\x12\x0f\n\x07game_id\x18\x02 \x01(\t\x12\x0f\n\x07room_id\x18\x03 \x01(\t\x12\x11\n\troom_name\x18\x04 \x01(\t\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12#\n\x05rules\x18\x06 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x15\n\rrules_version\x18\x07 \x01(\r\x12\'\n\x06policy\x18\x08 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\t \x03(\x0b\x32\x18.chefshat.v1.Participant\x12\x17\n\x0fseed_commitment\x18\n \x01(\x0c\x12\x15\n\rcreated_at_ms\x18\x0b \x01(\x04\x12\x16\n\x0eserver_version\x18\x0c \x01(\t\x12.\n\x0c\x61\x63tion_space\x18\r \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12%\n\x05start\x18\x0e \x01(\x0b\x32\x16.chefshat.v1.GameStart\x12\x15\n\rtournament_id\x18\x0f \x01(\t\x12\x11\n\tseries_id\x18\x10 \x01(\t\"\x96\x01\n\tGameStart\x12,\n\x08scripted\x18\x01 \x01(\x0b\x32\x1a.chefshat.v1.ScriptedShift\x12/\n\rbranched_from\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.BranchPoint\x12*\n\ntaken_over\x18\x03 \x03(\x0b\x32\x16.chefshat.v1.TakenOver\"1\n\tTakenOver\x12\x11\n\tdecisions\x18\x01 \x01(\x04\x12\x11\n\tgame_seed\x18\x02 \x01(\x0c\"\x88\x03\n\x0e\x44\x65\x63isionRecord\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x13\n\x0b\x64\x65\x63ision_id\x18\x02 \x01(\x04\x12\'\n\x04kind\x18\x03 \x01(\x0e\x32\x19.chefshat.v1.DecisionKind\x12\x0e\n\x06\x61\x63tion\x18\x04 \x01(\r\x12\x0c\n\x04text\x18\x05 \x01(\t\x12+\n\x06source\x18\x06 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x07 \x01(\x04\x12\x14\n\x0c\x62\x61nk_left_ms\x18\x08 \x01(\r\x12\x18\n\x10invalid_attempts\x18\t \x03(\r\x12-\n\x0b\x61nnotations\x18\n \x01(\x0b\x32\x18.chefshat.v1.Annotations\x12\x13\n\x0b\x61\x63tion_mask\x18\x0b \x01(\x0c\x12\x1b\n\x0einvalid_reward\x18\x0c \x01(\x02H\x00\x88\x01\x01\x12\x12\n\nelapsed_ms\x18\r \x01(\x04\x12\r\n\x05hints\x18\x0e \x01(\rB\x11\n\x0f_invalid_reward\"b\n\x11PrivateExpression\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x12\n\nelapsed_ms\x18\x02 \x01(\x04\x12+\n\nexpression\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.Expression\"\x89\x01\n\x0cRecordFooter\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x0e\n\x06\x65vents\x18\x02 \x01(\x04\x12\x11\n\tdecisions\x18\x03 \x01(\x04\x12/\n\tsignature\x18\x04 \x01(\x0b\x32\x1c.chefshat.v1.RecordSignature\"8\n\x0fRecordSignature\x12\x12\n\npublic_key\x18\x01 \x01(\x0c\x12\x11\n\tsignature\x18\x02 \x01(\x0c\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18\x63hefshat/v1/record.proto\x12\x0b\x63hefshat.v1\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\xad\x02\n\nRecordLine\x12+\n\x06header\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordHeaderH\x00\x12/\n\x08\x64\x65\x63ision\x18\x02 \x01(\x0b\x32\x1b.chefshat.v1.DecisionRecordH\x00\x12\'\n\x05\x65vent\x18\x03 \x01(\x0b\x32\x16.chefshat.v1.GameEventH\x00\x12<\n\x12private_expression\x18\x04 \x01(\x0b\x32\x1e.chefshat.v1.PrivateExpressionH\x00\x12+\n\x06\x66ooter\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.RecordFooterH\x00\x12%\n\x06marker\x18\x06 \x01(\x0b\x32\x13.chefshat.v1.MarkerH\x00\x42\x06\n\x04line\"\x84\x04\n\x0cRecordHeader\x12\x16\n\x0e\x66ormat_version\x18\x01 \x01(\r\x12\x0f\n\x07game_id\x18\x02 \x01(\t\x12\x0f\n\x07room_id\x18\x03 \x01(\t\x12\x11\n\troom_name\x18\x04 \x01(\t\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12#\n\x05rules\x18\x06 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x15\n\rrules_version\x18\x07 \x01(\r\x12\'\n\x06policy\x18\x08 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\'\n\x05seats\x18\t \x03(\x0b\x32\x18.chefshat.v1.Participant\x12\x17\n\x0fseed_commitment\x18\n \x01(\x0c\x12\x15\n\rcreated_at_ms\x18\x0b \x01(\x04\x12\x16\n\x0eserver_version\x18\x0c \x01(\t\x12.\n\x0c\x61\x63tion_space\x18\r \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12%\n\x05start\x18\x0e \x01(\x0b\x32\x16.chefshat.v1.GameStart\x12\x15\n\rtournament_id\x18\x0f \x01(\t\x12\x11\n\tseries_id\x18\x10 \x01(\t\x12\'\n\x05study\x18\x11 \x01(\x0b\x32\x18.chefshat.v1.StudyRecord\"+\n\nStudyLevel\x12\x0e\n\x06\x66\x61\x63tor\x18\x01 \x01(\t\x12\r\n\x05level\x18\x02 \x01(\t\"\x86\x02\n\x0bStudyRecord\x12\x10\n\x08study_id\x18\x01 \x01(\t\x12\x0c\n\x04name\x18\x02 \x01(\t\x12\x11\n\tcondition\x18\x03 \x01(\t\x12\'\n\x06levels\x18\x04 \x03(\x0b\x32\x17.chefshat.v1.StudyLevel\x12\x0e\n\x06number\x18\x05 \x01(\r\x12\x13\n\x0bparticipant\x18\x06 \x01(\t\x12\x0f\n\x07session\x18\x07 \x01(\r\x12\x0c\n\x04step\x18\x08 \x01(\r\x12\x10\n\x08practice\x18\t \x01(\x08\x12\x17\n\nseed_index\x18\n \x01(\rH\x00\x88\x01\x01\x12\x0c\n\x04seat\x18\x0b \x01(\r\x12\x0f\n\x07\x61ttempt\x18\x0c \x01(\rB\r\n\x0b_seed_index\"\x96\x01\n\tGameStart\x12,\n\x08scripted\x18\x01 \x01(\x0b\x32\x1a.chefshat.v1.ScriptedShift\x12/\n\rbranched_from\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.BranchPoint\x12*\n\ntaken_over\x18\x03 \x03(\x0b\x32\x16.chefshat.v1.TakenOver\"1\n\tTakenOver\x12\x11\n\tdecisions\x18\x01 \x01(\x04\x12\x11\n\tgame_seed\x18\x02 \x01(\x0c\"\x88\x03\n\x0e\x44\x65\x63isionRecord\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x13\n\x0b\x64\x65\x63ision_id\x18\x02 \x01(\x04\x12\'\n\x04kind\x18\x03 \x01(\x0e\x32\x19.chefshat.v1.DecisionKind\x12\x0e\n\x06\x61\x63tion\x18\x04 \x01(\r\x12\x0c\n\x04text\x18\x05 \x01(\t\x12+\n\x06source\x18\x06 \x01(\x0e\x32\x1b.chefshat.v1.DecisionSource\x12\x18\n\x10\x64\x65\x63ision_time_us\x18\x07 \x01(\x04\x12\x14\n\x0c\x62\x61nk_left_ms\x18\x08 \x01(\r\x12\x18\n\x10invalid_attempts\x18\t \x03(\r\x12-\n\x0b\x61nnotations\x18\n \x01(\x0b\x32\x18.chefshat.v1.Annotations\x12\x13\n\x0b\x61\x63tion_mask\x18\x0b \x01(\x0c\x12\x1b\n\x0einvalid_reward\x18\x0c \x01(\x02H\x00\x88\x01\x01\x12\x12\n\nelapsed_ms\x18\r \x01(\x04\x12\r\n\x05hints\x18\x0e \x01(\rB\x11\n\x0f_invalid_reward\"b\n\x11PrivateExpression\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\x12\n\nelapsed_ms\x18\x02 \x01(\x04\x12+\n\nexpression\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.Expression\"P\n\x06Marker\x12\x0e\n\x06number\x18\x01 \x01(\x04\x12\r\n\x05label\x18\x02 \x01(\t\x12\x12\n\nelapsed_us\x18\x03 \x01(\x04\x12\x13\n\x0breceived_ms\x18\x04 \x01(\x04\"\x89\x01\n\x0cRecordFooter\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x0e\n\x06\x65vents\x18\x02 \x01(\x04\x12\x11\n\tdecisions\x18\x03 \x01(\x04\x12/\n\tsignature\x18\x04 \x01(\x0b\x32\x1c.chefshat.v1.RecordSignature\"8\n\x0fRecordSignature\x12\x12\n\npublic_key\x18\x01 \x01(\x0c\x12\x11\n\tsignature\x18\x02 \x01(\x0c\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -36,19 +36,25 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.r
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_RECORDLINE']._serialized_start=144
-  _globals['_RECORDLINE']._serialized_end=406
-  _globals['_RECORDHEADER']._serialized_start=409
-  _globals['_RECORDHEADER']._serialized_end=884
-  _globals['_GAMESTART']._serialized_start=887
-  _globals['_GAMESTART']._serialized_end=1037
-  _globals['_TAKENOVER']._serialized_start=1039
-  _globals['_TAKENOVER']._serialized_end=1088
-  _globals['_DECISIONRECORD']._serialized_start=1091
-  _globals['_DECISIONRECORD']._serialized_end=1483
-  _globals['_PRIVATEEXPRESSION']._serialized_start=1485
-  _globals['_PRIVATEEXPRESSION']._serialized_end=1583
-  _globals['_RECORDFOOTER']._serialized_start=1586
-  _globals['_RECORDFOOTER']._serialized_end=1723
-  _globals['_RECORDSIGNATURE']._serialized_start=1725
-  _globals['_RECORDSIGNATURE']._serialized_end=1781
+  _globals['_RECORDLINE']._serialized_end=445
+  _globals['_RECORDHEADER']._serialized_start=448
+  _globals['_RECORDHEADER']._serialized_end=964
+  _globals['_STUDYLEVEL']._serialized_start=966
+  _globals['_STUDYLEVEL']._serialized_end=1009
+  _globals['_STUDYRECORD']._serialized_start=1012
+  _globals['_STUDYRECORD']._serialized_end=1274
+  _globals['_GAMESTART']._serialized_start=1277
+  _globals['_GAMESTART']._serialized_end=1427
+  _globals['_TAKENOVER']._serialized_start=1429
+  _globals['_TAKENOVER']._serialized_end=1478
+  _globals['_DECISIONRECORD']._serialized_start=1481
+  _globals['_DECISIONRECORD']._serialized_end=1873
+  _globals['_PRIVATEEXPRESSION']._serialized_start=1875
+  _globals['_PRIVATEEXPRESSION']._serialized_end=1973
+  _globals['_MARKER']._serialized_start=1975
+  _globals['_MARKER']._serialized_end=2055
+  _globals['_RECORDFOOTER']._serialized_start=2058
+  _globals['_RECORDFOOTER']._serialized_end=2195
+  _globals['_RECORDSIGNATURE']._serialized_start=2197
+  _globals['_RECORDSIGNATURE']._serialized_end=2253
 # @@protoc_insertion_point(module_scope)

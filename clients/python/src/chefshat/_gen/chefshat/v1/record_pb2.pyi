@@ -35,6 +35,7 @@ class RecordLine(_message.Message):
     EVENT_FIELD_NUMBER: _builtins.int
     PRIVATE_EXPRESSION_FIELD_NUMBER: _builtins.int
     FOOTER_FIELD_NUMBER: _builtins.int
+    MARKER_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def header(self) -> Global___RecordHeader:
         """The first line."""
@@ -55,6 +56,10 @@ class RecordLine(_message.Message):
     def footer(self) -> Global___RecordFooter:
         """The last line, with the signature of all lines."""
 
+    @_builtins.property
+    def marker(self) -> Global___Marker:
+        """A marker, which the owner of the room added."""
+
     def __init__(
         self,
         *,
@@ -63,12 +68,13 @@ class RecordLine(_message.Message):
         event: _event_pb2.GameEvent | None = ...,
         private_expression: Global___PrivateExpression | None = ...,
         footer: Global___RecordFooter | None = ...,
+        marker: Global___Marker | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["decision", b"decision", "event", b"event", "footer", b"footer", "header", b"header", "line", b"line", "private_expression", b"private_expression"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["decision", b"decision", "event", b"event", "footer", b"footer", "header", b"header", "line", b"line", "marker", b"marker", "private_expression", b"private_expression"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision", b"decision", "event", b"event", "footer", b"footer", "header", b"header", "line", b"line", "private_expression", b"private_expression"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision", b"decision", "event", b"event", "footer", b"footer", "header", b"header", "line", b"line", "marker", b"marker", "private_expression", b"private_expression"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_line: _TypeAlias = _typing.Literal["header", "decision", "event", "private_expression", "footer"]  # noqa: Y015
+    _WhichOneofReturnType_line: _TypeAlias = _typing.Literal["header", "decision", "event", "private_expression", "footer", "marker"]  # noqa: Y015
     _WhichOneofArgType_line: _TypeAlias = _typing.Literal["line", b"line"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_line) -> _WhichOneofReturnType_line | None: ...
 
@@ -96,6 +102,7 @@ class RecordHeader(_message.Message):
     START_FIELD_NUMBER: _builtins.int
     TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
     SERIES_ID_FIELD_NUMBER: _builtins.int
+    STUDY_FIELD_NUMBER: _builtins.int
     format_version: _builtins.int
     """Version of the format: 1."""
     game_id: _builtins.str
@@ -138,6 +145,12 @@ class RecordHeader(_message.Message):
     def start(self) -> Global___GameStart:
         """How the game began; unset if with a deal."""
 
+    @_builtins.property
+    def study(self) -> Global___StudyRecord:
+        """For a game of a study: where it belongs. Only the study's owner and the operator see such a
+        record; participants never do.
+        """
+
     def __init__(
         self,
         *,
@@ -157,14 +170,113 @@ class RecordHeader(_message.Message):
         start: Global___GameStart | None = ...,
         tournament_id: _builtins.str = ...,
         series_id: _builtins.str = ...,
+        study: Global___StudyRecord | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "policy", b"policy", "rules", b"rules", "start", b"start"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "policy", b"policy", "rules", b"rules", "start", b"start", "study", b"study"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "series_id", b"series_id", "server_version", b"server_version", "start", b"start", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "series_id", b"series_id", "server_version", b"server_version", "start", b"start", "study", b"study", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___RecordHeader: _TypeAlias = RecordHeader  # noqa: Y015
+
+@_typing.final
+class StudyLevel(_message.Message):
+    """A level of a factor."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    FACTOR_FIELD_NUMBER: _builtins.int
+    LEVEL_FIELD_NUMBER: _builtins.int
+    factor: _builtins.str
+    """Name of the factor."""
+    level: _builtins.str
+    """The level."""
+    def __init__(
+        self,
+        *,
+        factor: _builtins.str = ...,
+        level: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["factor", b"factor", "level", b"level"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyLevel: _TypeAlias = StudyLevel  # noqa: Y015
+
+@_typing.final
+class StudyRecord(_message.Message):
+    """Where a recorded game belongs in a study."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STUDY_ID_FIELD_NUMBER: _builtins.int
+    NAME_FIELD_NUMBER: _builtins.int
+    CONDITION_FIELD_NUMBER: _builtins.int
+    LEVELS_FIELD_NUMBER: _builtins.int
+    NUMBER_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    SESSION_FIELD_NUMBER: _builtins.int
+    STEP_FIELD_NUMBER: _builtins.int
+    PRACTICE_FIELD_NUMBER: _builtins.int
+    SEED_INDEX_FIELD_NUMBER: _builtins.int
+    SEAT_FIELD_NUMBER: _builtins.int
+    ATTEMPT_FIELD_NUMBER: _builtins.int
+    study_id: _builtins.str
+    """The study."""
+    name: _builtins.str
+    """Name of the study for researchers."""
+    condition: _builtins.str
+    """Id of the condition."""
+    number: _builtins.int
+    """Number of the participant, from 1."""
+    participant: _builtins.str
+    """Pseudonym of the participant."""
+    session: _builtins.int
+    """Number of the session in which the participant began the game, from 1."""
+    step: _builtins.int
+    """The step in which it was played, from 0."""
+    practice: _builtins.bool
+    """Whether it was practice."""
+    seed_index: _builtins.int
+    """Index of its seed in the list of the condition if that has one, else of the study; unset for
+    practice.
+    """
+    seat: _builtins.int
+    """The participant's seat."""
+    attempt: _builtins.int
+    """Attempt at this game, from 1."""
+    @_builtins.property
+    def levels(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyLevel]:
+        """The condition's level of each factor, by name of the factor."""
+
+    def __init__(
+        self,
+        *,
+        study_id: _builtins.str = ...,
+        name: _builtins.str = ...,
+        condition: _builtins.str = ...,
+        levels: _abc.Iterable[Global___StudyLevel] | None = ...,
+        number: _builtins.int = ...,
+        participant: _builtins.str = ...,
+        session: _builtins.int = ...,
+        step: _builtins.int = ...,
+        practice: _builtins.bool = ...,
+        seed_index: _builtins.int | None = ...,
+        seat: _builtins.int = ...,
+        attempt: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index", "seed_index", b"seed_index"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index", "attempt", b"attempt", "condition", b"condition", "levels", b"levels", "name", b"name", "number", b"number", "participant", b"participant", "practice", b"practice", "seat", b"seat", "seed_index", b"seed_index", "session", b"session", "step", b"step", "study_id", b"study_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__seed_index: _TypeAlias = _typing.Literal["seed_index"]  # noqa: Y015
+    _WhichOneofArgType__seed_index: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__seed_index) -> _WhichOneofReturnType__seed_index | None: ...
+
+Global___StudyRecord: _TypeAlias = StudyRecord  # noqa: Y015
 
 @_typing.final
 class GameStart(_message.Message):
@@ -267,8 +379,8 @@ class DecisionRecord(_message.Message):
     for built-in agents.
     """
     bank_left_ms: _builtins.int
-    """Milliseconds left in the seat's time bank afterwards. Time in which the seat was not connected is
-    not taken from it, if the policy has an absence time.
+    """Milliseconds left in the seat's time bank afterwards. Time in which the seat was not connected
+    is not taken from it, if the policy has an absence time.
     """
     action_mask: _builtins.bytes
     """Legal actions, as in DecisionRequest; empty in an imported game if the hand is unknown."""
@@ -349,6 +461,42 @@ class PrivateExpression(_message.Message):
 Global___PrivateExpression: _TypeAlias = PrivateExpression  # noqa: Y015
 
 @_typing.final
+class Marker(_message.Message):
+    """A marker that the owner of the room, or an instrument with its token, put into the record
+    (InstrumentService).
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NUMBER_FIELD_NUMBER: _builtins.int
+    LABEL_FIELD_NUMBER: _builtins.int
+    ELAPSED_US_FIELD_NUMBER: _builtins.int
+    RECEIVED_MS_FIELD_NUMBER: _builtins.int
+    number: _builtins.int
+    """Number of the marker in its room, from 1."""
+    label: _builtins.str
+    """What it says, 1..=128 characters."""
+    elapsed_us: _builtins.int
+    """The marked moment, microseconds since the room was created; at most a second after `received_ms`."""
+    received_ms: _builtins.int
+    """Milliseconds since the room was created, when the server received it."""
+    def __init__(
+        self,
+        *,
+        number: _builtins.int = ...,
+        label: _builtins.str = ...,
+        elapsed_us: _builtins.int = ...,
+        received_ms: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["elapsed_us", b"elapsed_us", "label", b"label", "number", b"number", "received_ms", b"received_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Marker: _TypeAlias = Marker  # noqa: Y015
+
+@_typing.final
 class RecordFooter(_message.Message):
     """The last line of a record."""
 
@@ -391,11 +539,12 @@ class RecordSignature(_message.Message):
     """A server's signature of a record (Ed25519, RFC 8032).
 
     It signs the ASCII text "chefshat.v1 record" followed by the hash of the record, 32 bytes. The
-    hash starts as 32 zero bytes. For each line, the footer included, it becomes SHA-256(hash || line),
-    where `line` is the text of the line in UTF-8 as the server writes it to a file, without its line
-    feed, and the footer has no `signature`. That text is the canonical JSON of RecordLine without
-    spaces: fields in the order of their numbers, those with a default value absent, 64-bit numbers as
-    strings, floats in the shortest form that gives the same 32-bit value, bytes in base64 with padding.
+    hash starts as 32 zero bytes. For each line, the footer included, it becomes SHA-256(hash ||
+    line), where `line` is the text of the line in UTF-8 as the server writes it to a file, without
+    its line feed, and the footer has no `signature`. That text is the canonical JSON of RecordLine
+    without spaces: fields in the order of their numbers, those with a default value absent, 64-bit
+    numbers as strings, floats in the shortest form that gives the same 32-bit value, bytes in base64
+    with padding.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

@@ -98,6 +98,7 @@ class RecordSummary(_message.Message):
     SUBSTITUTED_FIELD_NUMBER: _builtins.int
     VISIBILITY_FIELD_NUMBER: _builtins.int
     HINTED_FIELD_NUMBER: _builtins.int
+    STUDY_ID_FIELD_NUMBER: _builtins.int
     game_id: _builtins.str
     """Identifies the game."""
     room_id: _builtins.str
@@ -130,6 +131,10 @@ class RecordSummary(_message.Message):
     """Who sees it; UNSPECIFIED for a public game. A record that was added is public."""
     hinted: _builtins.bool
     """Whether any seat was given a hint (AskHint)."""
+    study_id: _builtins.str
+    """The study of the game; empty if there was none. Only the study's owner and the operator see such
+    a record.
+    """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -163,10 +168,11 @@ class RecordSummary(_message.Message):
         substituted: _builtins.bool = ...,
         visibility: _room_pb2.Visibility.ValueType = ...,
         hinted: _builtins.bool = ...,
+        study_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "hinted", b"hinted", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state", "substituted", b"substituted", "tournament_id", b"tournament_id", "visibility", b"visibility"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "hinted", b"hinted", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state", "study_id", b"study_id", "substituted", b"substituted", "tournament_id", b"tournament_id", "visibility", b"visibility"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -62,9 +62,10 @@ class RecordServiceServicer(object):
     """
 
     def ListRecords(self, request, context):
-        """Lists the records of the server, by default oldest first. Those of games that are not public are
-        listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
-        than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+        """Lists the records of the server, by default oldest first. Those of games that are not public
+        are listed only for callers who show a secret of them (`Visibility`). A page may have fewer
+        records than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        FILTER_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -74,7 +75,8 @@ class RecordServiceServicer(object):
         """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
         without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
         progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
-        the owner token, receive everything; others no record-only expressions, annotations and media.
+        the owner token, receive everything; others no record-only expressions, markers, annotations
+        and media.
         The record of a private game is complete only for its owner and the operator.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

@@ -34,15 +34,17 @@ class RecordServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> RecordServiceAsyncStub: ...
     ListRecords: _grpc.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]
-    """Lists the records of the server, by default oldest first. Those of games that are not public are
-    listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
-    than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+    """Lists the records of the server, by default oldest first. Those of games that are not public
+    are listed only for callers who show a secret of them (`Visibility`). A page may have fewer
+    records than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    FILTER_REFUSED).
     """
     GetRecord: _grpc.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]
     """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
     without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
     progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
-    the owner token, receive everything; others no record-only expressions, annotations and media.
+    the owner token, receive everything; others no record-only expressions, markers, annotations
+    and media.
     The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _grpc.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]
@@ -63,15 +65,17 @@ class RecordServiceAsyncStub(RecordServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     ListRecords: _aio.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]  # type: ignore[assignment]
-    """Lists the records of the server, by default oldest first. Those of games that are not public are
-    listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
-    than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+    """Lists the records of the server, by default oldest first. Those of games that are not public
+    are listed only for callers who show a secret of them (`Visibility`). A page may have fewer
+    records than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    FILTER_REFUSED).
     """
     GetRecord: _aio.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]  # type: ignore[assignment]
     """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
     without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
     progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
-    the owner token, receive everything; others no record-only expressions, annotations and media.
+    the owner token, receive everything; others no record-only expressions, markers, annotations
+    and media.
     The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _aio.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]  # type: ignore[assignment]
@@ -95,9 +99,10 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.ListRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ListRecordsResponse, _abc.Awaitable[_record_service_pb2.ListRecordsResponse]]:
-        """Lists the records of the server, by default oldest first. Those of games that are not public are
-        listed only for callers who show a secret of them (`Visibility`). A page may have fewer records
-        than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+        """Lists the records of the server, by default oldest first. Those of games that are not public
+        are listed only for callers who show a secret of them (`Visibility`). A page may have fewer
+        records than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        FILTER_REFUSED).
         """
 
     @_abc_1.abstractmethod
@@ -109,7 +114,8 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN), also for a private game
         without a secret of it (`Visibility`); FAILED_PRECONDITION (GAME_RUNNING) while the game is in
         progress, (SERIES_OPEN) while other games with the same deals are. Hosts, and callers who show
-        the owner token, receive everything; others no record-only expressions, annotations and media.
+        the owner token, receive everything; others no record-only expressions, markers, annotations
+        and media.
         The record of a private game is complete only for its owner and the operator.
         """
 

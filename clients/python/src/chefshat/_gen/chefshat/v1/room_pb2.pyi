@@ -87,8 +87,8 @@ class _VisibilityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Visibility
     VISIBILITY_PUBLIC: _Visibility.ValueType  # 1
     """Listed, and reached by its id."""
     VISIBILITY_UNLISTED: _Visibility.ValueType  # 2
-    """Reached by its id, but listed only for callers who show a secret of it and for the operator. Its
-    games are not rated.
+    """Reached by its id, but listed only for callers who show a secret of it and for the operator.
+    Its games are not rated.
     """
     VISIBILITY_PRIVATE: _Visibility.ValueType  # 3
     """Listed and reached only for callers who show a secret of it, who have a token for this room or
@@ -99,9 +99,9 @@ class _VisibilityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Visibility
 class Visibility(_Visibility, metaclass=_VisibilityEnumTypeWrapper):
     """Who sees a room or tournament, and the records of its games. What somebody may do there is not
     affected: that needs a role, a join code or a ticket as before. A *secret* of a room is its owner
-    token, the ticket of a seat or that of its physical table; of a tournament, its owner token or the
-    ticket of a participant, which also show its rooms. Clients show secrets in the request header
-    `chefshat-secret` (proto/README.md). Join codes do not count.
+    token, the ticket of a seat or that of its physical table; of a tournament, its owner token or
+    the ticket of a participant, which also show its rooms. Clients show secrets in the request
+    header `chefshat-secret` (proto/README.md). Join codes do not count.
     """
 
 VISIBILITY_UNSPECIFIED: Visibility.ValueType  # 0
@@ -109,8 +109,8 @@ VISIBILITY_UNSPECIFIED: Visibility.ValueType  # 0
 VISIBILITY_PUBLIC: Visibility.ValueType  # 1
 """Listed, and reached by its id."""
 VISIBILITY_UNLISTED: Visibility.ValueType  # 2
-"""Reached by its id, but listed only for callers who show a secret of it and for the operator. Its
-games are not rated.
+"""Reached by its id, but listed only for callers who show a secret of it and for the operator.
+Its games are not rated.
 """
 VISIBILITY_PRIVATE: Visibility.ValueType  # 3
 """Listed and reached only for callers who show a secret of it, who have a token for this room or
@@ -272,8 +272,8 @@ class _AbortReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_AbortReas
     ABORT_REASON_SHUTDOWN: _AbortReason.ValueType  # 2
     """The server was shut down."""
     ABORT_REASON_PARTICIPANTS_LOST: _AbortReason.ValueType  # 3
-    """Participants were lost, and the policy is to abort; or nothing was reported from a physical table
-    for 12 hours.
+    """Participants were lost, and the policy is to abort; or nothing was reported from a physical
+    table for 12 hours.
     """
     ABORT_REASON_NEVER_STARTED: _AbortReason.ValueType  # 4
     """The seats were not attached in time."""
@@ -290,8 +290,8 @@ ABORT_REASON_CLOSED: AbortReason.ValueType  # 1
 ABORT_REASON_SHUTDOWN: AbortReason.ValueType  # 2
 """The server was shut down."""
 ABORT_REASON_PARTICIPANTS_LOST: AbortReason.ValueType  # 3
-"""Participants were lost, and the policy is to abort; or nothing was reported from a physical table
-for 12 hours.
+"""Participants were lost, and the policy is to abort; or nothing was reported from a physical
+table for 12 hours.
 """
 ABORT_REASON_NEVER_STARTED: AbortReason.ValueType  # 4
 """The seats were not attached in time."""
@@ -309,6 +309,7 @@ class SeatConfig(_message.Message):
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     REPLAY_FIELD_NUMBER: _builtins.int
     AT_TABLE_FIELD_NUMBER: _builtins.int
+    WIZARD_FIELD_NUMBER: _builtins.int
     NAME_FIELD_NUMBER: _builtins.int
     reserved_for: Global___ParticipantKind.ValueType
     """Participants of this kind, with the room's join code; UNSPECIFIED admits every kind."""
@@ -320,8 +321,14 @@ class SeatConfig(_message.Message):
     "trained". Not at physical tables.
     """
     at_table: Global___ParticipantKind.ValueType
-    """A player of this kind who sits at the physical table with real cards. Nobody connects: what the
-    player does is reported. Only in a physical room.
+    """A player of this kind who sits at the physical table with real cards. Nobody connects: what
+    the player does is reported. Only in a physical room.
+    """
+    wizard: Global___ParticipantKind.ValueType
+    """A person who plays as a participant of this kind, ROBOT or AGENT (Wizard of Oz), and joins as
+    one, with the room's join code. To everybody in the room and to spectators the seat is as
+    with `reserved_for`, also after the end. Only the record says what it was
+    (`Participant.shown_kind`). The game is not rated. Not in physical rooms.
     """
     name: _builtins.str
     """Display name of a built-in agent, 1..=64 characters; empty: its own name. Ratings and filters
@@ -339,13 +346,14 @@ class SeatConfig(_message.Message):
         built_in_agent: _builtins.str = ...,
         replay: Global___RecordedPlayer | None = ...,
         at_table: Global___ParticipantKind.ValueType = ...,
+        wizard: Global___ParticipantKind.ValueType = ...,
         name: _builtins.str = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for", "wizard", b"wizard"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "wizard", b"wizard"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay", "at_table"]  # noqa: Y015
+    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay", "at_table", "wizard"]  # noqa: Y015
     _WhichOneofArgType_filled_by: _TypeAlias = _typing.Literal["filled_by", b"filled_by"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_filled_by) -> _WhichOneofReturnType_filled_by | None: ...
 
@@ -459,8 +467,7 @@ class RoomPolicy(_message.Message):
     1..=1000; by default 3. Invalid answers, attaching again and the return from a substitution
     reset nothing: a seat that returned is substituted again at its next timeout unless it has
     answered. A special action that is declined or runs out does not count, since others could
-    infer it. A decision that ends while its seat is not connected substitutes it at once, if the
-    policy has an absence_time_ms.
+    infer it. A seat that was away for its absence_time_ms is substituted at once.
     """
     substitute: _builtins.str
     """Built-in agent that plays for a substituted seat; by default "random"."""
@@ -507,17 +514,18 @@ class RoomPolicy(_message.Message):
     """
     absence_time_ms: _builtins.int
     """The absence time: milliseconds that the game waits, at each decision, for a seat that is not
-    connected, 0..=86400000; never longer than its time for a decision. By default 20000 for people,
-    for others their decision time. When it is over, the server takes the default decision
-    (DISCONNECTED) and a substitute plays until the seat returns, or the game is aborted by `abort`.
-    It runs from the loss of the connection, or from the start of the decision if that is later;
-    several absences during one decision share it. Outside of tournaments it runs only while another
-    participant, who waits, is connected or sits at the table; otherwise the decision ends when the
-    seat's own time is over. An absence never uses the bank: if the seat returns in time, only the time in
-    which it was connected is taken from it. A special action ends as it would with the seat
-    connected, and substitutes nobody, since others could infer it. After a restart of the server,
-    see ServerRestarted. Unset in games of earlier servers: the decision time and the bank run on
-    while a seat is away, and max_timeouts alone decides when it is substituted.
+    connected, 0..=86400000; never longer than its time for a decision. By default 20000 for
+    people, for others their decision time. When it is over, the server takes the default decision
+    (DISCONNECTED) and a substitute plays until the seat returns, or the game is aborted by
+    `abort`. It runs from the loss of the connection, or from the start of the decision if that is
+    later; several absences during one decision share it. Outside of tournaments it runs only
+    while another participant, who waits, is connected or sits at the table; otherwise the
+    decision ends when the seat's own time is over. If that ends before the absence time, the
+    decision counts as a timeout. An absence never uses the bank: if the seat returns in time,
+    only the time in which it was connected is taken from it. A special action ends as it would
+    with the seat connected, and substitutes nobody, since others could infer it. After a restart
+    of the server, see ServerRestarted. Unset in games of earlier servers: the decision time and
+    the bank run on while a seat is away, and max_timeouts alone decides when it is substituted.
     """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
@@ -657,6 +665,7 @@ class Participant(_message.Message):
     SUBSTITUTED_FIELD_NUMBER: _builtins.int
     REPLAY_FIELD_NUMBER: _builtins.int
     AT_TABLE_FIELD_NUMBER: _builtins.int
+    SHOWN_KIND_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """Seat number, from 0."""
     name: _builtins.str
@@ -676,6 +685,10 @@ class Participant(_message.Message):
     """Whether a substitute plays for the seat now."""
     at_table: _builtins.bool
     """Whether the player sits at the physical table with real cards."""
+    shown_kind: Global___ParticipantKind.ValueType
+    """Only in records and their lists: as what the participant was shown, if a person played the seat
+    as another kind (`SeatConfig.wizard`). `kind` is then HUMAN. UNSPECIFIED: as what it was.
+    """
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """The recorded player that the built-in agent "replay" imitates; unset for all others."""
@@ -692,10 +705,11 @@ class Participant(_message.Message):
         substituted: _builtins.bool = ...,
         replay: Global___RecordedPlayer | None = ...,
         at_table: _builtins.bool = ...,
+        shown_kind: Global___ParticipantKind.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["replay", b"replay"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "substituted", b"substituted"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "shown_kind", b"shown_kind", "substituted", b"substituted"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -704,8 +718,9 @@ Global___Participant: _TypeAlias = Participant  # noqa: Y015
 @_typing.final
 class Awaited(_message.Message):
     """Whom the game waits for, as everybody may know it. Built-in agents and players at a physical table
-    are not awaited. While a special action is open, which only its own seat may know of, it is the
-    seat that decides next if none is declared.
+    are not awaited. Only a seat with both jokers knows whether somebody is offered a special action. So
+    from the roles of a Shift to the first gift of a participant (without an exchange, to the first
+    turn), it is the participant who decides first if none is declared, whatever decision is open.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -719,11 +734,14 @@ class Awaited(_message.Message):
     away: _builtins.bool
     """Whether the seat is not connected."""
     waited_ms: _builtins.int
-    """Milliseconds since its decision was opened, when the message was written."""
+    """Milliseconds since its decision was opened, when the message was written. If a special action may
+    have delayed it: since the roles were assigned.
+    """
     left_ms: _builtins.int
     """Milliseconds until the server decides for it, when the message was written, unless it answers,
     leaves or returns: what is left of its decision time and bank, and while it is away of its absence
-    time. Invalid answers and a slow store may extend it.
+    time. Invalid answers and a slow store may extend it. Unset while a special action may be open
+    or may have delayed the decision.
     """
     def __init__(
         self,
@@ -731,14 +749,19 @@ class Awaited(_message.Message):
         seat: _builtins.int | None = ...,
         away: _builtins.bool = ...,
         waited_ms: _builtins.int = ...,
-        left_ms: _builtins.int = ...,
+        left_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "seat", b"seat"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_left_ms", b"_left_ms", "_seat", b"_seat", "left_ms", b"left_ms", "seat", b"seat"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "away", b"away", "left_ms", b"left_ms", "seat", b"seat", "waited_ms", b"waited_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_left_ms", b"_left_ms", "_seat", b"_seat", "away", b"away", "left_ms", b"left_ms", "seat", b"seat", "waited_ms", b"waited_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__left_ms: _TypeAlias = _typing.Literal["left_ms"]  # noqa: Y015
+    _WhichOneofArgType__left_ms: _TypeAlias = _typing.Literal["_left_ms", b"_left_ms"]  # noqa: Y015
     _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
     _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__left_ms) -> _WhichOneofReturnType__left_ms | None: ...
+    @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__seat) -> _WhichOneofReturnType__seat | None: ...
 
 Global___Awaited: _TypeAlias = Awaited  # noqa: Y015
@@ -809,7 +832,9 @@ class Room(_message.Message):
 
     @_builtins.property
     def awaited(self) -> Global___Awaited:
-        """Whom the game waits for; unset if for nobody, and in rooms that delay their events for spectators."""
+        """Whom the game waits for; unset if for nobody, and where spectators could not see it now: in rooms
+        without spectators, with a delay, or with the deals of a series. Seats learn it on their streams.
+        """
 
     def __init__(
         self,

@@ -44,8 +44,9 @@ class CreateRoomRequest(_message.Message):
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
     lost response, creates nothing and gets the same response with the same secrets, as long as the
-    created object is listed; if it survives a restart of the server, then too. The same id with other
-    content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    created object is listed; if it survives a restart of the server, then too. The same id with
+    other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    (REQUEST_ID_REFUSED).
     """
     physical: _builtins.bool
     """Whether the cards are real: the server deals nothing, and a bridge reports what happens
@@ -109,8 +110,8 @@ class CreateRoomResponse(_message.Message):
     join_code: _builtins.str
     """The join code: what participants need to join."""
     owner_token: _builtins.str
-    """Secret that authorises the room's creator, for CloseRoom. It shows a room that is not public, and
-    the complete record of its game (`Visibility`).
+    """Secret that authorises the room's creator, for CloseRoom. It shows a room that is not public,
+    and the complete record of its game (`Visibility`).
     """
     table_ticket: _builtins.str
     """Of a physical room: secret that authorises reports about its table and following it
@@ -268,9 +269,9 @@ class JoinRoomRequest(_message.Message):
     """The requested seat; unset: the first free one that admits the kind."""
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
-    lost response, gets the same place with the same ticket while the participant has it, even after
-    the start of the game or a restart of the server. The same id with another name, kind or seat:
-    ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    lost response, gets the same place with the same ticket while the participant has it, even
+    after the start of the game or a restart of the server. The same id with another name, kind or
+    seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     def __init__(
         self,

@@ -83,8 +83,8 @@ class RoomServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def GetRoom(self, request, context):
-        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
-        without a secret of it (`Visibility`); PERMISSION_DENIED
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
+        room without a secret of it (`Visibility`); PERMISSION_DENIED
         (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -94,8 +94,8 @@ class RoomServiceServicer(object):
     def ListRooms(self, request, context):
         """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
         first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-        requested without being the last. Rooms that are not public are listed only for callers who show
-        a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        requested without being the last. Rooms that are not public are listed only for callers who
+        show a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

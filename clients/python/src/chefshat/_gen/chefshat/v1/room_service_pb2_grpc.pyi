@@ -41,15 +41,15 @@ class RoomServiceStub:
     STORE_FAILED).
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
-    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
-    without a secret of it (`Visibility`); PERMISSION_DENIED
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
+    room without a secret of it (`Visibility`); PERMISSION_DENIED
     (JOIN_CODE_WRONG).
     """
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
     first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-    requested without being the last. Rooms that are not public are listed only for callers who show
-    a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    requested without being the last. Rooms that are not public are listed only for callers who
+    show a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
@@ -81,15 +81,15 @@ class RoomServiceAsyncStub(RoomServiceStub):
     STORE_FAILED).
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
-    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
-    without a secret of it (`Visibility`); PERMISSION_DENIED
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
+    room without a secret of it (`Visibility`); PERMISSION_DENIED
     (JOIN_CODE_WRONG).
     """
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
     first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-    requested without being the last. Rooms that are not public are listed only for callers who show
-    a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    requested without being the last. Rooms that are not public are listed only for callers who
+    show a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
@@ -130,8 +130,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.GetRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.GetRoomResponse, _abc.Awaitable[_room_service_pb2.GetRoomResponse]]:
-        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private room
-        without a secret of it (`Visibility`); PERMISSION_DENIED
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
+        room without a secret of it (`Visibility`); PERMISSION_DENIED
         (JOIN_CODE_WRONG).
         """
 
@@ -143,8 +143,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.ListRoomsResponse, _abc.Awaitable[_room_service_pb2.ListRoomsResponse]]:
         """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
         first. Page tokens are valid until the server restarts. A page may have fewer rooms than
-        requested without being the last. Rooms that are not public are listed only for callers who show
-        a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        requested without being the last. Rooms that are not public are listed only for callers who
+        show a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod

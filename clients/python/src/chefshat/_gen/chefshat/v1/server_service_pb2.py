@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n chefshat/v1/server_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/rules.proto\"\x16\n\x14GetServerInfoRequest\"\xd4\x02\n\x15GetServerInfoResponse\x12\x16\n\x0eserver_version\x18\x01 \x01(\t\x12\x15\n\rrules_version\x18\x02 \x01(\r\x12%\n\x07presets\x18\x03 \x03(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x17\n\x0f\x62uilt_in_agents\x18\x04 \x03(\t\x12>\n\x06limits\x18\x05 \x03(\x0b\x32..chefshat.v1.GetServerInfoResponse.LimitsEntry\x12\x12\n\nopen_rooms\x18\x06 \x01(\r\x12\x15\n\rshutting_down\x18\x07 \x01(\x08\x12\x13\n\x0bsigning_key\x18\x08 \x01(\t\x12\x1d\n\x15quick_built_in_agents\x18\t \x03(\t\x1a-\n\x0bLimitsEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x04:\x02\x38\x01\"&\n\x15GetActionTableRequest\x12\r\n\x05\x66\x61\x63\x65s\x18\x01 \x01(\r\"W\n\x16GetActionTableResponse\x12.\n\x0c\x61\x63tion_space\x18\x01 \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12\r\n\x05texts\x18\x02 \x03(\t2\xc2\x01\n\rServerService\x12V\n\rGetServerInfo\x12!.chefshat.v1.GetServerInfoRequest\x1a\".chefshat.v1.GetServerInfoResponse\x12Y\n\x0eGetActionTable\x12\".chefshat.v1.GetActionTableRequest\x1a#.chefshat.v1.GetActionTableResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n chefshat/v1/server_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/rules.proto\"\x16\n\x14GetServerInfoRequest\"\xd4\x02\n\x15GetServerInfoResponse\x12\x16\n\x0eserver_version\x18\x01 \x01(\t\x12\x15\n\rrules_version\x18\x02 \x01(\r\x12%\n\x07presets\x18\x03 \x03(\x0b\x32\x14.chefshat.v1.RuleSet\x12\x17\n\x0f\x62uilt_in_agents\x18\x04 \x03(\t\x12>\n\x06limits\x18\x05 \x03(\x0b\x32..chefshat.v1.GetServerInfoResponse.LimitsEntry\x12\x12\n\nopen_rooms\x18\x06 \x01(\r\x12\x15\n\rshutting_down\x18\x07 \x01(\x08\x12\x13\n\x0bsigning_key\x18\x08 \x01(\t\x12\x1d\n\x15quick_built_in_agents\x18\t \x03(\t\x1a-\n\x0bLimitsEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x04:\x02\x38\x01\"&\n\x15GetActionTableRequest\x12\r\n\x05\x66\x61\x63\x65s\x18\x01 \x01(\r\"W\n\x16GetActionTableResponse\x12.\n\x0c\x61\x63tion_space\x18\x01 \x01(\x0b\x32\x18.chefshat.v1.ActionSpace\x12\r\n\x05texts\x18\x02 \x03(\t\"\"\n\x0fGetClockRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\"d\n\x10GetClockResponse\x12\x16\n\x0ereceived_at_us\x18\x01 \x01(\x04\x12\x12\n\nsent_at_us\x18\x02 \x01(\x04\x12$\n\x04room\x18\x03 \x01(\x0b\x32\x16.chefshat.v1.RoomClock\"Y\n\tRoomClock\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x15\n\rcreated_at_ms\x18\x02 \x01(\x04\x12\x13\n\x0breceived_us\x18\x03 \x01(\x04\x12\x0f\n\x07sent_us\x18\x04 \x01(\x04\x32\x8b\x02\n\rServerService\x12V\n\rGetServerInfo\x12!.chefshat.v1.GetServerInfoRequest\x1a\".chefshat.v1.GetServerInfoResponse\x12Y\n\x0eGetActionTable\x12\".chefshat.v1.GetActionTableRequest\x1a#.chefshat.v1.GetActionTableResponse\x12G\n\x08GetClock\x12\x1c.chefshat.v1.GetClockRequest\x1a\x1d.chefshat.v1.GetClockResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -44,6 +44,12 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_GETACTIONTABLEREQUEST']._serialized_end=479
   _globals['_GETACTIONTABLERESPONSE']._serialized_start=481
   _globals['_GETACTIONTABLERESPONSE']._serialized_end=568
-  _globals['_SERVERSERVICE']._serialized_start=571
-  _globals['_SERVERSERVICE']._serialized_end=765
+  _globals['_GETCLOCKREQUEST']._serialized_start=570
+  _globals['_GETCLOCKREQUEST']._serialized_end=604
+  _globals['_GETCLOCKRESPONSE']._serialized_start=606
+  _globals['_GETCLOCKRESPONSE']._serialized_end=706
+  _globals['_ROOMCLOCK']._serialized_start=708
+  _globals['_ROOMCLOCK']._serialized_end=797
+  _globals['_SERVERSERVICE']._serialized_start=800
+  _globals['_SERVERSERVICE']._serialized_end=1067
 # @@protoc_insertion_point(module_scope)

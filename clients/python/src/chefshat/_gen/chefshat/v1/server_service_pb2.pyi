@@ -177,3 +177,101 @@ class GetActionTableResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___GetActionTableResponse: _TypeAlias = GetActionTableResponse  # noqa: Y015
+
+@_typing.final
+class GetClockRequest(_message.Message):
+    """Requests the times of the server's clocks."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ROOM_ID_FIELD_NUMBER: _builtins.int
+    room_id: _builtins.str
+    """The room whose clock is read, too; empty: none."""
+    def __init__(
+        self,
+        *,
+        room_id: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["room_id", b"room_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetClockRequest: _TypeAlias = GetClockRequest  # noqa: Y015
+
+@_typing.final
+class GetClockResponse(_message.Message):
+    """The times of the clocks of one server: where several servers share their rooms, the one that has the
+    requested room, or without a room the one that the client is connected to.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    RECEIVED_AT_US_FIELD_NUMBER: _builtins.int
+    SENT_AT_US_FIELD_NUMBER: _builtins.int
+    ROOM_FIELD_NUMBER: _builtins.int
+    received_at_us: _builtins.int
+    """Time of day when the server had read the request, microseconds since the Unix epoch. The
+    operating system may set it forward or back at any time.
+    """
+    sent_at_us: _builtins.int
+    """The same when it wrote the response."""
+    @_builtins.property
+    def room(self) -> Global___RoomClock:
+        """The clock of the requested room; unset without one."""
+
+    def __init__(
+        self,
+        *,
+        received_at_us: _builtins.int = ...,
+        sent_at_us: _builtins.int = ...,
+        room: Global___RoomClock | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["room", b"room"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["received_at_us", b"received_at_us", "room", b"room", "sent_at_us", b"sent_at_us"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetClockResponse: _TypeAlias = GetClockResponse  # noqa: Y015
+
+@_typing.final
+class RoomClock(_message.Message):
+    """The clock of a room. It measures all times of its events and record (`elapsed_ms`), starts at 0 when
+    the room is created and runs steadily, whatever happens to the time of day. Only when a server
+    resumes the room, after a restart or from another server, does it continue from the time of day, so
+    it may jump then: read it again after ServerRestarted.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAME_ID_FIELD_NUMBER: _builtins.int
+    CREATED_AT_MS_FIELD_NUMBER: _builtins.int
+    RECEIVED_US_FIELD_NUMBER: _builtins.int
+    SENT_US_FIELD_NUMBER: _builtins.int
+    game_id: _builtins.str
+    """Identifies the game of the room."""
+    created_at_ms: _builtins.int
+    """Milliseconds since the Unix epoch when the room was created. This and the `elapsed_ms` of an event
+    add up to the time of day of the event, as precise as the server's time of day was then.
+    """
+    received_us: _builtins.int
+    """Microseconds since the room was created, when the server had read the request."""
+    sent_us: _builtins.int
+    """The same when it wrote the response."""
+    def __init__(
+        self,
+        *,
+        game_id: _builtins.str = ...,
+        created_at_ms: _builtins.int = ...,
+        received_us: _builtins.int = ...,
+        sent_us: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["created_at_ms", b"created_at_ms", "game_id", b"game_id", "received_us", b"received_us", "sent_us", b"sent_us"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RoomClock: _TypeAlias = RoomClock  # noqa: Y015

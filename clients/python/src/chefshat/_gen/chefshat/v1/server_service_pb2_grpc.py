@@ -45,6 +45,11 @@ class ServerServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_server__service__pb2.GetActionTableRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_server__service__pb2.GetActionTableResponse.FromString,
                 _registered_method=True)
+        self.GetClock = channel.unary_unary(
+                '/chefshat.v1.ServerService/GetClock',
+                request_serializer=chefshat_dot_v1_dot_server__service__pb2.GetClockRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_server__service__pb2.GetClockResponse.FromString,
+                _registered_method=True)
 
 
 class ServerServiceServicer(object):
@@ -65,6 +70,17 @@ class ServerServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetClock(self, request, context):
+        """Reads the server's clocks, so that a client can relate them to its own as in NTP. With t0 and t3
+        the client's times of sending the request and receiving the response, the server's clock is ahead
+        by ((received - t0) + (sent - t3)) / 2, give or take half the round trip (t3 - t0) - (sent -
+        received). Repeat it and keep the reading with the shortest round trip. NOT_FOUND (ROOM_UNKNOWN),
+        also for a private room without a secret of it (`Visibility`).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_ServerServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -77,6 +93,11 @@ def add_ServerServiceServicer_to_server(servicer, server):
                     servicer.GetActionTable,
                     request_deserializer=chefshat_dot_v1_dot_server__service__pb2.GetActionTableRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_server__service__pb2.GetActionTableResponse.SerializeToString,
+            ),
+            'GetClock': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetClock,
+                    request_deserializer=chefshat_dot_v1_dot_server__service__pb2.GetClockRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_server__service__pb2.GetClockResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -134,6 +155,33 @@ class ServerService(object):
             '/chefshat.v1.ServerService/GetActionTable',
             chefshat_dot_v1_dot_server__service__pb2.GetActionTableRequest.SerializeToString,
             chefshat_dot_v1_dot_server__service__pb2.GetActionTableResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetClock(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.ServerService/GetClock',
+            chefshat_dot_v1_dot_server__service__pb2.GetClockRequest.SerializeToString,
+            chefshat_dot_v1_dot_server__service__pb2.GetClockResponse.FromString,
             options,
             channel_credentials,
             insecure,

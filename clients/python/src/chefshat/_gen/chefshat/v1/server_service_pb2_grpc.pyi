@@ -37,6 +37,13 @@ class ServerServiceStub:
     """Returns version, limits, presets and built-in agents."""
     GetActionTable: _grpc.UnaryUnaryMultiCallable[_server_service_pb2.GetActionTableRequest, _server_service_pb2.GetActionTableResponse]
     """Returns the texts of all actions. INVALID_ARGUMENT (FACES_OUT_OF_RANGE)."""
+    GetClock: _grpc.UnaryUnaryMultiCallable[_server_service_pb2.GetClockRequest, _server_service_pb2.GetClockResponse]
+    """Reads the server's clocks, so that a client can relate them to its own as in NTP. With t0 and t3
+    the client's times of sending the request and receiving the response, the server's clock is ahead
+    by ((received - t0) + (sent - t3)) / 2, give or take half the round trip (t3 - t0) - (sent -
+    received). Repeat it and keep the reading with the shortest round trip. NOT_FOUND (ROOM_UNKNOWN),
+    also for a private room without a secret of it (`Visibility`).
+    """
 
 @_typing.type_check_only
 class ServerServiceAsyncStub(ServerServiceStub):
@@ -47,6 +54,13 @@ class ServerServiceAsyncStub(ServerServiceStub):
     """Returns version, limits, presets and built-in agents."""
     GetActionTable: _aio.UnaryUnaryMultiCallable[_server_service_pb2.GetActionTableRequest, _server_service_pb2.GetActionTableResponse]  # type: ignore[assignment]
     """Returns the texts of all actions. INVALID_ARGUMENT (FACES_OUT_OF_RANGE)."""
+    GetClock: _aio.UnaryUnaryMultiCallable[_server_service_pb2.GetClockRequest, _server_service_pb2.GetClockResponse]  # type: ignore[assignment]
+    """Reads the server's clocks, so that a client can relate them to its own as in NTP. With t0 and t3
+    the client's times of sending the request and receiving the response, the server's clock is ahead
+    by ((received - t0) + (sent - t3)) / 2, give or take half the round trip (t3 - t0) - (sent -
+    received). Repeat it and keep the reading with the shortest round trip. NOT_FOUND (ROOM_UNKNOWN),
+    also for a private room without a secret of it (`Visibility`).
+    """
 
 class ServerServiceServicer(metaclass=_abc_1.ABCMeta):
     """Information about a server."""
@@ -66,5 +80,18 @@ class ServerServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_server_service_pb2.GetActionTableResponse, _abc.Awaitable[_server_service_pb2.GetActionTableResponse]]:
         """Returns the texts of all actions. INVALID_ARGUMENT (FACES_OUT_OF_RANGE)."""
+
+    @_abc_1.abstractmethod
+    def GetClock(
+        self,
+        request: _server_service_pb2.GetClockRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_server_service_pb2.GetClockResponse, _abc.Awaitable[_server_service_pb2.GetClockResponse]]:
+        """Reads the server's clocks, so that a client can relate them to its own as in NTP. With t0 and t3
+        the client's times of sending the request and receiving the response, the server's clock is ahead
+        by ((received - t0) + (sent - t3)) / 2, give or take half the round trip (t3 - t0) - (sent -
+        received). Repeat it and keep the reading with the shortest round trip. NOT_FOUND (ROOM_UNKNOWN),
+        also for a private room without a secret of it (`Visibility`).
+        """
 
 def add_ServerServiceServicer_to_server(servicer: ServerServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

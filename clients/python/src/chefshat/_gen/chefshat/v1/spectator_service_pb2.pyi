@@ -77,8 +77,8 @@ class SpectatorServiceWatchResponse(_message.Message):
 
     @_builtins.property
     def awaited(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Awaited]:
-        """Whom the game waits for after these events, when that changes; the last one counts. Not in rooms
-        with a delay.
+        """Whom the game waits for after these events, when that changes; the last one counts. Not in
+        rooms with a delay.
         """
 
     def __init__(

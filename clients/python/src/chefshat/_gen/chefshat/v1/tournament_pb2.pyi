@@ -250,8 +250,8 @@ class TournamentSettings(_message.Message):
     """
     start_at_ms: _builtins.int
     """Milliseconds since the Unix epoch at which the tournament starts by itself, at most 366 days
-    ahead; 0: only its owner, or `start_when_joined`, starts it. If fewer than two participants have
-    joined by then, it starts as soon as two have.
+    ahead; 0: only its owner, or `start_when_joined`, starts it. If fewer than two participants
+    have joined by then, it starts as soon as two have.
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -354,8 +354,8 @@ class TournamentParticipant(_message.Message):
     WITHDRAWN_FIELD_NUMBER: _builtins.int
     FORMER_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
-    """Number in the tournament, from 0, in the order of joining. A participant who joins after another
-    left before the start takes its number.
+    """Number in the tournament, from 0, in the order of joining. The number of a participant who left
+    before the start is not used again.
     """
     name: _builtins.str
     """Display name, unique in the tournament."""
@@ -374,8 +374,8 @@ class TournamentParticipant(_message.Message):
     at_table: _builtins.bool
     """Whether it plays at a physical table with real cards. Nobody connects for it."""
     withdrawn: _builtins.bool
-    """Whether it withdrew or was removed. Before the start its place is free, and its name too; after
-    that it forfeits its games without being waited for.
+    """Whether it withdrew or was removed. Before the start its name is free again, and somebody else
+    can join instead of it; after that it forfeits its games without being waited for.
     """
     @_builtins.property
     def former(self) -> _containers.RepeatedCompositeFieldContainer[Global___FormerParticipant]:

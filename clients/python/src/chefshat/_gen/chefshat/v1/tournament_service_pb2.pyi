@@ -31,8 +31,9 @@ class CreateTournamentRequest(_message.Message):
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
     lost response, creates nothing and gets the same response with the same secrets, as long as the
-    created object is listed; if it survives a restart of the server, then too. The same id with other
-    content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    created object is listed; if it survives a restart of the server, then too. The same id with
+    other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    (REQUEST_ID_REFUSED).
     """
     @_builtins.property
     def settings(self) -> _tournament_pb2.TournamentSettings:
@@ -219,10 +220,10 @@ class JoinTournamentRequest(_message.Message):
     """Declares it stateless: it remembers nothing from one game to the next."""
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
-    lost response, gets the same place with the same ticket while the participant has it, even after
-    the start of the tournament or a restart of the server. The same id with another name, kind, number
-    of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
-    (REQUEST_ID_REFUSED).
+    lost response, gets the same place with the same ticket while the participant has it, even
+    after the start of the tournament or a restart of the server. The same id with another name,
+    kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     def __init__(
         self,
@@ -256,7 +257,8 @@ class JoinTournamentResponse(_message.Message):
     """The participant's number."""
     ticket: _builtins.str
     """Secret of the participant, which Attach accepts in place of a seat's ticket. Valid as long as
-    the tournament exists, unless the participant withdraws before the start, is removed or replaced.
+    the tournament exists, unless the participant withdraws before the start, is removed or
+    replaced.
     """
     @_builtins.property
     def tournament(self) -> _tournament_pb2.Tournament:
@@ -298,9 +300,9 @@ class AddTableParticipantRequest(_message.Message):
     """Kind of the participant; UNSPECIFIED means HUMAN. `kinds` of the settings does not limit it."""
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
-    lost response, gets the same participant, even after the start of the tournament or a restart of
-    the server. The same id with another name or kind, or of a participant who joined: ALREADY_EXISTS
-    (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    lost response, gets the same participant, even after the start of the tournament or a restart
+    of the server. The same id with another name or kind, or of a participant who joined:
+    ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     def __init__(
         self,
@@ -658,8 +660,9 @@ class ReplaceParticipantRequest(_message.Message):
     """Declares it stateless: it remembers nothing from one game to the next."""
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
-    lost response, gets the same response with the same ticket. The same id for another participant,
-    name, kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    lost response, replaces nobody and gets the same ticket, if there is one, as long as the new
+    participant has the place. The same id for another participant, name, kind, built-in agent,
+    number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
     INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     def __init__(

@@ -28,8 +28,11 @@ if _version_not_supported:
 class TournamentServiceStub(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     def __init__(self, channel):
@@ -138,8 +141,11 @@ class TournamentServiceStub(object):
 class TournamentServiceServicer(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     def CreateTournament(self, request, context):
@@ -161,10 +167,10 @@ class TournamentServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ListTournaments(self, request, context):
-        """Lists the tournaments of the server, newest first. Those that are not public are listed only for
-        callers who show a secret of them. A page may have fewer tournaments than requested without
-        being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
-        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Lists the tournaments of the server, newest first. Those that are not public are listed only
+        for callers who show a secret of them. A page may have fewer tournaments than requested without
+        being the last. Later pages do not include tournaments created after the first. Page tokens are
+        valid until the server restarts. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -173,17 +179,17 @@ class TournamentServiceServicer(object):
     def JoinTournament(self, request, context):
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
-        fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
-        NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
+        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
+        MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def AddTableParticipant(self, request, context):
-        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-        does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
+        it does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
         (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
         TOURNAMENT_STARTED);
         INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
@@ -195,8 +201,8 @@ class TournamentServiceServicer(object):
 
     def GetPhysicalTable(self, request, context):
         """Returns what the organiser needs for a physical game in progress: the table's ticket for an
-        attendant or a camera. The same at each call, also after a restart of the server, as long as the
-        game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+        attendant or a camera. The same at each call, also after a restart of the server, as long as
+        the game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
         (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -220,10 +226,22 @@ class TournamentServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def WithdrawParticipant(self, request, context):
-        """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
-        again, and its ticket ends. After that a substitute plays its games in progress to their end, it
-        forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
-        the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+        """Withdraws a participant, with its ticket or by the owner. Before the start somebody else can
+        join instead of it, and its ticket ends. After that a substitute plays its games in progress to
+        their end, it forfeits all others without being waited for, and its ticket only shows the
+        tournament. Repeating the call changes nothing; with a ticket that ended before the start, the
+        answer is then TICKET_UNKNOWN. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
+        (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def RemoveParticipant(self, request, context):
+        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case, also if it
+        has withdrawn before. Repeating the call changes nothing. PERMISSION_DENIED
         (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
         (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
         """
@@ -231,33 +249,24 @@ class TournamentServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
-    def RemoveParticipant(self, request, context):
-        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
-        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
-        FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
-        """
-        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
-        context.set_details('Method not implemented!')
-        raise NotImplementedError('Method not implemented!')
-
     def ReplaceParticipant(self, request, context):
-        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
-        to somebody else, with all its results. The former participant's ticket ends; games in progress
-        are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
-        NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
-        (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
-        UNAVAILABLE (SHUTTING_DOWN).
+        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent
+        or to somebody else, with all its results. The former participant's ticket ends; games in
+        progress are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+        NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER,
+        NAME_TAKEN, NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN);
+        INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for
+        `built_in_agent`); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def PauseTournament(self, request, context):
-        """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
-        a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
-        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
-        (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+        """Pauses the tournament: until it is resumed, no game is called, no round is drawn, and it does
+        not end. Games in progress continue. After a week it resumes by itself. Repeating the call
+        changes nothing. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN);
+        FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -273,8 +282,8 @@ class TournamentServiceServicer(object):
 
     def PostponeGame(self, request, context):
         """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
-        participants restarts, and this costs no call. The owner may do so at any time, a participant of
-        the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+        participants restarts, and this costs no call. The owner may do so at any time, a participant
+        of the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
         (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
         (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
         POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
@@ -285,9 +294,13 @@ class TournamentServiceServicer(object):
 
     def CallGame(self, request, context):
         """Calls a game before all others, with as many calls as at first: one that is due, also after it
-        was postponed, or one that is void. In a knockout a void game can be called as long as the next
-        round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
-        GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+        was postponed, or one that is void. A void game is then due again, with a new deal if its
+        participants may have seen the old one, and counts if it is played. That is possible while the
+        tournament is not over, so pause it to play its last void games; in a knockout, until the next
+        round is drawn. In a paused tournament the game is called when it is resumed. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE; NOBODY_LEFT: all its participants have withdrawn, so
+        that it would be void again); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
         (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -439,8 +452,11 @@ def add_TournamentServiceServicer_to_server(servicer, server):
 class TournamentService(object):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     @staticmethod

@@ -29,8 +29,11 @@ GRPC_VERSION: str
 class TournamentServiceStub:
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     @_typing.overload
@@ -48,21 +51,21 @@ class TournamentServiceStub:
     PERMISSION_DENIED (JOIN_CODE_WRONG).
     """
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
-    """Lists the tournaments of the server, newest first. Those that are not public are listed only for
-    callers who show a secret of them. A page may have fewer tournaments than requested without
-    being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
-    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Lists the tournaments of the server, newest first. Those that are not public are listed only
+    for callers who show a secret of them. A page may have fewer tournaments than requested without
+    being the last. Later pages do not include tournaments created after the first. Page tokens are
+    valid until the server restarts. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
-    fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
-    NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
+    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
+    MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
-    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-    does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
+    it does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
     (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
     TOURNAMENT_STARTED);
     INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
@@ -70,8 +73,8 @@ class TournamentServiceStub:
     """
     GetPhysicalTable: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]
     """Returns what the organiser needs for a physical game in progress: the table's ticket for an
-    attendant or a camera. The same at each call, also after a restart of the server, as long as the
-    game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+    attendant or a camera. The same at each call, also after a restart of the server, as long as
+    the game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
     (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
     """
     StartTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]
@@ -83,32 +86,35 @@ class TournamentServiceStub:
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     WithdrawParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.WithdrawParticipantRequest, _tournament_service_pb2.WithdrawParticipantResponse]
-    """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
-    again, and its ticket ends. After that a substitute plays its games in progress to their end, it
-    forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
-    the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    """Withdraws a participant, with its ticket or by the owner. Before the start somebody else can
+    join instead of it, and its ticket ends. After that a substitute plays its games in progress to
+    their end, it forfeits all others without being waited for, and its ticket only shows the
+    tournament. Repeating the call changes nothing; with a ticket that ended before the start, the
+    answer is then TICKET_UNKNOWN. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
+    (SHUTTING_DOWN).
+    """
+    RemoveParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]
+    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case, also if it
+    has withdrawn before. Repeating the call changes nothing. PERMISSION_DENIED
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
     (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
     """
-    RemoveParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]
-    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
-    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
-    FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
-    """
     ReplaceParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ReplaceParticipantRequest, _tournament_service_pb2.ReplaceParticipantResponse]
-    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
-    to somebody else, with all its results. The former participant's ticket ends; games in progress
-    are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
-    NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
-    (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
-    UNAVAILABLE (SHUTTING_DOWN).
+    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent
+    or to somebody else, with all its results. The former participant's ticket ends; games in
+    progress are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+    NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER,
+    NAME_TAKEN, NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN);
+    INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for
+    `built_in_agent`); UNAVAILABLE (SHUTTING_DOWN).
     """
     PauseTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.PauseTournamentRequest, _tournament_service_pb2.PauseTournamentResponse]
-    """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
-    a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
-    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
-    (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+    """Pauses the tournament: until it is resumed, no game is called, no round is drawn, and it does
+    not end. Games in progress continue. After a week it resumes by itself. Repeating the call
+    changes nothing. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN);
+    FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
     """
     ResumeTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ResumeTournamentRequest, _tournament_service_pb2.ResumeTournamentResponse]
     """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
@@ -116,17 +122,21 @@ class TournamentServiceStub:
     """
     PostponeGame: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.PostponeGameRequest, _tournament_service_pb2.PostponeGameResponse]
     """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
-    participants restarts, and this costs no call. The owner may do so at any time, a participant of
-    the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+    participants restarts, and this costs no call. The owner may do so at any time, a participant
+    of the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
     (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
     (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
     POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CallGame: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CallGameRequest, _tournament_service_pb2.CallGameResponse]
     """Calls a game before all others, with as many calls as at first: one that is due, also after it
-    was postponed, or one that is void. In a knockout a void game can be called as long as the next
-    round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
-    GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+    was postponed, or one that is void. A void game is then due again, with a new deal if its
+    participants may have seen the old one, and counts if it is played. That is possible while the
+    tournament is not over, so pause it to play its last void games; in a knockout, until the next
+    round is drawn. In a paused tournament the game is called when it is resumed. PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE; NOBODY_LEFT: all its participants have withdrawn, so
+    that it would be void again); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
     (SHUTTING_DOWN).
     """
     FollowTournament: _grpc.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]
@@ -154,8 +164,11 @@ class TournamentServiceStub:
 class TournamentServiceAsyncStub(TournamentServiceStub):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -170,21 +183,21 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     PERMISSION_DENIED (JOIN_CODE_WRONG).
     """
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
-    """Lists the tournaments of the server, newest first. Those that are not public are listed only for
-    callers who show a secret of them. A page may have fewer tournaments than requested without
-    being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
-    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Lists the tournaments of the server, newest first. Those that are not public are listed only
+    for callers who show a secret of them. A page may have fewer tournaments than requested without
+    being the last. Later pages do not include tournaments created after the first. Page tokens are
+    valid until the server restarts. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
-    fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
-    NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
+    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
+    MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
-    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-    does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+    """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
+    it does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
     (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
     TOURNAMENT_STARTED);
     INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
@@ -192,8 +205,8 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """
     GetPhysicalTable: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetPhysicalTableRequest, _tournament_service_pb2.GetPhysicalTableResponse]  # type: ignore[assignment]
     """Returns what the organiser needs for a physical game in progress: the table's ticket for an
-    attendant or a camera. The same at each call, also after a restart of the server, as long as the
-    game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+    attendant or a camera. The same at each call, also after a restart of the server, as long as
+    the game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
     (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
     """
     StartTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]  # type: ignore[assignment]
@@ -205,32 +218,35 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     WithdrawParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.WithdrawParticipantRequest, _tournament_service_pb2.WithdrawParticipantResponse]  # type: ignore[assignment]
-    """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
-    again, and its ticket ends. After that a substitute plays its games in progress to their end, it
-    forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
-    the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    """Withdraws a participant, with its ticket or by the owner. Before the start somebody else can
+    join instead of it, and its ticket ends. After that a substitute plays its games in progress to
+    their end, it forfeits all others without being waited for, and its ticket only shows the
+    tournament. Repeating the call changes nothing; with a ticket that ended before the start, the
+    answer is then TICKET_UNKNOWN. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
+    (SHUTTING_DOWN).
+    """
+    RemoveParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]  # type: ignore[assignment]
+    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case, also if it
+    has withdrawn before. Repeating the call changes nothing. PERMISSION_DENIED
     (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
     (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
     """
-    RemoveParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.RemoveParticipantRequest, _tournament_service_pb2.RemoveParticipantResponse]  # type: ignore[assignment]
-    """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
-    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
-    FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
-    """
     ReplaceParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ReplaceParticipantRequest, _tournament_service_pb2.ReplaceParticipantResponse]  # type: ignore[assignment]
-    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
-    to somebody else, with all its results. The former participant's ticket ends; games in progress
-    are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
-    NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
-    (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
-    UNAVAILABLE (SHUTTING_DOWN).
+    """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent
+    or to somebody else, with all its results. The former participant's ticket ends; games in
+    progress are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+    NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER,
+    NAME_TAKEN, NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN);
+    INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for
+    `built_in_agent`); UNAVAILABLE (SHUTTING_DOWN).
     """
     PauseTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.PauseTournamentRequest, _tournament_service_pb2.PauseTournamentResponse]  # type: ignore[assignment]
-    """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
-    a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
-    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
-    (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+    """Pauses the tournament: until it is resumed, no game is called, no round is drawn, and it does
+    not end. Games in progress continue. After a week it resumes by itself. Repeating the call
+    changes nothing. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN);
+    FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
     """
     ResumeTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ResumeTournamentRequest, _tournament_service_pb2.ResumeTournamentResponse]  # type: ignore[assignment]
     """Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
@@ -238,17 +254,21 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """
     PostponeGame: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.PostponeGameRequest, _tournament_service_pb2.PostponeGameResponse]  # type: ignore[assignment]
     """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
-    participants restarts, and this costs no call. The owner may do so at any time, a participant of
-    the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+    participants restarts, and this costs no call. The owner may do so at any time, a participant
+    of the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
     (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
     (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
     POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CallGame: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CallGameRequest, _tournament_service_pb2.CallGameResponse]  # type: ignore[assignment]
     """Calls a game before all others, with as many calls as at first: one that is due, also after it
-    was postponed, or one that is void. In a knockout a void game can be called as long as the next
-    round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
-    GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+    was postponed, or one that is void. A void game is then due again, with a new deal if its
+    participants may have seen the old one, and counts if it is played. That is possible while the
+    tournament is not over, so pause it to play its last void games; in a knockout, until the next
+    round is drawn. In a paused tournament the game is called when it is resumed. PERMISSION_DENIED
+    (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION
+    (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE; NOBODY_LEFT: all its participants have withdrawn, so
+    that it would be void again); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
     (SHUTTING_DOWN).
     """
     FollowTournament: _aio.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]  # type: ignore[assignment]
@@ -275,8 +295,11 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     """Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     the answer for a private tournament without a secret of it (`Visibility`). The calls from
-    WithdrawParticipant to CallGame change a tournament by hand; after 10,000 such changes they are
-    refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES).
+    WithdrawParticipant to CallGame change a tournament by hand. Their numbers are bounded; what goes
+    beyond is refused: RESOURCE_EXHAUSTED (TOO_MANY_CHANGES). Before the start, 20 participants of
+    one caller and 1,000 in all can withdraw by themselves; a participant can postpone 100 times, and
+    the owner can replace, pause, postpone and call 10,000 times. Nothing that others do counts for
+    the owner, and it can always remove participants, resume and close.
     """
 
     @_abc_1.abstractmethod
@@ -307,10 +330,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ListTournamentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentsResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentsResponse]]:
-        """Lists the tournaments of the server, newest first. Those that are not public are listed only for
-        callers who show a secret of them. A page may have fewer tournaments than requested without
-        being the last. Later pages do not include tournaments created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
-        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Lists the tournaments of the server, newest first. Those that are not public are listed only
+        for callers who show a secret of them. A page may have fewer tournaments than requested without
+        being the last. Later pages do not include tournaments created after the first. Page tokens are
+        valid until the server restarts. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod
@@ -321,9 +344,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.JoinTournamentResponse, _abc.Awaitable[_tournament_service_pb2.JoinTournamentResponse]]:
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names of
-        fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
-        NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
+        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
+        MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -332,8 +355,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.AddTableParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.AddTableParticipantResponse, _abc.Awaitable[_tournament_service_pb2.AddTableParticipantResponse]]:
-        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what it
-        does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
+        """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
+        it does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
         (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
         TOURNAMENT_STARTED);
         INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
@@ -347,8 +370,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetPhysicalTableResponse, _abc.Awaitable[_tournament_service_pb2.GetPhysicalTableResponse]]:
         """Returns what the organiser needs for a physical game in progress: the table's ticket for an
-        attendant or a camera. The same at each call, also after a restart of the server, as long as the
-        game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
+        attendant or a camera. The same at each call, also after a restart of the server, as long as
+        the game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
         (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
         """
 
@@ -378,12 +401,14 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.WithdrawParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.WithdrawParticipantResponse, _abc.Awaitable[_tournament_service_pb2.WithdrawParticipantResponse]]:
-        """Withdraws a participant, with its ticket or by the owner. Before the start its place is free
-        again, and its ticket ends. After that a substitute plays its games in progress to their end, it
-        forfeits all others without being waited for, and its ticket only shows the tournament. Repeating
-        the call changes nothing. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
+        """Withdraws a participant, with its ticket or by the owner. Before the start somebody else can
+        join instead of it, and its ticket ends. After that a substitute plays its games in progress to
+        their end, it forfeits all others without being waited for, and its ticket only shows the
+        tournament. Repeating the call changes nothing; with a ticket that ended before the start, the
+        answer is then TICKET_UNKNOWN. UNAUTHENTICATED (TICKET_UNKNOWN); PERMISSION_DENIED
         (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
-        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -392,9 +417,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.RemoveParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.RemoveParticipantResponse, _abc.Awaitable[_tournament_service_pb2.RemoveParticipantResponse]]:
-        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case.
-        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN);
-        FAILED_PRECONDITION (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
+        """Removes a participant: as WithdrawParticipant, but its ticket ends in every case, also if it
+        has withdrawn before. Repeating the call changes nothing. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -403,13 +429,13 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ReplaceParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ReplaceParticipantResponse, _abc.Awaitable[_tournament_service_pb2.ReplaceParticipantResponse]]:
-        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent or
-        to somebody else, with all its results. The former participant's ticket ends; games in progress
-        are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER, NAME_TAKEN,
-        NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN); INVALID_ARGUMENT
-        (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for `built_in_agent`);
-        UNAVAILABLE (SHUTTING_DOWN).
+        """Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent
+        or to somebody else, with all its results. The former participant's ticket ends; games in
+        progress are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+        NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_OVER,
+        NAME_TAKEN, NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN);
+        INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for
+        `built_in_agent`); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -418,10 +444,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.PauseTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.PauseTournamentResponse, _abc.Awaitable[_tournament_service_pb2.PauseTournamentResponse]]:
-        """Pauses the tournament: no game is called until it is resumed. Games in progress continue. After
-        a week it resumes by itself. Repeating the call changes nothing. PERMISSION_DENIED
-        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); FAILED_PRECONDITION
-        (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
+        """Pauses the tournament: until it is resumed, no game is called, no round is drawn, and it does
+        not end. Games in progress continue. After a week it resumes by itself. Repeating the call
+        changes nothing. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN);
+        FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -441,8 +467,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.PostponeGameResponse, _abc.Awaitable[_tournament_service_pb2.PostponeGameResponse]]:
         """Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
-        participants restarts, and this costs no call. The owner may do so at any time, a participant of
-        the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
+        participants restarts, and this costs no call. The owner may do so at any time, a participant
+        of the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
         (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
         (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
         POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
@@ -455,9 +481,13 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.CallGameResponse, _abc.Awaitable[_tournament_service_pb2.CallGameResponse]]:
         """Calls a game before all others, with as many calls as at first: one that is due, also after it
-        was postponed, or one that is void. In a knockout a void game can be called as long as the next
-        round has not been drawn. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN,
-        GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE); UNAVAILABLE
+        was postponed, or one that is void. A void game is then due again, with a new deal if its
+        participants may have seen the old one, and counts if it is played. That is possible while the
+        tournament is not over, so pause it to play its last void games; in a knockout, until the next
+        round is drawn. In a paused tournament the game is called when it is resumed. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION
+        (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE; NOBODY_LEFT: all its participants have withdrawn, so
+        that it would be void again); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
         (SHUTTING_DOWN).
         """
 

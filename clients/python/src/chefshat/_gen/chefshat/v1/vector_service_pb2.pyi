@@ -276,9 +276,9 @@ class SavedStart(_message.Message):
     same_deals: _builtins.bool
     """Whether a copy continues exactly as the saved game would: with its seed, and with the random
     choices of its built-in agents. A game that follows a copy of the same state then has the same
-    deals and choices again, which tells nothing new: set total_games to `games` so that none follows.
-    Otherwise later Shifts are dealt, and built-in agents choose, by the seed of each game; the
-    cards of the current Shift stay the same.
+    deals and choices again, which tells nothing new: set total_games to `games` so that none
+    follows. Otherwise later Shifts are dealt, and built-in agents choose, by the seed of each
+    game; the cards of the current Shift stay the same.
     """
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
@@ -492,8 +492,8 @@ class VectorActions(_message.Message):
 
     ACTIONS_FIELD_NUMBER: _builtins.int
     actions: _builtins.bytes
-    """u16: the action of each row of the batch, in the same order. 65535 leaves the decision open: the
-    next batch has it again, unchanged.
+    """u16: the action of each row of the batch, in the same order. 65535 leaves the decision open:
+    the next batch has it again, unchanged.
     """
     def __init__(
         self,
@@ -582,8 +582,8 @@ class VectorRestore(_message.Message):
     stream, and the seed that it has here. The next batch has every game that waits for the client;
     the other games are unchanged. A restored game is not among the beginnings.
 
-    A request has at most max_vector_message_bytes, fewer than VectorStates may have: restore games in
-    several requests. A single state is larger only if it has some 100,000 decisions kept for a
+    A request has at most max_vector_message_bytes, fewer than VectorStates may have: restore games
+    in several requests. A single state is larger only if it has some 100,000 decisions kept for a
     record; it can then be restored in process, not over the network.
     """
 
@@ -888,16 +888,16 @@ class ObservationColumns(_message.Message):
     """u8, F+1 wide: cards this seat received in this Shift's exchange."""
     history: _builtins.bytes
     """u16, as wide as the setup's `history`: the latest actions since the Shift began, as far as the
-    seat may know them, the most recent last, after zeros. An entry is 1 + s * (A+1) + a for action a
-    of seat s. Turns and declared special actions are public. A gift is action A, a card unknown to
-    the seat, except for its giver and, when the exchange is complete, its receiver, who sees two
-    cards of one giver ascending. Gifts without a choice come when the exchange is complete. A
+    seat may know them, the most recent last, after zeros. An entry is 1 + s * (A+1) + a for action
+    a of seat s. Turns and declared special actions are public. A gift is action A, a card unknown
+    to the seat, except for its giver and, when the exchange is complete, its receiver, who sees
+    two cards of one giver ascending. Gifts without a choice come when the exchange is complete. A
     declined special action is an entry for the seat that declined alone. If a game begins within a
     Shift, its history begins there.
     """
     history_counts: _builtins.bytes
-    """u32: number of these actions since the Shift began, also those beyond the width; empty without a
-    history.
+    """u32: number of these actions since the Shift began, also those beyond the width; empty without
+    a history.
     """
     board_owners: _builtins.bytes
     """u8: the seat that played the cards on the board; 255 if the board is empty."""

@@ -49,12 +49,12 @@ class VectorServiceServicer(object):
     def Run(self, request_iterator, context):
         """Plays games that the client owns. The first request is the setup. The server replies with
         `started` and the first batch, and to every later request (actions, reset or restore) with the
-        next batch; to a request to save with the states. Half-closing ends the stream and the games. Invalid requests end it as well:
-        INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED,
-        BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED),
-        NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING), RESOURCE_EXHAUSTED
-        (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES, RECORDS_TOO_LONG, STATES_TOO_LARGE),
-        DEADLINE_EXCEEDED
+        next batch; to a request to save with the states. Half-closing ends the stream and the games.
+        Invalid requests end it as well: INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED,
+        RULE_SET_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED,
+        ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION
+        (GAME_RUNNING), RESOURCE_EXHAUSTED (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES,
+        RECORDS_TOO_LONG, STATES_TOO_LARGE), DEADLINE_EXCEEDED
         (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to

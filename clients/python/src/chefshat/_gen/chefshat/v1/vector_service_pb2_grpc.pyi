@@ -45,12 +45,12 @@ class VectorServiceStub:
     Run: _grpc.StreamStreamMultiCallable[_vector_service_pb2.RunRequest, _vector_service_pb2.RunResponse]
     """Plays games that the client owns. The first request is the setup. The server replies with
     `started` and the first batch, and to every later request (actions, reset or restore) with the
-    next batch; to a request to save with the states. Half-closing ends the stream and the games. Invalid requests end it as well:
-    INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED,
-    BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED),
-    NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING), RESOURCE_EXHAUSTED
-    (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES, RECORDS_TOO_LONG, STATES_TOO_LARGE),
-    DEADLINE_EXCEEDED
+    next batch; to a request to save with the states. Half-closing ends the stream and the games.
+    Invalid requests end it as well: INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED,
+    RULE_SET_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED,
+    ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION
+    (GAME_RUNNING), RESOURCE_EXHAUSTED (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES,
+    RECORDS_TOO_LONG, STATES_TOO_LARGE), DEADLINE_EXCEEDED
     (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
     max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
     ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
@@ -65,12 +65,12 @@ class VectorServiceAsyncStub(VectorServiceStub):
     Run: _aio.StreamStreamMultiCallable[_vector_service_pb2.RunRequest, _vector_service_pb2.RunResponse]  # type: ignore[assignment]
     """Plays games that the client owns. The first request is the setup. The server replies with
     `started` and the first batch, and to every later request (actions, reset or restore) with the
-    next batch; to a request to save with the states. Half-closing ends the stream and the games. Invalid requests end it as well:
-    INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED,
-    BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED),
-    NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING), RESOURCE_EXHAUSTED
-    (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES, RECORDS_TOO_LONG, STATES_TOO_LARGE),
-    DEADLINE_EXCEEDED
+    next batch; to a request to save with the states. Half-closing ends the stream and the games.
+    Invalid requests end it as well: INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED,
+    RULE_SET_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED,
+    ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION
+    (GAME_RUNNING), RESOURCE_EXHAUSTED (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES,
+    RECORDS_TOO_LONG, STATES_TOO_LARGE), DEADLINE_EXCEEDED
     (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
     max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
     ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
@@ -88,12 +88,12 @@ class VectorServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_vector_service_pb2.RunResponse], _abc.AsyncIterator[_vector_service_pb2.RunResponse]]:
         """Plays games that the client owns. The first request is the setup. The server replies with
         `started` and the first batch, and to every later request (actions, reset or restore) with the
-        next batch; to a request to save with the states. Half-closing ends the stream and the games. Invalid requests end it as well:
-        INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED,
-        BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED),
-        NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING), RESOURCE_EXHAUSTED
-        (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES, RECORDS_TOO_LONG, STATES_TOO_LARGE),
-        DEADLINE_EXCEEDED
+        next batch; to a request to save with the states. Half-closing ends the stream and the games.
+        Invalid requests end it as well: INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED,
+        RULE_SET_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED,
+        ILLEGAL_ACTION, RESET_REFUSED, STATES_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION
+        (GAME_RUNNING), RESOURCE_EXHAUSTED (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES,
+        RECORDS_TOO_LONG, STATES_TOO_LARGE), DEADLINE_EXCEEDED
         (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to

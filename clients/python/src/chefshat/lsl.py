@@ -1,0 +1,338 @@
+"""Markers of a game for the Lab Streaming Layer (LSL), which records EEG, eye trackers and other instruments on one clock.
+
+`python -m chefshat.lsl --address HOST:PORT --room CODE` opens a stream of markers and sends every event of a room. `MarkerStream`
+does the same from a program, and `MarkedAgent` from an agent, with what its seat sees. A marker has the time at which the event
+happened at the server, on LSL's clock (`Client.clock`), not the time at which it arrived. docs/instruments.md describes the stream.
+"""
+
+import argparse
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Awaitable, Sequence
+from types import TracebackType
+from typing import Self
+
+from google.protobuf.json_format import MessageToJson
+
+try:
+    import pylsl
+except ImportError as error:
+    raise ImportError("chefshat.lsl needs pylsl, which brings liblsl: pip install 'pylsl>=1.18'") from error
+
+import chefshat
+from chefshat import join_options, pb
+from chefshat.agent import make_agent
+from chefshat.agents import Agent
+from chefshat.client import Client
+from chefshat.clock import ClockReading
+from chefshat.decision import Decision, SeatInfo
+from chefshat.errors import ChefsHatError, exit_code
+from chefshat.result import SeatResult
+
+# Seconds between two readings of the server's clock.
+CLOCK_INTERVAL_S = 5.0
+# A clock that is known less precisely is read again, this often before the first marker.
+WANTED_ERROR_S = 0.005
+FIRST_READINGS = 5
+# How much two clocks drift apart at most, seconds per second: a reading becomes less precise with age.
+DRIFT = 2e-4
+# Seconds for which a command waits for recorders to receive the last markers.
+LINGER_S = 2.0
+# Name of the stream, unless another is given.
+NAME = "Chef's Hat"
+
+EXAMPLE = """examples:
+  python -m chefshat.lsl --address 127.0.0.1:50051 --room BCDF2345
+  python -m chefshat.lsl --address https://play.example.org --room ROOM-ID --secret OWNER-TOKEN --wait
+  python -m chefshat.lsl --address 127.0.0.1:50051 --ticket TICKET --agent my_module:MyAgent
+
+Start it before the game, and the recorder (LabRecorder, for example) after it; --wait holds the markers back until something
+records them. The stream is called "Chef's Hat" and has the type Markers.
+
+exit code: 0 the game is over, 1 the server refused or was lost, 2 wrong arguments, 130 interrupted
+"""
+
+
+class RoomClock:
+    """The clock of a room on LSL's clock, read again in a thread of its own, since clocks drift; a context manager."""
+
+    def __init__(self, client: Client, room_id: str, *, interval_s: float = CLOCK_INTERVAL_S) -> None:
+        """Reads the clock for the first time.
+
+        Args:
+            client: a connection to the server.
+            room_id: the room.
+            interval_s: seconds between two readings.
+
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached.
+        """
+        self._client = client
+        self._room_id = room_id
+        self._interval_s = interval_s
+        self._lock = threading.Lock()
+        self._readings = 1
+        self._reading, self._read_at = self._read()
+        for _ in range(FIRST_READINGS - 1):
+            if self._reading.error <= WANTED_ERROR_S:
+                break
+            self.read()
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._follow, name="chefshat-lsl-clock", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None) -> None:
+        self.close()
+
+    @property
+    def reading(self) -> ClockReading:
+        """The reading in use."""
+        with self._lock:
+            return self._reading
+
+    @property
+    def readings(self) -> int:
+        """How often the clock has been read."""
+        with self._lock:
+            return self._readings
+
+    def lsl(self, event: pb.GameEvent) -> float:
+        """The time of an event on LSL's clock, in seconds."""
+        return self.reading.local(event.elapsed_ms)
+
+    def read(self, *, jumped: bool = False) -> None:
+        """Reads the clock again. A less precise reading does not replace a recent one, unless the server's clock has jumped."""
+        reading, at = self._read()
+        with self._lock:
+            self._readings += 1
+            aged = self._reading.error + DRIFT * (at - self._read_at)
+            if jumped or reading.error <= aged:
+                self._reading, self._read_at = reading, at
+
+    def close(self) -> None:
+        """Stops reading."""
+        self._closed.set()
+        self._thread.join()
+
+    def _read(self) -> tuple[ClockReading, float]:
+        return self._client.clock(self._room_id, local=pylsl.local_clock), pylsl.local_clock()
+
+    def _follow(self) -> None:
+        while not self._closed.wait(self._interval_s):
+            try:
+                self.read()
+            except ChefsHatError:
+                continue  # The last reading is used until the server answers again. A room that is over is forgotten some time.
+
+
+class MarkerStream:
+    """A stream of LSL with a marker for each event of one game; a context manager."""
+
+    def __init__(self, client: Client, room_id: str, *, viewer: str = "spectator", name: str = NAME) -> None:
+        """Opens the stream.
+
+        Args:
+            client: a connection to the server.
+            room_id: the room.
+            viewer: whose view of the events it has, for the description of the stream: "spectator" or "seat 2".
+            name: the name of the stream.
+
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached.
+        """
+        server = client.server_info()
+        self.clock = RoomClock(client, room_id)
+        reading = self.clock.reading
+        # With the same id a recorder resumes the stream after a restart of this program.
+        source = f"chefshat {reading.game_id} {viewer}"
+        info = pylsl.StreamInfo(name, "Markers", 1, pylsl.IRREGULAR_RATE, pylsl.cf_string, source)
+        description = info.desc()
+        channel = description.append_child("channels").append_child("channel")
+        for key, value in (("label", "event"), ("type", "Marker"), ("unit", "JSON of chefshat.v1.GameEvent")):
+            channel.append_child_value(key, value)
+        game = description.append_child("game")
+        for key, value in {
+            "room_id": room_id,
+            "game_id": reading.game_id,
+            "viewer": viewer,
+            "created_at_ms": str(reading.created_at_ms),
+        }.items():
+            game.append_child_value(key, value)
+        acquisition = description.append_child("acquisition")
+        for key, value in {
+            "manufacturer": "Chef's Hat",
+            "server": client.address,
+            "server_version": server.server_version,
+            "clock_error_s": f"{reading.error:.6f}",
+        }.items():
+            acquisition.append_child_value(key, value)
+        self.source = source
+        self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
+        self._last = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None) -> None:
+        self.close()
+
+    def wait_for_recorder(self, timeout_s: float) -> bool:
+        """Waits until something receives the stream. Returns whether it does."""
+        return bool(self._open().wait_for_consumers(timeout_s))
+
+    def push(self, event: pb.GameEvent) -> None:
+        """Sends an event, with the time at which it happened. Ignores events that were sent before."""
+        if event.sequence <= self._last:
+            return
+        if event.HasField("server_restarted"):
+            # If the server does not answer, the thread of the clock tries again.
+            with contextlib.suppress(ChefsHatError):
+                self.clock.read(jumped=True)
+        self._open().push_sample([MessageToJson(event, indent=None)], self.clock.lsl(event))
+        self._last = event.sequence
+
+    def close(self, linger_s: float = 0.0) -> None:
+        """Closes the stream; what has not been received by then is lost. Waits up to `linger_s` seconds for recorders to leave."""
+        self.clock.close()
+        until = time.monotonic() + linger_s
+        while self._outlet is not None and self._outlet.have_consumers() and time.monotonic() < until:
+            time.sleep(0.05)
+        self._outlet = None
+
+    def _open(self) -> pylsl.StreamOutlet:
+        if self._outlet is None:
+            raise ValueError("the stream is closed")
+        return self._outlet
+
+
+class MarkedAgent(Agent):
+    """An agent that also sends the events of its game, as its seat sees them, as markers.
+
+    Sends them when they arrive, with the times at which they happened. By default that is together with the seat's decisions.
+    """
+
+    def __init__(self, agent: Agent, client: Client, *, name: str = NAME, wait_s: float = 0.0) -> None:
+        """Sets the agent.
+
+        Args:
+            agent: the agent that plays.
+            client: a connection to the server, for its clock.
+            name: the name of the stream.
+            wait_s: seconds to wait for a recorder when the seat is attached.
+        """
+        self._agent = agent
+        self._client = client
+        self._name = name
+        self._wait_s = wait_s
+        self._markers: MarkerStream | None = None
+
+    def decide(self, request: Decision) -> int | Awaitable[int]:
+        """Asks the agent."""
+        return self._agent.decide(request)
+
+    def on_attached(self, seat: SeatInfo) -> None:
+        """Opens the stream, the first time."""
+        if self._markers is None:
+            self._markers = MarkerStream(self._client, seat.room_id, viewer=f"seat {seat.seat}", name=self._name)
+            self._markers.wait_for_recorder(self._wait_s)
+        self._agent.on_attached(seat)
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        """Sends a marker."""
+        if self._markers is not None:
+            self._markers.push(event)
+        self._agent.on_event(event)
+
+    def on_snapshot(self, snapshot: pb.Snapshot) -> None:
+        """Passes it on."""
+        self._agent.on_snapshot(snapshot)
+
+    def on_awaited(self, awaited: pb.Awaited) -> None:
+        """Passes it on."""
+        self._agent.on_awaited(awaited)
+
+    def on_result(self, result: pb.AnswerResult) -> None:
+        """Passes it on."""
+        self._agent.on_result(result)
+
+    def on_refused(self, refused: pb.Refused) -> None:
+        """Passes it on."""
+        self._agent.on_refused(refused)
+
+    def on_game_over(self, result: SeatResult) -> None:
+        """Passes it on."""
+        self._agent.on_game_over(result)
+
+    def on_seat_lost(self, error: ChefsHatError) -> None:
+        """Passes it on."""
+        self._agent.on_seat_lost(error)
+
+    def close(self, linger_s: float = 0.0) -> None:
+        """Closes the stream."""
+        if self._markers is not None:
+            self._markers.close(linger_s)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command and returns its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m chefshat.lsl",
+        description="Sends the events of a room as markers to the Lab Streaming Layer, until the game is over.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    join_options.add_server_options(parser, required=True)
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--room", metavar="ID|CODE", help="watch this room, by its id or join code, as a spectator")
+    where.add_argument("--ticket", help="play this seat, and send what it sees; see --agent")
+    parser.add_argument("--agent", default="random", help="with --ticket: 'random', or module:Class of an Agent (default: random)")
+    parser.add_argument("--name", default=NAME, help=f"name of the stream (default: {NAME})")
+    parser.add_argument("--wait", action="store_true", help="send nothing until something records the stream")
+    options = parser.parse_args(arguments)
+    wait_s = pylsl.FOREVER if options.wait else 0.0
+
+    def run() -> int:
+        # The ticket shows a private room, whose clock is read.
+        with Client(join_options.server_of(options), secrets=[options.ticket] if options.ticket else []) as client:
+            if options.ticket is not None:
+                return play(client, options.ticket, options.agent, options.name, wait_s)
+            return watch(client, options.room, options.name, wait_s)
+
+    return exit_code(run, as_json=False)
+
+
+def watch(client: Client, room: str, name: str, wait_s: float) -> int:
+    """Sends the events of a room as a spectator sees them. Returns the exit code."""
+    is_id = len(room) == 32
+    room_id = client.get_room(room if is_id else "", join_code="" if is_id else room).room_id
+    markers = MarkerStream(client, room_id, name=name)
+    say(markers)
+    markers.wait_for_recorder(wait_s)
+    for event in client.watch(room_id):
+        markers.push(event)
+    markers.close(LINGER_S)
+    print("the game is over", file=sys.stderr)
+    return 0
+
+
+def play(client: Client, ticket: str, agent: str, name: str, wait_s: float) -> int:
+    """Plays a seat and sends the events that it sees. Returns the exit code."""
+    marked = MarkedAgent(make_agent(agent, None), client, name=name, wait_s=wait_s)
+    client.play(marked, ticket, options=chefshat.PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE))
+    marked.close(LINGER_S)
+    return 0
+
+
+def say(markers: MarkerStream) -> None:
+    """Prints what the stream is."""
+    error_ms = markers.clock.reading.error * 1e3
+    print(f"sending markers as {markers.source!r}; the server's clock is known to {error_ms:.1f} ms", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

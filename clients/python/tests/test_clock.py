@@ -1,0 +1,74 @@
+"""Reading a server's clocks: the offset, the round trip, and the local times of events."""
+
+import asyncio
+import itertools
+import time
+
+import pytest
+from fake_server import CLOCK_AHEAD_S, FakeServer
+
+import chefshat
+from chefshat import ChefsHatError, ClockReading, aio, pb
+
+
+def test_four_times_give_the_offset_and_the_round_trip() -> None:
+    # Ten milliseconds there, one to answer, twenty back; ten seconds ahead.
+    room = pb.RoomClock(game_id="game", created_at_ms=1_005_000, received_us=5_010_000, sent_us=5_011_000)
+    response = pb.GetClockResponse(received_at_us=1_010_010_000, sent_at_us=1_010_011_000, room=room)
+    clock = ClockReading.of(response, 1000.0, 1000.031)
+    assert clock.round_trip == pytest.approx(0.030)
+    assert clock.error == pytest.approx(0.015)
+    # The way there was shorter: five milliseconds wrong, of at most fifteen.
+    assert clock.offset == pytest.approx(9.995)
+    assert clock.room_offset == pytest.approx(-995.005)
+    assert clock.local(5_010) == pytest.approx(1000.015)
+    assert (clock.created_at_ms, clock.game_id) == (1_005_000, "game")
+
+
+def test_the_reading_with_the_shortest_round_trip_is_returned(fake: FakeServer) -> None:
+    # The local clock says when each of three requests was sent and answered: two, one and three seconds.
+    times = itertools.chain([0.0, 2.0, 5.0, 6.0, 7.0, 10.0])
+    with chefshat.Client(fake.address) as client:
+        clock = client.clock(local=lambda: next(times), readings=3)
+    assert clock.round_trip == 1.0
+    assert next(times, None) is None
+
+
+def test_the_offset_is_known_to_half_the_round_trip(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        clock = client.clock()
+        # In microseconds, and as precise as numbers of this size are.
+        assert abs(clock.offset - CLOCK_AHEAD_S) <= clock.error + 2e-6
+        assert clock.room_offset is None
+        with pytest.raises(ValueError, match="without a room"):
+            clock.local(0)
+        room = client.create_room("clock").room
+        clock = client.clock(room.room_id)
+        assert clock.room_offset is not None
+        assert abs(clock.room_offset) <= clock.error + 2e-6
+        assert clock.game_id == room.game_id
+        with pytest.raises(ChefsHatError) as caught:
+            client.clock("nobody's")
+        assert caught.value.reason == "ROOM_UNKNOWN"
+
+
+@pytest.mark.server
+def test_events_are_placed_between_what_came_before_and_after(real_address: str) -> None:
+    async def joined() -> None:
+        async with aio.Client(real_address) as client:
+            before = time.monotonic()
+            created = await client.create_room("clock")
+            joined = time.monotonic()
+            await client.join_room(created.join_code, "agent")
+            after = time.monotonic()
+            clock = await client.clock(created.room.room_id, local=time.monotonic)
+            assert clock.game_id == created.room.game_id
+            assert clock.created_at_ms == created.room.created_at_ms
+            # The time of an event is rounded to a millisecond.
+            error = clock.error + 1e-3
+            assert before - error <= clock.local(0) <= joined + error
+            async for event in client.watch(created.room.room_id):
+                assert joined - error <= clock.local(event.elapsed_ms) <= after + error
+                break
+
+    asyncio.run(joined())

@@ -1,0 +1,170 @@
+"""Markers for the Lab Streaming Layer: a real server and a real inlet.
+
+All times that are compared come from clocks that were read: how fast the tests run does not matter.
+"""
+
+import json
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import Any
+
+import pytest
+
+import chefshat
+from chefshat import RandomAgent, pb
+
+pylsl = pytest.importorskip("pylsl")
+
+from chefshat import lsl  # noqa: E402 (needs pylsl)
+
+pytestmark = pytest.mark.server
+
+# Time limit for what must happen, seconds.
+WAIT_S = 120.0
+# How close the times of markers and record must be, seconds.
+CLOSE_S = 0.020
+# Events have times in milliseconds.
+ROUNDING_S = 0.001
+ONE_SHIFT = pb.RuleSet(target_shifts=1)
+
+
+def inlet(source: str) -> Any:
+    """An inlet that receives the stream with this id."""
+    found = pylsl.resolve_byprop("source_id", source, timeout=WAIT_S)
+    assert found, f"no stream {source!r}"
+    opened = pylsl.StreamInlet(found[0])
+    opened.open_stream(timeout=WAIT_S)
+    return opened
+
+
+def received(stream: Any) -> Iterator[tuple[dict[str, Any], float]]:
+    """The markers of a stream and their times, until the game is over."""
+    while True:
+        sample, at = stream.pull_sample(timeout=WAIT_S)
+        assert sample is not None, "no marker"
+        marker = json.loads(sample[0])
+        yield marker, at
+        if "gameEnded" in marker or "gameAborted" in marker:
+            return
+
+
+def seated(client: chefshat.Client) -> tuple[pb.Room, list[str], str]:
+    """A room with four seats that are taken, their tickets, and the join code."""
+    created = client.create_room("markers", rules=ONE_SHIFT)
+    tickets = [client.join_room(created.join_code, f"agent {seat}").ticket for seat in range(4)]
+    return created.room, tickets, created.join_code
+
+
+def time_of_day() -> tuple[float, float]:
+    """How far the time of day is ahead of LSL's clock, and how much that may be wrong."""
+    readings = []
+    for _ in range(20):
+        before, now, after = pylsl.local_clock(), time.time(), pylsl.local_clock()
+        readings.append(((after - before) / 2, now - (before + after) / 2))
+    error, ahead = min(readings)
+    return ahead, error
+
+
+def check_times(client: chefshat.Client, room: pb.Room, markers: list[tuple[dict[str, Any], float]], error: float) -> None:
+    """Compares the times of markers with those of the record, whose clock the stream knows to `error`."""
+    clock = client.clock(room.room_id, local=pylsl.local_clock)
+    ahead, ahead_error = time_of_day()
+    header, *_ = list(client.record(room.game_id))
+    for marker, at in markers:
+        elapsed_ms = int(marker.get("elapsedMs", 0))
+        assert abs(at - clock.local(elapsed_ms)) <= error + clock.error + ROUNDING_S
+        recorded = (header.header.created_at_ms + elapsed_ms) / 1e3
+        allowed = error + ahead_error + 2 * ROUNDING_S
+        assert abs(at + ahead - recorded) <= max(allowed, CLOSE_S)
+
+
+def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str) -> None:
+    with chefshat.Client(real_address) as client, ThreadPoolExecutor(2) as threads:
+        room, tickets, _ = seated(client)
+        markers = lsl.MarkerStream(client, room.room_id)
+        stream = inlet(markers.source)
+        assert markers.wait_for_recorder(WAIT_S)
+        playing = threads.submit(client.play_many, {ticket: RandomAgent(seat) for seat, ticket in enumerate(tickets)})
+
+        def watch() -> None:
+            for event in client.watch(room.room_id):
+                markers.push(event)
+                markers.push(event)  # A repetition is not sent.
+
+        watching = threads.submit(watch)
+        sent = list(received(stream))
+        playing.result()
+        watching.result()
+        assert all(result.finished for result in playing.result().values())
+        recorded = [line.event for line in client.record(room.game_id) if line.HasField("event")]
+        assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in recorded]
+        camel = {name: field.json_name for name, field in pb.GameEvent.DESCRIPTOR.fields_by_name.items()}
+        for (marker, _), event in zip(sent, recorded, strict=True):
+            assert camel[str(event.WhichOneof("kind"))] in marker
+            assert int(marker.get("elapsedMs", 0)) == event.elapsed_ms
+            # A spectator sees no hands.
+            assert "hands" not in marker.get("shiftStarted", {})
+        check_times(client, room, sent, markers.clock.reading.error)
+        description = stream.info(timeout=WAIT_S).desc().child("game")
+        assert description.child_value("room_id") == room.room_id
+        assert description.child_value("game_id") == room.game_id
+        assert description.child_value("viewer") == "spectator"
+        markers.close()
+        with pytest.raises(ValueError, match="closed"):
+            markers.push(pb.GameEvent(sequence=1_000_000))
+
+
+def test_the_clock_is_read_again_and_keeps_the_better_reading(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("clock").room
+        with lsl.RoomClock(client, room.room_id, interval_s=0.01) as clock:
+            first = clock.reading
+            until = time.monotonic() + WAIT_S
+            while clock.readings < 10 and time.monotonic() < until:
+                time.sleep(0.01)
+            assert clock.readings >= 10
+            assert clock.reading.error <= first.error + lsl.DRIFT * WAIT_S
+            now = clock.reading
+            assert abs(now.local(0) - first.local(0)) <= now.error + first.error + lsl.DRIFT * WAIT_S
+
+
+def test_a_seat_sends_what_it_sees(real_address: str) -> None:
+    with chefshat.Client(real_address) as client, ThreadPoolExecutor(1) as threads:
+        room, tickets, _ = seated(client)
+        marked = lsl.MarkedAgent(RandomAgent(1), client, wait_s=WAIT_S)
+        agents = {tickets[0]: marked, **{ticket: RandomAgent(2) for ticket in tickets[1:]}}
+        playing = threads.submit(client.play_many, agents)
+        stream = inlet(f"chefshat {room.game_id} seat 0")
+        sent = list(received(stream))
+        assert all(result.finished for result in playing.result().values())
+        events = [line.event for line in client.record(room.game_id) if line.HasField("event")]
+        assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
+        (hands,) = [marker["shiftStarted"]["hands"] for marker, _ in sent if "shiftStarted" in marker]
+        assert [hand.get("seat", 0) for hand in hands] == [0]
+        clock = client.clock(room.room_id, local=pylsl.local_clock)
+        check_times(client, room, sent, max(clock.error, lsl.WANTED_ERROR_S))
+        marked.close()
+
+
+def test_the_command_sends_a_room_by_its_join_code(real_address: str, processes: list[Popen[str]], tmp_path: Path) -> None:
+    with chefshat.Client(real_address) as client:
+        room, tickets, code = seated(client)
+        command = [sys.executable, "-m", "chefshat.lsl", "--address", real_address, "--room", code, "--wait"]
+        process = Popen(command, text=True, stdout=PIPE, stderr=PIPE, cwd=tmp_path)
+        processes.append(process)
+        stream = inlet(f"chefshat {room.game_id} spectator")
+        playing = threading.Thread(target=client.play_many, args=({ticket: RandomAgent(3) for ticket in tickets},))
+        playing.start()
+        sent = [int(marker["sequence"]) for marker, _ in received(stream)]
+        playing.join()
+        stream.close_stream()
+        out, err = process.communicate(timeout=WAIT_S)
+        assert process.returncode == 0, err
+        assert out == ""
+        assert "the game is over" in err
+        assert sent == list(range(1, len(sent) + 1))

@@ -1,0 +1,32 @@
+// English texts of wizard/.
+
+export const wizard = {
+  title: "Console",
+  what: "You play a robot’s seat. Everyone else sees a robot until the game is over; the record says that a person played.",
+  lines: "Lines to say",
+  firstLines: [
+    "Hello!",
+    "Let me think.",
+    "Good move!",
+    "I pass this time.",
+    "That was close.",
+    "Well played, everyone.",
+  ],
+  edit: "Edit the lines",
+  editHint: (most: number) => `One line in each row, at most ${most}. They are kept on this device.`,
+  keep: "Keep",
+  expressions: "Expressions",
+  timing: "Timing",
+  noDecision: "No decision is open.",
+  wait: (seconds: number) => `Act in ${seconds} s`,
+  act: "Act now",
+  pace: "Thinking time, seconds",
+  paceHint: "From–to, for instance 2-6. A time is drawn for each decision.",
+  paceFault: "Enter two numbers up to 60, for instance 2-6.",
+  moves: "Legal moves",
+  suggest: "Ask the agent",
+  suggested: "suggested",
+  noHints: "This room gives no suggestions.",
+  asRobot: "Play as a robot",
+  asRobotHint: "Take a seat for robots: everyone else sees a robot. Only if the host has planned it.",
+};

@@ -1,0 +1,213 @@
+// Creating a study: from a file with all settings, or with a form for the common case.
+
+import { useState } from "preact/hooks";
+import { agentsFor, useOffered } from "../api/server";
+import type { StudySettings } from "../gen/chefshat/v1/study_pb";
+import { language, languages, t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import { CheckField, Field, SelectField, TextField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import { navigate } from "../router";
+import css from "./Own.module.css";
+import { createStudy } from "./owning";
+import { settingsFrom } from "./settings-file";
+import { type ConditionForm, emptyForm, faultsOf, type StudyForm, settingsOf } from "./study-form";
+
+/** The page. */
+export function NewStudyPage() {
+  return (
+    <div class={css.page}>
+      <h1>{t().studies.make.title}</h1>
+      <FromFile />
+      <FromForm />
+    </div>
+  );
+}
+
+/** An id for a request, so that one repeated after a lost answer creates no second study. */
+function newRequestId(): Uint8Array {
+  return crypto.getRandomValues(new Uint8Array(32));
+}
+
+function FromFile() {
+  const words = t().studies.make;
+  const [read, setRead] = useState<StudySettings | null>(null);
+  const [problem, setProblem] = useState("");
+  // Another file is another study.
+  const [requestId, setRequestId] = useState(newRequestId);
+  const { busy, fault, run, reset } = useAttempt();
+  const take = async (file: File | undefined) => {
+    setRead(null);
+    setProblem("");
+    reset();
+    if (!file) return;
+    setRequestId(newRequestId());
+    try {
+      setRead(await settingsFrom(await file.text(), file.name));
+    } catch (thrown) {
+      setProblem(words.unreadable(thrown instanceof Error ? thrown.message : String(thrown)));
+    }
+  };
+  const make = (settings: StudySettings) =>
+    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settings, requestId) }));
+  return (
+    <section class={`sheet ${css.part}`} data-part="study-file">
+      <h2>{words.fromFile}</h2>
+      <Field label={words.file} hint={words.fromFileText} fault={problem || undefined}>
+        {(joined) => (
+          <input
+            {...joined}
+            type="file"
+            accept=".json,.toml,application/json"
+            onChange={(event) => void take(event.currentTarget.files?.[0])}
+          />
+        )}
+      </Field>
+      {read && <p>{words.read(read.name, read.conditions.length, read.stages.length)}</p>}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      {read && (
+        <div>
+          <Button look="main" busy={busy} onClick={() => make(read)}>
+            {words.createFile}
+          </Button>
+        </div>
+      )}
+    </section>
+  );
+}
+
+const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
+const LANGUAGES: readonly StudyForm["language"][] = ["en", "it"];
+
+function FromForm() {
+  const words = t().studies.make;
+  const [form, setForm] = useState<StudyForm>(() => emptyForm(language.peek()));
+  const [tried, setTried] = useState(false);
+  const [requestId] = useState(newRequestId);
+  const { offered } = useOffered();
+  const { busy, fault, run } = useAttempt();
+  const agents = offered ? agentsFor(offered, false, "") : ["greedy", "random"];
+  const faults = tried ? faultsOf(form) : {};
+  const change = (changed: Partial<StudyForm>) => setForm({ ...form, ...changed });
+  const changeCondition = (index: number, changed: Partial<ConditionForm>) =>
+    change({ conditions: form.conditions.map((one, at) => (at === index ? { ...one, ...changed } : one)) });
+  const submit = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    if (Object.keys(faultsOf(form)).length > 0) return;
+    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settingsOf(form), requestId) }));
+  };
+  const text = (name: "name" | "title" | "version" | "external", label: string, hint?: string) => (
+    <TextField
+      label={label}
+      hint={hint}
+      value={form[name]}
+      onText={(typed) => change({ [name]: typed })}
+      fault={faults[name]}
+      autoComplete="off"
+    />
+  );
+  const number = (name: "participants" | "games" | "shifts", label: string) => (
+    <TextField
+      label={label}
+      type="number"
+      min={1}
+      value={form[name]}
+      onText={(typed) => change({ [name]: typed })}
+      fault={faults[name]}
+    />
+  );
+  const check = (name: "within" | "practice" | "godspeed" | "nasaTlx" | "traces", label: string) => (
+    <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
+  );
+  const long = (name: "consent" | "debriefing", label: string) => (
+    <Field label={label} fault={faults[name]}>
+      {(joined) => (
+        <textarea
+          {...joined}
+          rows={6}
+          value={form[name]}
+          onInput={(event) => change({ [name]: event.currentTarget.value })}
+        />
+      )}
+    </Field>
+  );
+  return (
+    <form class={`sheet ${css.part}`} onSubmit={submit} noValidate data-part="study-form">
+      <h2>{words.form}</h2>
+      <div class={css.fields}>
+        {text("name", words.name, words.nameHint)}
+        {text("title", words.studyTitle, words.titleHint)}
+        <SelectField
+          label={words.language}
+          value={form.language}
+          options={LANGUAGES.map((value) => ({ value, label: languages[value] }))}
+          onPick={(chosen) => change({ language: chosen })}
+        />
+        {number("participants", words.participants)}
+        {number("games", words.games)}
+        {number("shifts", words.shifts)}
+      </div>
+      <h3>{words.conditions}</h3>
+      <p class="soft small">{words.conditionsHint}</p>
+      {form.conditions.map((condition, index) => (
+        // Conditions are told apart by their place: their names are being typed.
+        <div key={index} class={css.fields} data-part="condition">
+          <TextField
+            label={words.conditionId}
+            value={condition.id}
+            onText={(id) => changeCondition(index, { id })}
+            fault={faults[`condition.${index}`]}
+            autoComplete="off"
+          />
+          <SelectField
+            label={words.opponents}
+            value={condition.agent}
+            options={agents.map((value) => ({ value, label: value }))}
+            onPick={(agent) => changeCondition(index, { agent })}
+          />
+          <SelectField
+            label={words.labels}
+            value={condition.labels}
+            options={LABELS.map((value) => ({ value, label: words.label[value] }))}
+            onPick={(labels) => changeCondition(index, { labels })}
+          />
+          {form.conditions.length > 1 && (
+            <Button
+              look="quiet"
+              onClick={() => change({ conditions: form.conditions.filter((_, at) => at !== index) })}
+            >
+              {words.removeCondition}
+              <span class="visually-hidden"> {condition.id}</span>
+            </Button>
+          )}
+        </div>
+      ))}
+      <div>
+        <Button
+          onClick={() =>
+            change({ conditions: [...form.conditions, { id: "", agent: agents[0] ?? "greedy", labels: "players" }] })
+          }
+        >
+          {words.addCondition}
+        </Button>
+      </div>
+      {check("within", words.within)}
+      {check("practice", words.practice)}
+      {long("consent", words.consent)}
+      <div class={css.fields}>{text("version", words.version)}</div>
+      {check("godspeed", words.godspeed)}
+      {check("nasaTlx", words.nasaTlx)}
+      {text("external", words.external, words.externalHint)}
+      {long("debriefing", words.debriefing)}
+      {check("traces", words.traces)}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <div>
+        <Button type="submit" look="main" busy={busy}>
+          {words.submit}
+        </Button>
+      </div>
+    </form>
+  );
+}

@@ -1,0 +1,410 @@
+// A study, for its researcher: progress, links, participants, data. Only devices with the owner
+// token show it.
+
+import { type Signal, signal } from "@preact/signals";
+import { useEffect, useState } from "preact/hooks";
+import { wordsOf } from "../api/faults";
+import { type Following, follow } from "../api/follow";
+import type { PageProps } from "../app";
+import { LinkList } from "../experiment/LinkList";
+import { participantsIn } from "../experiment/participants";
+import { type Study, type StudyLink, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+import { dateLocale, t } from "../i18n";
+import { CopyLine, QrCode } from "../lobby/Invite";
+import { MAX_NAME } from "../lobby/room-form";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import { ConfirmButton } from "../parts/ConfirmButton";
+import { download, fileName } from "../parts/download";
+import { Field, TextField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import { zipped } from "../parts/zip";
+import { byCondition, STATES, stateName } from "./board";
+import { studyApi } from "./client";
+import css from "./Own.module.css";
+import {
+  addParticipants,
+  addressOf,
+  closeStudy,
+  deleteDataOf,
+  exportStudy,
+  keepOwnerToken,
+  linksOf,
+  ownership,
+  ownerTokenOf,
+  removeFromStudy,
+} from "./owning";
+
+/** The page. */
+export function OwnStudyPage({ route: { studyId } }: PageProps<"ownStudy">) {
+  const [owned, setOwned] = useState(() => ownerTokenOf(studyId) !== null);
+  return owned ? <Owned studyId={studyId} /> : <Unlock studyId={studyId} onKey={() => setOwned(true)} />;
+}
+
+/** Takes the owner token of a study that another device created. */
+function Unlock({ studyId, onKey }: { studyId: string; onKey: () => void }) {
+  const words = t().studies.own;
+  const [key, setKey] = useState("");
+  const [tried, setTried] = useState(false);
+  const use = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    if (!/^[0-9a-f]{96}$/.test(key.trim())) return;
+    keepOwnerToken(studyId, key.trim());
+    onKey();
+  };
+  return (
+    <form class={`sheet ${css.part}`} onSubmit={use} noValidate>
+      <h1>{words.title}</h1>
+      <p>{words.notOwned}</p>
+      <TextField
+        label={words.key}
+        hint={words.keyHint}
+        value={key}
+        onText={setKey}
+        autoComplete="off"
+        fault={tried ? words.keyHint : undefined}
+      />
+      <div>
+        <Button type="submit">{words.useKey}</Button>
+      </div>
+    </form>
+  );
+}
+
+/** The study as the stream reports it. */
+export interface FollowedStudy {
+  readonly study: Study;
+  readonly participants: readonly StudyParticipant[];
+}
+
+function useStudy(studyId: string): { live: Signal<FollowedStudy | undefined>; following: Following } | undefined {
+  const [followed, setFollowed] = useState<{ live: Signal<FollowedStudy | undefined>; following: Following }>();
+  useEffect(() => {
+    const live = signal<FollowedStudy | undefined>(undefined);
+    const following = follow(
+      (abort) => studyApi.followStudy(ownership(studyId), { signal: abort }),
+      ({ study, participants }) => {
+        const now = live.peek();
+        const next = study ?? now?.study;
+        if (!next) return true;
+        const merged = new Map([...(now?.participants ?? []), ...participants].map((one) => [one.number, one]));
+        live.value = {
+          study: next,
+          participants: [...merged.values()].sort((one, other) => one.number - other.number),
+        };
+        return !(next.closed && next.active === 0);
+      },
+    );
+    setFollowed({ live, following });
+    return () => following.stop();
+  }, [studyId]);
+  return followed;
+}
+
+function Owned({ studyId }: { studyId: string }) {
+  const followed = useStudy(studyId);
+  const live = followed?.live.value;
+  const fault = followed?.following.link.value === "failed" && followed.following.fault.value;
+  if (fault) return <Notice kind="fault">{wordsOf(fault)}</Notice>;
+  return live ? <OwnStudy {...live} /> : <p class="soft">{t().common.loading}</p>;
+}
+
+/** The page of a study. */
+export function OwnStudy({ study, participants }: FollowedStudy) {
+  const words = t().studies.own;
+  const { studyId, settings, closed } = study;
+  return (
+    <div class={css.page} data-part="own-study">
+      <header class={css.head}>
+        <div>
+          <h1>{settings?.name}</h1>
+          <p class="soft">
+            {closed ? words.closed : words.open} · {words.counts(study.completed, settings?.participants ?? 0)}
+          </p>
+        </div>
+        <Export study={study} />
+      </header>
+      {closed && <Notice kind="hint">{words.isClosed}</Notice>}
+      <Counts study={study} participants={participants} />
+      {!closed && <Add studyId={studyId} />}
+      <Links key={participants.length} studyId={studyId} />
+      <Participants study={study} participants={participants} />
+      <details class={`sheet ${css.part}`}>
+        <summary>{words.showKey}</summary>
+        <CopyLine label={words.key} text={ownerTokenOf(studyId) ?? ""} mono />
+        <CopyLine label={words.seeds} text={hex(study.seedsSha256)} mono />
+      </details>
+      {!closed && (
+        <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeStudy(studyId).then(() => false)}>
+          {words.closeText}
+        </ConfirmButton>
+      )}
+    </div>
+  );
+}
+
+function hex(bytes: Uint8Array): string {
+  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+function Counts({ study, participants }: FollowedStudy) {
+  const words = t().studies.own;
+  const rows = byCondition(study, participants);
+  return (
+    <section class={`sheet ${css.part}`}>
+      <h2>{words.board.title}</h2>
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a region that scrolls must be reachable with the keyboard */}
+      <section class={css.scroll} tabIndex={0} aria-label={words.board.title}>
+        <table class={css.table} data-part="conditions">
+          <thead>
+            <tr>
+              <th scope="col">{words.board.condition}</th>
+              {STATES.map((state) => (
+                <th scope="col" key={state}>
+                  {words.state[stateName(state)]}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map(({ condition, counts }) => (
+              <tr key={condition ?? ""}>
+                <th scope="row">{condition ?? words.board.all}</th>
+                {counts.map((count, index) => (
+                  <td class="number" key={STATES[index]}>
+                    {count}
+                  </td>
+                ))}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+    </section>
+  );
+}
+
+const MAX_ADDED = 1000;
+
+function Add({ studyId }: { studyId: string }) {
+  const words = t().studies.own.add;
+  const [count, setCount] = useState("");
+  const [names, setNames] = useState("");
+  const [tried, setTried] = useState(false);
+  const { busy, fault, run } = useAttempt();
+  const pseudonyms = participantsIn(names);
+  const number = count.trim() === "" ? 0 : Number(count);
+  const fits = Number.isInteger(number) && number >= 0 && number <= MAX_ADDED;
+  const valid =
+    fits && number + pseudonyms.length > 0 && pseudonyms.every((name) => Array.from(name).length <= MAX_NAME);
+  const add = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    if (!valid) return;
+    run(async () => {
+      await addParticipants(studyId, number, pseudonyms);
+      setCount("");
+      setNames("");
+      setTried(false);
+      return false;
+    });
+  };
+  return (
+    <form class={`sheet ${css.part}`} onSubmit={add} noValidate data-part="add-participants">
+      <h2>{words.title}</h2>
+      <div class={css.fields}>
+        <TextField label={words.count} value={count} onText={setCount} type="number" min={1} max={MAX_ADDED} />
+        <Field label={words.names} hint={words.namesHint} fault={tried && !valid ? words.problem : undefined}>
+          {(joined) => (
+            <textarea {...joined} rows={2} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
+          )}
+        </Field>
+      </div>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <div>
+        <Button type="submit" busy={busy}>
+          {words.submit}
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+/** The links, requested when asked for: they let anybody take part. */
+function Links({ studyId }: { studyId: string }) {
+  const words = t().studies.own.links;
+  const [links, setLinks] = useState<StudyLink[] | null>(null);
+  const { busy, fault, run } = useAttempt();
+  const show = () =>
+    run(async () => {
+      setLinks(await linksOf(studyId));
+      return false;
+    });
+  return (
+    <section class={`sheet ${css.part} ${css.links}`} data-part="links">
+      <h2>{words.title}</h2>
+      <p class="soft">{words.text}</p>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      {links === null ? (
+        <div>
+          <Button busy={busy} onClick={show}>
+            {words.show}
+          </Button>
+        </div>
+      ) : (
+        <>
+          <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link), roomId: "" }))} />
+          <div>
+            <Button onClick={() => window.print()}>{words.print}</Button>
+          </div>
+          <ul class={css.slips}>
+            {links.map((link) => (
+              <li key={link.number}>
+                <b>{link.pseudonym}</b>
+                <QrCode text={addressOf(link)} label={words.of(link.pseudonym)} />
+                <span class="small">{addressOf(link)}</span>
+              </li>
+            ))}
+          </ul>
+        </>
+      )}
+    </section>
+  );
+}
+
+function Participants({ study, participants }: FollowedStudy) {
+  const words = t().studies.own.board;
+  if (participants.length === 0) return null;
+  return (
+    <section class={`sheet ${css.part}`}>
+      <h2>{words.participants}</h2>
+      <section class={css.scroll} aria-label={words.participants}>
+        <table class={css.table} data-part="participants">
+          <thead>
+            <tr>
+              {[words.number, words.pseudonym, words.conditions, words.stateColumn, words.stage, words.seen].map(
+                (title) => (
+                  <th scope="col" key={title}>
+                    {title}
+                  </th>
+                ),
+              )}
+              <th scope="col">
+                <span class="visually-hidden">{words.change}</span>
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {participants.map((participant) => (
+              <Row key={participant.number} study={study} participant={participant} />
+            ))}
+          </tbody>
+        </table>
+      </section>
+    </section>
+  );
+}
+
+const LEFT = [
+  StudyParticipantState.WITHDRAWN,
+  StudyParticipantState.DROPPED_OUT,
+  StudyParticipantState.REMOVED,
+  StudyParticipantState.COMPLETED,
+];
+
+function Row({ study, participant }: { study: Study; participant: StudyParticipant }) {
+  const words = t().studies.own;
+  const { number, pseudonym, state, step, sessions, connected, conditions, dataDeleted } = participant;
+  const name = pseudonym || `${words.board.number} ${number}`;
+  const over = LEFT.includes(state);
+  const running = participant.games.find(({ joinCode }) => joinCode !== "");
+  const act = (call: Promise<void>) => call.then(() => false);
+  return (
+    <tr>
+      <td class="number">{number}</td>
+      <th scope="row">{dataDeleted ? <span class="soft">{words.board.deleted}</span> : pseudonym}</th>
+      <td>{conditions.join(", ")}</td>
+      <td>{words.state[stateName(state)]}</td>
+      <td class="number">
+        {Math.min(step, study.steps)}/{study.steps}
+      </td>
+      <td>
+        {!over && sessions > 0 && <span>{connected ? words.board.connected : words.board.away} · </span>}
+        <span class="soft small">{seenWords(participant)}</span>
+        {running && <span class="small"> {words.board.joinCode(running.joinCode)}</span>}
+      </td>
+      <td>
+        {!dataDeleted && (
+          <details>
+            <summary>
+              {words.board.change}
+              <span class="visually-hidden"> {name}</span>
+            </summary>
+            <div class={css.changes}>
+              {!over && (
+                <>
+                  <ConfirmButton
+                    label={words.remove}
+                    confirm={words.removeDo}
+                    subject={name}
+                    act={() => act(removeFromStudy(study.studyId, number, false))}
+                  >
+                    {words.removeText(name)}
+                  </ConfirmButton>
+                  <ConfirmButton
+                    label={words.replace}
+                    confirm={words.replaceDo}
+                    subject={name}
+                    act={() => act(removeFromStudy(study.studyId, number, true))}
+                  >
+                    {words.replaceText(name)}
+                  </ConfirmButton>
+                </>
+              )}
+              <ConfirmButton
+                label={words.deleteData}
+                confirm={words.deleteDo}
+                subject={name}
+                act={() => act(deleteDataOf(study.studyId, number))}
+              >
+                {words.deleteText(name)}
+              </ConfirmButton>
+            </div>
+          </details>
+        )}
+      </td>
+    </tr>
+  );
+}
+
+function seenWords({ beganAtMs, endedAtMs, sessions }: StudyParticipant): string {
+  const words = t().studies.own.board;
+  const moment = (ms: bigint) =>
+    new Intl.DateTimeFormat(dateLocale(), { dateStyle: "short", timeStyle: "short" }).format(Number(ms));
+  if (endedAtMs > 0n) return words.ended(moment(endedAtMs));
+  if (beganAtMs > 0n) return `${words.began(moment(beganAtMs))} · ${words.sessions(sessions)}`;
+  return "";
+}
+
+function Export({ study }: { study: Study }) {
+  const words = t().studies.own;
+  const [files, setFiles] = useState(0);
+  const { busy, fault, run } = useAttempt();
+  const save = () =>
+    run(async () => {
+      setFiles(0);
+      const archive = zipped(await exportStudy(study.studyId, setFiles));
+      download(archive, `${fileName(study.settings?.name ?? "study")}.zip`, "application/zip");
+      return false;
+    });
+  return (
+    <div class={css.export}>
+      <Button busy={busy} onClick={save}>
+        {words.export}
+      </Button>
+      {busy && <span class="soft small">{words.exporting(files)}</span>}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </div>
+  );
+}

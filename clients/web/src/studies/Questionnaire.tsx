@@ -1,0 +1,306 @@
+// A questionnaire of a study. Every item is a native group of radio buttons, a slider, check boxes
+// or a text field, so that keyboard and screen reader work as everywhere. No item has a value
+// before the participant gives it one.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { StudyShownItem, StudyShownQuestionnaire, StudySlider } from "../gen/chefshat/v1/study_pb";
+import { t } from "../i18n";
+import { announce } from "../parts/Announcer";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import { answersOf, type Draft, dropDraft, keepDraft, keptDraft, missingItems, type Value } from "./answers";
+import type { ItemAnswer } from "./participating";
+import css from "./Questionnaire.module.css";
+import { Paragraphs, StageTitle } from "./Stage";
+
+interface QuestionnaireProps {
+  /** The secret of the link, and the step: whose answers these are. */
+  link: string;
+  step: number;
+  questionnaire: StudyShownQuestionnaire;
+  onAnswer: (answers: ItemAnswer[]) => Promise<void>;
+}
+
+/** The form. */
+export function Questionnaire({ link, step, questionnaire, onAnswer }: QuestionnaireProps) {
+  const { title, instructions, items } = questionnaire;
+  const words = t().studies.questionnaire;
+  const [draft, setDraft] = useState<Draft>(() => keptDraft(link, step));
+  const [tried, setTried] = useState(false);
+  const { busy, fault, run } = useAttempt();
+  const sinceMs = useRef(performance.now());
+  const form = useRef<HTMLFormElement>(null);
+  const missing = tried ? missingItems(items, draft) : [];
+
+  const enter = (item: number, value: Value) => {
+    const next = { ...draft, [item]: { value, afterMs: performance.now() - sinceMs.current } };
+    setDraft(next);
+    keepDraft(link, step, next);
+  };
+  const submit = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    const left = missingItems(items, draft);
+    if (left.length > 0) {
+      announce(words.missing(left.length));
+      form.current?.querySelector<HTMLElement>(`[data-item="${left[0]}"] :is(input, textarea)`)?.focus();
+      return;
+    }
+    run(async () => {
+      await onAnswer(answersOf(items, draft));
+      dropDraft();
+      return false;
+    });
+  };
+  return (
+    <form class={css.form} ref={form} onSubmit={submit} noValidate data-part="questionnaire">
+      <StageTitle>{title || words.title}</StageTitle>
+      {instructions && <Paragraphs text={instructions} />}
+      {items.map((item) => (
+        <Item
+          key={item.item}
+          item={item}
+          value={draft[item.item]?.value}
+          missing={missing.includes(item.item)}
+          onEnter={(value) => enter(item.item, value)}
+        />
+      ))}
+      {missing.length > 0 && <Notice kind="fault">{words.missing(missing.length)}</Notice>}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <div>
+        <Button type="submit" look="main" busy={busy}>
+          {words.submit}
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+interface ItemProps {
+  item: StudyShownItem;
+  value: Value | undefined;
+  missing: boolean;
+  onEnter: (value: Value) => void;
+}
+
+function Item({ item, value, missing, onEnter }: ItemProps) {
+  const words = t().studies.questionnaire;
+  const { kind } = item;
+  const id = `item-${item.item}`;
+  const question =
+    item.text || (kind.case === "semanticDifferential" ? `${kind.value.left} – ${kind.value.right}` : "");
+  return (
+    <fieldset
+      class={css.item}
+      data-part="item"
+      data-item={item.item}
+      data-missing={missing || undefined}
+      aria-describedby={missing ? `${id}-fault` : undefined}
+    >
+      <legend class={item.text ? "" : "visually-hidden"}>
+        {question}
+        {item.optional && <span class="soft small"> {words.optional}</span>}
+      </legend>
+      {kind.case === "likert" && (
+        <Points id={id} points={kind.value.points} labels={kind.value.labels} {...{ value, missing, onEnter }} />
+      )}
+      {kind.case === "semanticDifferential" && (
+        <Points
+          id={id}
+          points={kind.value.points}
+          labels={[kind.value.left, kind.value.right]}
+          beside
+          {...{ value, missing, onEnter }}
+        />
+      )}
+      {kind.case === "slider" && (
+        <Slider
+          label={question}
+          slider={kind.value}
+          value={typeof value === "number" ? value : undefined}
+          onEnter={onEnter}
+        />
+      )}
+      {kind.case === "choice" && (
+        <Choice id={id} options={kind.value.options} multiple={kind.value.multiple} {...{ value, onEnter }} />
+      )}
+      {kind.case === "freeText" && (
+        <FreeText
+          label={question}
+          max={kind.value.maxCharacters}
+          value={typeof value === "string" ? value : ""}
+          onEnter={onEnter}
+        />
+      )}
+      {missing && (
+        <p id={`${id}-fault`} class={css.fault}>
+          {words.answerThis}
+        </p>
+      )}
+    </fieldset>
+  );
+}
+
+interface PointsProps extends Pick<ItemProps, "value" | "missing" | "onEnter"> {
+  id: string;
+  points: number;
+  /** Of the first and last point, or of all. */
+  labels: readonly string[];
+  /** The labels stand before and after the points. */
+  beside?: boolean;
+}
+
+/** One of several points. */
+function Points({ id, points, labels, beside = false, value, onEnter }: PointsProps) {
+  const words = t().studies.questionnaire;
+  const all = labels.length === points && points > 2;
+  const labelOf = (point: number) =>
+    all ? labels[point - 1] : point === 1 ? labels[0] : point === points ? labels[labels.length - 1] : "";
+  return (
+    <div class={`${css.scale} ${all ? css.labelled : ""}`} data-beside={beside || undefined}>
+      {!all && (
+        <span class={css.end} aria-hidden="true">
+          {labels[0]}
+        </span>
+      )}
+      <div class={css.points} style={{ "--points": points }}>
+        {Array.from({ length: points }, (_, index) => index + 1).map((point) => (
+          <label key={point} class={css.point}>
+            <input
+              type="radio"
+              name={id}
+              value={point}
+              checked={value === point}
+              aria-label={words.point(point, points, labelOf(point) ?? "")}
+              onChange={() => onEnter(point)}
+            />
+            <span aria-hidden="true">{all ? labelOf(point) : point}</span>
+          </label>
+        ))}
+      </div>
+      {!all && (
+        <span class={`${css.end} ${css.last}`} aria-hidden="true">
+          {labels[labels.length - 1]}
+        </span>
+      )}
+    </div>
+  );
+}
+
+interface SliderProps {
+  label: string;
+  slider: StudySlider;
+  value: number | undefined;
+  onEnter: (value: number) => void;
+}
+
+/** Keys that give a slider the value at which it stands. */
+const TAKES = ["Enter", " "];
+
+/** A slider without a handle until it is moved. */
+function Slider({ label, slider: { min, max, step, left, right }, value, onEnter }: SliderProps) {
+  const words = t().studies.questionnaire;
+  // Where the first move with a key starts from.
+  const middle = min + Math.round((max - min) / 2 / step) * step;
+  const take = (event: { currentTarget: HTMLInputElement }) => onEnter(Number(event.currentTarget.value));
+  return (
+    <div class={css.slider}>
+      <input
+        type="range"
+        aria-label={label}
+        aria-valuetext={value === undefined ? words.unset : words.onScale(value, min, max)}
+        min={min}
+        max={max}
+        step={step}
+        value={value ?? middle}
+        data-unset={value === undefined || undefined}
+        onInput={take}
+        onClick={take}
+        onKeyDown={(event) => {
+          if (!TAKES.includes(event.key)) return;
+          event.preventDefault();
+          take(event);
+        }}
+      />
+      <div class={css.ends}>
+        <span>{left}</span>
+        <span class={css.state} aria-hidden="true">
+          {value === undefined ? words.unset : "✓"}
+        </span>
+        <span>{right}</span>
+      </div>
+    </div>
+  );
+}
+
+interface ChoiceProps extends Pick<ItemProps, "value" | "onEnter"> {
+  id: string;
+  options: readonly string[];
+  multiple: boolean;
+}
+
+function Choice({ id, options, multiple, value, onEnter }: ChoiceProps) {
+  const chosen: readonly number[] = Array.isArray(value) ? value : [];
+  const choose = (index: number) => {
+    if (!multiple) return onEnter([index]);
+    onEnter(chosen.includes(index) ? chosen.filter((other) => other !== index) : [...chosen, index]);
+  };
+  return (
+    <div class={css.options}>
+      {options.map((option, index) => (
+        <label key={option} class={css.option}>
+          <input
+            type={multiple ? "checkbox" : "radio"}
+            name={id}
+            checked={chosen.includes(index)}
+            onChange={() => choose(index)}
+          />
+          <span>{option}</span>
+        </label>
+      ))}
+    </div>
+  );
+}
+
+interface FreeTextProps {
+  label: string;
+  max: number;
+  value: string;
+  onEnter: (value: string) => void;
+}
+
+/** Characters left from which the number is shown. */
+const FEW_LEFT = 100;
+
+function FreeText({ label, max, value, onEnter }: FreeTextProps) {
+  const words = t().studies.questionnaire;
+  const left = max - value.length;
+  // The number is read out when typing pauses, not with every letter.
+  const [said, setSaid] = useState("");
+  useEffect(() => {
+    if (left > FEW_LEFT) return;
+    const timer = setTimeout(() => setSaid(words.left(left)), 1000);
+    return () => clearTimeout(timer);
+  }, [left]);
+  return (
+    <>
+      <textarea
+        class={css.text}
+        aria-label={label}
+        rows={4}
+        maxLength={max}
+        value={value}
+        onInput={(event) => onEnter(event.currentTarget.value)}
+      />
+      {left <= FEW_LEFT && (
+        <p class="soft small" aria-hidden="true">
+          {words.left(left)}
+        </p>
+      )}
+      <span class="visually-hidden" role="status">
+        {said}
+      </span>
+    </>
+  );
+}

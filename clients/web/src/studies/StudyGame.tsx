@@ -1,0 +1,190 @@
+// A game of a study: the table from the participant's seat, without what the study hides.
+
+import { type Signal, signal } from "@preact/signals";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { type Fault, faultOf, isPassing, wordsOf } from "../api/faults";
+import { type Hideable, leaveOut } from "../experiment/hiding";
+import { StudyHide, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
+import { t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import { tableFromRoom } from "../table/model/state";
+import { Seated } from "../table/Seated";
+import { type Session, startSession } from "../table/session";
+import type { Participating } from "./participating";
+import { StageTitle } from "./Stage";
+import { startTracing, type Tracing } from "./tracing";
+
+interface StudyGameProps {
+  game: StudyShownGame;
+  /** Title of the study, in place of the room's name. */
+  title: string;
+  traces: boolean;
+  part: Participating;
+}
+
+const HIDEABLE: Partial<Record<StudyHide, Hideable>> = {
+  [StudyHide.LOG]: "log",
+  [StudyHide.LOOKUP]: "lookup",
+  [StudyHide.EXPRESSIONS]: "expressions",
+  [StudyHide.PLAYED]: "played",
+};
+
+/** The stage of a game. */
+export function StudyGame({ game, title, traces, part }: StudyGameProps) {
+  const words = t().studies.game;
+  const [table, setTable] = useState<StudyTable | undefined>(undefined);
+  useEffect(() => {
+    if (game.ticket === "") return setTable(undefined);
+    const started = startStudyTable(game, title);
+    setTable(started);
+    return () => started.stop();
+  }, [game.ticket]);
+  const hide = game.hide.flatMap((one) => HIDEABLE[one] ?? []).join(" ");
+  useLayoutEffect(() => leaveOut((hide === "" ? [] : hide.split(" ")) as Hideable[]), [hide]);
+  const session = table?.session.value;
+  const fault = table?.fault.value;
+  const label = game.practice ? words.practice : game.games > 1 ? words.gameOf(game.game, game.games) : words.game;
+  if (!session) {
+    return (
+      <section class="sheet stack" data-part="study-game">
+        <StageTitle>{label}</StageTitle>
+        {game.ended ? (
+          <Onward part={part} />
+        ) : fault ? (
+          <Notice kind="fault">{wordsOf(fault)}</Notice>
+        ) : (
+          <p class="soft">{words.preparing}</p>
+        )}
+      </section>
+    );
+  }
+  return <Table {...{ session, part, label, game }} send={traces} />;
+}
+
+interface TableProps {
+  session: Session;
+  part: Participating;
+  label: string;
+  game: StudyShownGame;
+  send: boolean;
+}
+
+function Table({ session, part, label, game, send }: TableProps) {
+  const words = t().studies.game;
+  const whole = useRef<HTMLDivElement>(null);
+  const tracing = useRef<Tracing | undefined>(undefined);
+  useEffect(() => {
+    if (!send || !whole.current) return;
+    const started = startTracing(whole.current, session.live, (traces) => part.sendTraces(game.gameId, traces));
+    tracing.current = started;
+    return () => {
+      tracing.current = undefined;
+      started.stop();
+    };
+  }, [session, send]);
+  const { attachment, substituted, table } = session.live.value;
+  const { link } = session.following.value;
+  const over = table.phase === "gameOver" || table.phase === "aborted";
+  const acting: Session = {
+    ...session,
+    answer: (action, automatic) => {
+      tracing.current?.answered(action);
+      session.answer(action, automatic);
+    },
+  };
+  const banner = (
+    <>
+      <p class="soft small">{label}</p>
+      {!over && link.value === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
+      {attachment.kind === "refused" && !game.ended && (
+        <Notice kind="fault">
+          {t().table.link.refused} {attachment.message}
+        </Notice>
+      )}
+      {attachment.kind === "superseded" && !over && (
+        <Notice kind="hint">
+          {t().table.link.superseded} <Button onClick={session.takeBack}>{t().table.link.takeBack}</Button>
+        </Notice>
+      )}
+      {substituted && !over && (
+        <Notice kind="hint">
+          {t().table.link.substituted}{" "}
+          <Button look="main" onClick={session.resume}>
+            {t().table.link.resume}
+          </Button>
+        </Notice>
+      )}
+      {over && !game.ended && <Notice kind="hint">{words.ending}</Notice>}
+      {game.ended && (
+        <Notice kind="good">
+          <Onward part={part} />
+        </Notice>
+      )}
+    </>
+  );
+  return (
+    <div ref={whole} data-part="study-game">
+      <Seated acting={acting} study banner={banner} onPick={(card, picked) => tracing.current?.pick(card, picked)} />
+    </div>
+  );
+}
+
+/** The game is over: continues with the study. */
+function Onward({ part }: { part: Participating }) {
+  const words = t().studies;
+  const { busy, fault, run } = useAttempt();
+  return (
+    <>
+      {words.game.over}{" "}
+      <Button look="main" busy={busy} onClick={() => run(() => part.proceed().then(() => false))}>
+        {words.next}
+      </Button>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </>
+  );
+}
+
+interface StudyTable {
+  readonly session: Signal<Session | undefined>;
+  readonly fault: Signal<Fault | undefined>;
+  stop(): void;
+}
+
+const RETRY_MS = 1_000;
+
+/** Requests the room, which only those who have its ticket see, and attaches to the seat. */
+function startStudyTable({ roomId, ticket }: StudyShownGame, title: string): StudyTable {
+  const session = signal<Session | undefined>(undefined);
+  const fault = signal<Fault | undefined>(undefined);
+  let stopped = false;
+  const load = async () => {
+    while (!stopped) {
+      try {
+        const call = { timeoutMs: CALL_LIMIT_MS, headers: { "chefshat-secret": ticket } };
+        const { room } = await roomApi.getRoom({ roomId }, call);
+        if (stopped || !room) return;
+        session.value = startSession({ ticket }, { ...tableFromRoom(room), roomName: title }, true);
+        return;
+      } catch (thrown) {
+        const found = faultOf(thrown);
+        if (!isPassing(found)) {
+          fault.value = found;
+          return;
+        }
+        await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+      }
+    }
+  };
+  void load();
+  return {
+    session,
+    fault,
+    stop: () => {
+      stopped = true;
+      session.peek()?.stop();
+    },
+  };
+}

@@ -1,0 +1,283 @@
+// A study, for a participant: one stage after the other, as the server says. Withdrawing is possible
+// on every screen. The page knows nothing about conditions.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { wordsOf } from "../api/faults";
+import type { PageProps } from "../app";
+import { leaveOut } from "../experiment/hiding";
+import { hostOf, questionnaire as safeAddress } from "../experiment/study";
+import {
+  type StudyConsent,
+  StudyEndReason,
+  type StudyExternalQuestionnaire,
+  type StudyText,
+  type StudyView,
+} from "../gen/chefshat/v1/study_pb";
+import { showLanguage, t } from "../i18n";
+import { announce } from "../parts/Announcer";
+import { useAttempt } from "../parts/attempt";
+import { Button } from "../parts/Button";
+import buttonCss from "../parts/Button.module.css";
+import { ConfirmButton } from "../parts/ConfirmButton";
+import { CheckField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import { dropDraft } from "./answers";
+import { type Participating, startParticipating } from "./participating";
+import { Questionnaire } from "./Questionnaire";
+import { Paragraphs, StageTitle } from "./Stage";
+import css from "./Study.module.css";
+import { StudyGame } from "./StudyGame";
+
+/** The page. */
+export function StudyPage({ route }: PageProps<"study">) {
+  const [part, setPart] = useState<Participating | undefined>(undefined);
+  useEffect(() => {
+    const started = startParticipating(route.link);
+    setPart(started);
+    return () => started.stop();
+  }, [route.link]);
+  // Other pages of the server are not part of the study.
+  useLayoutEffect(() => leaveOut(["pages"]), []);
+  return part ? <Taking link={route.link} part={part} /> : null;
+}
+
+/** The study as it stands. */
+export function Taking({ link, part }: { link: string; part: Participating }) {
+  const words = t().studies;
+  const view = part.view.value;
+  const presence = part.presence.value;
+  useEffect(() => {
+    if (view) void showLanguage(view.language);
+  }, [view?.language]);
+  if (presence === "superseded") {
+    return (
+      <section class={`sheet ${css.stage}`} data-part="study-elsewhere">
+        <h1>{words.elsewhere.title}</h1>
+        <Notice kind="hint">{words.elsewhere.text}</Notice>
+        <div>
+          <Button look="main" onClick={part.open}>
+            {words.elsewhere.here}
+          </Button>
+        </div>
+      </section>
+    );
+  }
+  if (presence === "failed" && part.fault.value) {
+    return (
+      <section class={`sheet ${css.stage}`}>
+        <h1>{words.title}</h1>
+        <Notice kind="fault">{wordsOf(part.fault.value)}</Notice>
+      </section>
+    );
+  }
+  if (!view) {
+    return (
+      <section class={`sheet ${css.stage}`}>
+        <h1>{words.title}</h1>
+        {part.link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : <p>{t().common.loading}</p>}
+      </section>
+    );
+  }
+  return (
+    <div class={css.study} data-part="study">
+      {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
+      <Progress view={view} />
+      <Stage key={stageKey(view)} {...{ view, link, part }} />
+      <Withdraw view={view} part={part} />
+    </div>
+  );
+}
+
+/** A stage is rendered anew at each step; a game that is repeated, too. */
+function stageKey({ step, content }: StudyView): string {
+  return content.case === "game" ? `${step} ${content.value.ticket}` : `${step} ${content.case}`;
+}
+
+function Progress({ view: { title, step, steps, content } }: { view: StudyView }) {
+  const words = t().studies;
+  const over = content.case === "end";
+  const said = words.progress(Math.min(step + 1, steps), steps);
+  const first = useRef(true);
+  useEffect(() => {
+    if (!first.current && !over) announce(said);
+    first.current = false;
+  }, [step]);
+  return (
+    <header class={css.head}>
+      <span class={css.title}>{title}</span>
+      {!over && (
+        <>
+          <span class="soft small">{said}</span>
+          <progress max={steps} value={step} aria-label={said} />
+        </>
+      )}
+    </header>
+  );
+}
+
+interface StageProps {
+  view: StudyView;
+  link: string;
+  part: Participating;
+}
+
+function Stage({ view, link, part }: StageProps) {
+  const { content, step, title, traces, pseudonym } = view;
+  switch (content.case) {
+    case "consent":
+      return <Consent consent={content.value} part={part} />;
+    case "questionnaire":
+      return (
+        <section class={`sheet ${css.stage}`}>
+          <Questionnaire link={link} step={step} questionnaire={content.value} onAnswer={part.answer} />
+        </section>
+      );
+    case "externalQuestionnaire":
+      return <External external={content.value} part={part} />;
+    case "text":
+      return <Text text={content.value} part={part} />;
+    case "game":
+      return <StudyGame game={content.value} {...{ title, traces, part }} />;
+    case "end":
+      return <End reason={content.value.reason} pseudonym={pseudonym} />;
+    default:
+      return <p class="soft">{t().common.loading}</p>;
+  }
+}
+
+function Consent({ consent, part }: { consent: StudyConsent; part: Participating }) {
+  const words = t().studies.consent;
+  const [agreed, setAgreed] = useState(false);
+  const [tried, setTried] = useState(false);
+  const { busy, fault, run } = useAttempt();
+  const submit = (event: Event) => {
+    event.preventDefault();
+    setTried(true);
+    if (agreed) run(() => part.consent().then(() => false));
+  };
+  return (
+    <form class={`sheet ${css.stage}`} onSubmit={submit} noValidate data-part="consent">
+      <StageTitle>{words.title}</StageTitle>
+      <section class={css.consent} aria-label={words.textLabel}>
+        <Paragraphs text={consent.text} />
+      </section>
+      <p class="soft small">{words.version(consent.version)}</p>
+      <CheckField
+        label={words.agree}
+        checked={agreed}
+        onCheck={setAgreed}
+        fault={tried && !agreed ? words.must : undefined}
+      />
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <div>
+        <Button type="submit" look="main" busy={busy}>
+          {words.submit}
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+function Text({ text, part }: { text: StudyText; part: Participating }) {
+  return (
+    <section class={`sheet ${css.stage}`} data-part="study-text">
+      <StageTitle>{text.title || t().studies.title}</StageTitle>
+      <Paragraphs text={text.text} />
+      <Next part={part}>{t().studies.next}</Next>
+    </section>
+  );
+}
+
+function External({ external, part }: { external: StudyExternalQuestionnaire; part: Participating }) {
+  const words = t().studies.external;
+  const address = safeAddress(external.url);
+  const [opened, setOpened] = useState(false);
+  return (
+    <section class={`sheet ${css.stage}`} data-part="study-external">
+      <StageTitle>{words.title}</StageTitle>
+      {external.text && <Paragraphs text={external.text} />}
+      {address && (
+        <>
+          <p>{words.text(hostOf(address))}</p>
+          <p>
+            <a
+              class={buttonCss.button}
+              data-look={opened ? "plain" : "main"}
+              data-part="button"
+              href={address}
+              target="_blank"
+              rel="noopener noreferrer external"
+              onClick={() => setOpened(true)}
+            >
+              {words.open}
+            </a>
+          </p>
+        </>
+      )}
+      <Next part={part}>{words.done}</Next>
+    </section>
+  );
+}
+
+function Next({ part, children }: { part: Participating; children: ComponentChildren }) {
+  const { busy, fault, run } = useAttempt();
+  return (
+    <>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <div>
+        <Button look="main" busy={busy} onClick={() => run(() => part.proceed().then(() => false))}>
+          {children}
+        </Button>
+      </div>
+    </>
+  );
+}
+
+const ENDS: Partial<Record<StudyEndReason, keyof ReturnType<typeof t>["studies"]["end"]["texts"]>> = {
+  [StudyEndReason.COMPLETED]: "completed",
+  [StudyEndReason.WITHDRAWN]: "withdrawn",
+  [StudyEndReason.DATA_DELETED]: "deleted",
+  [StudyEndReason.DROPPED_OUT]: "droppedOut",
+  [StudyEndReason.REMOVED]: "removed",
+};
+
+function End({ reason, pseudonym }: { reason: StudyEndReason; pseudonym: string }) {
+  const words = t().studies.end;
+  const which = ENDS[reason] ?? "completed";
+  return (
+    <section class={`sheet ${css.stage}`} data-part="study-end">
+      <StageTitle>{reason === StudyEndReason.COMPLETED ? words.thanks : words.title}</StageTitle>
+      <p>{words.texts[which]}</p>
+      {pseudonym && <p class="soft">{words.pseudonym(pseudonym)}</p>}
+      <p>{words.close}</p>
+    </section>
+  );
+}
+
+/** Withdraws; after the end it can still delete the data. */
+function Withdraw({ view, part }: { view: StudyView; part: Participating }) {
+  const words = t().studies.withdraw;
+  const [deleting, setDeleting] = useState(false);
+  const end = view.content.case === "end" ? view.content.value.reason : undefined;
+  if (end === StudyEndReason.DATA_DELETED) return null;
+  const withdraw = async (deleteData: boolean) => {
+    await part.withdraw(deleteData);
+    dropDraft();
+    return false;
+  };
+  return (
+    <footer class={css.withdraw} data-part="withdraw">
+      {end === undefined ? (
+        <ConfirmButton key="withdraw" label={words.button} confirm={words.confirm} act={() => withdraw(deleting)}>
+          {words.text}
+          <CheckField label={words.deleteToo} hint={words.deleteHint} checked={deleting} onCheck={setDeleting} />
+        </ConfirmButton>
+      ) : (
+        <ConfirmButton key="delete" label={words.deleteButton} confirm={words.deleteConfirm} act={() => withdraw(true)}>
+          {words.deleteText}
+        </ConfirmButton>
+      )}
+    </footer>
+  );
+}

@@ -1,0 +1,47 @@
+// The numbers on the progress board of a study.
+
+import { type Study, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+
+/** The states in the order of the columns. */
+export const STATES = [
+  StudyParticipantState.INVITED,
+  StudyParticipantState.ACTIVE,
+  StudyParticipantState.COMPLETED,
+  StudyParticipantState.WITHDRAWN,
+  StudyParticipantState.DROPPED_OUT,
+  StudyParticipantState.REMOVED,
+] as const;
+
+/** A state's name in the texts. */
+export function stateName(state: StudyParticipantState) {
+  switch (state) {
+    case StudyParticipantState.ACTIVE:
+      return "active";
+    case StudyParticipantState.COMPLETED:
+      return "completed";
+    case StudyParticipantState.WITHDRAWN:
+      return "withdrawn";
+    case StudyParticipantState.DROPPED_OUT:
+      return "droppedOut";
+    case StudyParticipantState.REMOVED:
+      return "removed";
+    default:
+      return "invited";
+  }
+}
+
+/** The participants in each state: of each condition, and last of all (`condition` undefined). */
+export function byCondition(
+  study: Study,
+  participants: readonly StudyParticipant[],
+): { condition: string | undefined; counts: number[] }[] {
+  const count = (some: readonly StudyParticipant[]) =>
+    STATES.map((state) => some.filter((participant) => participant.state === state).length);
+  const rows: { condition: string | undefined; counts: number[] }[] = (study.settings?.conditions ?? []).map(
+    ({ id }) => ({
+      condition: id,
+      counts: count(participants.filter(({ conditions }) => conditions.includes(id))),
+    }),
+  );
+  return [...rows, { condition: undefined, counts: count(participants) }];
+}

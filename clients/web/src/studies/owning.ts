@@ -1,0 +1,91 @@
+// Studies of researchers: the owner tokens that this device stores, and calls with them.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { CALL_LIMIT_MS } from "../api/client";
+import type { Study, StudyLink, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
+import { pathOf } from "../router";
+import { recallObject, remember, remembered } from "../store";
+import { studyApi } from "./client";
+
+const STORED = "own-study.";
+/** Most tokens of a call. */
+const MAX_TOKENS = 100;
+
+/** The owner token of a study, if this device has it. */
+export function ownerTokenOf(studyId: string): string | null {
+  return recallObject(STORED + studyId, ({ ownerToken }) => (typeof ownerToken === "string" ? ownerToken : null));
+}
+
+/** Stores the owner token of a study. */
+export function keepOwnerToken(studyId: string, ownerToken: string): void {
+  remember(STORED + studyId, JSON.stringify({ ownerToken }));
+}
+
+/** The studies whose owner tokens this device has, newest first. */
+export async function ownStudies(signal: AbortSignal): Promise<Study[]> {
+  const ids = [...remembered().keys()].flatMap((key) => (key.startsWith(STORED) ? key.slice(STORED.length) : []));
+  const ownerTokens = ids.flatMap((id) => ownerTokenOf(id) ?? []).slice(0, MAX_TOKENS);
+  return (await studyApi.listStudies({ ownerTokens }, { signal, timeoutMs: CALL_LIMIT_MS })).studies;
+}
+
+/** Creates a study and stores its owner token; returns its id. */
+export async function createStudy(
+  settings: MessageInitShape<typeof StudySettingsSchema>,
+  requestId: Uint8Array,
+): Promise<string> {
+  const { study, ownerToken } = await studyApi.createStudy({ settings, requestId }, call);
+  if (!study) throw new Error("the server did not say which study it is");
+  keepOwnerToken(study.studyId, ownerToken);
+  return study.studyId;
+}
+
+const call = { timeoutMs: CALL_LIMIT_MS };
+
+/** Adds participants by their codes, or as many as `count` with codes of the server. */
+export async function addParticipants(studyId: string, count: number, pseudonyms: string[]): Promise<StudyLink[]> {
+  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms }, call)).links;
+}
+
+export async function linksOf(studyId: string): Promise<StudyLink[]> {
+  return (await studyApi.listStudyLinks(ownership(studyId), call)).links;
+}
+
+export async function removeFromStudy(studyId: string, number: number, replace: boolean): Promise<void> {
+  await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace }, call);
+}
+
+export async function deleteDataOf(studyId: string, number: number): Promise<void> {
+  await studyApi.deleteStudyParticipant({ ...ownership(studyId), number }, call);
+}
+
+/** Nobody may begin any more. */
+export async function closeStudy(studyId: string): Promise<void> {
+  await studyApi.closeStudy(ownership(studyId), call);
+}
+
+/** The data of a study as files, in the order of the server; `onFiles` is called with their number. */
+export async function exportStudy(
+  studyId: string,
+  onFiles: (count: number) => void,
+): Promise<Map<string, Uint8Array[]>> {
+  const files = new Map<string, Uint8Array[]>();
+  for await (const { file, data } of studyApi.exportStudy(ownership(studyId))) {
+    const parts = files.get(file);
+    if (parts) parts.push(data);
+    else {
+      files.set(file, [data]);
+      onFiles(files.size);
+    }
+  }
+  return files;
+}
+
+/** The secrets of calls about a study. */
+export function ownership(studyId: string) {
+  return { studyId, ownerToken: ownerTokenOf(studyId) ?? "" };
+}
+
+/** The address to hand to a participant. */
+export function addressOf({ link }: Pick<StudyLink, "link">): string {
+  return `${location.origin}${pathOf({ page: "study", link })}`;
+}

@@ -1,0 +1,167 @@
+// Taking part in a study: opens it with the link's secret, follows what to show, and sends what the
+// participant does. Nothing is stored on this device: the link is enough to come back, also on
+// another one.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { effect, type Signal, signal } from "@preact/signals";
+import { CALL_LIMIT_MS } from "../api/client";
+import { type Fault, faultOf, isPassing } from "../api/faults";
+import { type Following, follow, type Link } from "../api/follow";
+import type { StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
+import { participationApi } from "./client";
+
+/**
+ * How this page takes part: opening the study, open, taken over by another page or device, or
+ * failed with an error that a retry does not fix.
+ */
+export type Presence = "opening" | "open" | "superseded" | "failed";
+
+/** An answer to an item. */
+export type ItemAnswer = MessageInitShape<typeof StudyItemAnswerSchema>;
+/** An interface trace. */
+export type Trace = MessageInitShape<typeof StudyTraceSchema>;
+
+export interface Participating {
+  readonly presence: Signal<Presence>;
+  /** What is shown; undefined until the study is open. */
+  readonly view: Signal<StudyView | undefined>;
+  /** Why it failed. */
+  readonly fault: Signal<Fault | undefined>;
+  /** The state of the stream. */
+  readonly link: Signal<Link>;
+  /** Agrees to the text that is shown. */
+  consent(): Promise<void>;
+  answer(answers: ItemAnswer[]): Promise<void>;
+  /** Continues from a text, another site or a game. */
+  proceed(): Promise<void>;
+  sendTraces(gameId: string, traces: Trace[]): Promise<void>;
+  withdraw(deleteData: boolean): Promise<void>;
+  /** Opens the study here, also if another device has it. */
+  open(): void;
+  stop(): void;
+}
+
+const SHORTEST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 8_000;
+/** The page is behind: the newest view says what to do. */
+const OUTDATED = ["STEP_OVER", "STEP_MISMATCH", "PARTICIPATION_OVER"];
+
+/** Takes part with the secret of a link. */
+export function startParticipating(secret: string): Participating {
+  const presence = signal<Presence>("opening");
+  const view = signal<StudyView | undefined>(undefined);
+  const fault = signal<Fault | undefined>(undefined);
+  const link = signal<Link>("connecting");
+  let session = "";
+  let following: Following | undefined;
+  let unwatch = () => {};
+  let stopped = false;
+  /** Counts how often the study was opened: an earlier attempt that ends late changes nothing. */
+  let opened = 0;
+
+  const leave = () => {
+    unwatch();
+    following?.stop();
+    following = undefined;
+  };
+  const fail = (found: Fault) => {
+    leave();
+    fault.value = found;
+    presence.value = found.reason === "SESSION_SUPERSEDED" ? "superseded" : "failed";
+  };
+  /** A view never leads back to an earlier step. */
+  const show = (next: StudyView | undefined) => {
+    const now = view.peek();
+    if (!next || (now && next.step < now.step && next.content.case !== "end")) return;
+    view.value = next;
+  };
+
+  const open = async () => {
+    leave();
+    opened += 1;
+    const attempt = opened;
+    presence.value = "opening";
+    for (
+      let waitMs = SHORTEST_WAIT_MS;
+      !stopped && attempt === opened;
+      waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)
+    ) {
+      try {
+        const answer = await participationApi.openStudy({ link: secret }, { timeoutMs: CALL_LIMIT_MS });
+        if (stopped || attempt !== opened) return;
+        session = answer.session;
+        view.value = answer.view;
+        presence.value = "open";
+        link.value = "open";
+        if (session !== "") attend();
+        return;
+      } catch (thrown) {
+        const found = faultOf(thrown);
+        if (stopped || attempt !== opened) return;
+        if (!isPassing(found)) return fail(found);
+        link.value = "lost";
+        await new Promise((resolve) => setTimeout(resolve, waitMs));
+      }
+    }
+  };
+
+  const attend = () => {
+    const stream = follow(
+      (abort) => participationApi.followParticipation({ session }, { signal: abort }),
+      ({ view: next }) => {
+        show(next);
+        return next?.content.case !== "end";
+      },
+    );
+    following = stream;
+    unwatch = effect(() => {
+      link.value = stream.link.value;
+      const found = stream.fault.value;
+      if (stream.link.value !== "failed" || !found) return;
+      // The server has forgotten the session, for example in a restart; the link still counts.
+      if (found.reason === "SESSION_UNKNOWN") queueMicrotask(() => void open());
+      else queueMicrotask(() => fail(found));
+    });
+  };
+
+  /** Does something at the step that is shown, and shows what comes next. */
+  const act = async (call: (at: { session: string; step: number }) => Promise<{ view?: StudyView | undefined }>) => {
+    const at = view.peek();
+    if (!at) return;
+    try {
+      show((await call({ session, step: at.step })).view);
+    } catch (thrown) {
+      const found = faultOf(thrown);
+      if (found.reason === "SESSION_SUPERSEDED") return fail(found);
+      if (OUTDATED.includes(found.reason)) return open();
+      if (found.reason === "SESSION_UNKNOWN") await open();
+      throw thrown;
+    }
+  };
+  const call = { timeoutMs: CALL_LIMIT_MS };
+
+  void open();
+  return {
+    presence,
+    view,
+    fault,
+    link,
+    consent: () => act((at) => participationApi.giveConsent(at, call)),
+    answer: (answers) => act((at) => participationApi.answerQuestionnaire({ ...at, answers }, call)),
+    proceed: () => act((at) => participationApi.continueStudy(at, call)),
+    sendTraces: async (gameId, traces) => {
+      await participationApi.recordTraces({ session, gameId, traces }, call);
+    },
+    withdraw: async (deleteData) => {
+      const answer = await participationApi.withdrawFromStudy({ link: secret, deleteData }, call);
+      leave();
+      presence.value = "open";
+      view.value = answer.view;
+    },
+    open: () => void open(),
+    stop: () => {
+      stopped = true;
+      leave();
+    },
+  };
+}

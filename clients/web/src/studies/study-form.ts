@@ -1,0 +1,132 @@
+// The form for the common study: conditions that differ in the opponents and what is said about
+// them, one block of games, questionnaires after it. Everything else needs a file.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { StudyLabels, StudyOrder, type StudySettingsSchema, type StudyStageSchema } from "../gen/chefshat/v1/study_pb";
+import { t } from "../i18n";
+
+/** A condition in the form. */
+export interface ConditionForm {
+  readonly id: string;
+  /** The built-in agent in all other seats. */
+  readonly agent: string;
+  readonly labels: "asTheyAre" | "kinds" | "players";
+}
+
+/** The form, as typed. */
+export interface StudyForm {
+  readonly name: string;
+  readonly title: string;
+  readonly language: "en" | "it";
+  readonly participants: string;
+  readonly within: boolean;
+  readonly conditions: readonly ConditionForm[];
+  readonly games: string;
+  readonly shifts: string;
+  readonly practice: boolean;
+  readonly consent: string;
+  readonly version: string;
+  readonly godspeed: boolean;
+  readonly nasaTlx: boolean;
+  readonly external: string;
+  readonly debriefing: string;
+  readonly traces: boolean;
+}
+
+/** The form at first. */
+export function emptyForm(language: "en" | "it"): StudyForm {
+  return {
+    name: "",
+    title: "",
+    language,
+    participants: "24",
+    within: false,
+    conditions: [
+      { id: "A", agent: "greedy", labels: "players" },
+      { id: "B", agent: "random", labels: "players" },
+    ],
+    games: "3",
+    shifts: "3",
+    practice: true,
+    consent: "",
+    version: "1",
+    godspeed: false,
+    nasaTlx: false,
+    external: "",
+    debriefing: "",
+    traces: false,
+  };
+}
+
+const LABELS = {
+  asTheyAre: StudyLabels.AS_THEY_ARE,
+  kinds: StudyLabels.KINDS,
+  players: StudyLabels.PLAYERS,
+};
+const MAX_PARTICIPANTS = 10_000;
+const MAX_GAMES = 100;
+const MAX_SHIFTS = 100;
+const ID = /^[A-Za-z0-9_.-]{1,64}$/;
+/** Players of a game; the participant has one of the seats. */
+const OTHER_SEATS = 3;
+
+/** What is wrong, by field; that of a condition has its index. */
+export type StudyFaults = Readonly<Record<string, string>>;
+
+/** What must be corrected before the study can be created. */
+export function faultsOf(form: StudyForm): StudyFaults {
+  const words = t().studies.make.problems;
+  const faults: Record<string, string> = {};
+  for (const field of ["name", "title", "consent", "version"] as const)
+    if (form[field].trim() === "") faults[field] = words.missing;
+  const bounds = { participants: MAX_PARTICIPANTS, games: MAX_GAMES, shifts: MAX_SHIFTS };
+  for (const [field, most] of Object.entries(bounds)) {
+    const typed = form[field as keyof typeof bounds];
+    if (!/^\d{1,6}$/.test(typed) || Number(typed) < 1 || Number(typed) > most) faults[field] = words.number(1, most);
+  }
+  form.conditions.forEach(({ id }, index) => {
+    if (!ID.test(id)) faults[`condition.${index}`] = words.id;
+    else if (form.conditions.findIndex((other) => other.id === id) < index) faults[`condition.${index}`] = words.twice;
+  });
+  if (form.external !== "" && !form.external.startsWith("https://")) faults.external = words.address;
+  return faults;
+}
+
+/** The settings of the study that the form describes, in texts of the participants' language. */
+export function settingsOf(form: StudyForm): MessageInitShape<typeof StudySettingsSchema> {
+  const words = t().studies.make;
+  type Stage = MessageInitShape<typeof StudyStageSchema>;
+  const inBlock: Stage[] = [{ stage: { case: "games", value: { count: Number(form.games) } } }];
+  if (form.godspeed) inBlock.push({ stage: { case: "questionnaire", value: { template: "godspeed" } } });
+  if (form.nasaTlx) inBlock.push({ stage: { case: "questionnaire", value: { template: "nasa_tlx" } } });
+  const stages: Stage[] = [
+    { stage: { case: "consent", value: { text: form.consent.trim(), version: form.version.trim() } } },
+  ];
+  if (form.practice) stages.push({ stage: { case: "practice", value: {} } });
+  if (form.within) stages.push({ stage: { case: "perCondition", value: { stages: inBlock } } });
+  else stages.push(...inBlock);
+  if (form.external !== "")
+    stages.push({
+      stage: { case: "externalQuestionnaire", value: { text: words.externalText, url: form.external } },
+    });
+  if (form.debriefing.trim() !== "")
+    stages.push({
+      stage: { case: "text", value: { title: words.debriefingTitle, text: form.debriefing.trim() } },
+    });
+  return {
+    name: form.name.trim(),
+    title: form.title.trim(),
+    language: form.language,
+    participants: Number(form.participants),
+    order: form.within ? StudyOrder.WITHIN : StudyOrder.BETWEEN,
+    factors: [],
+    conditions: form.conditions.map(({ id, agent, labels }) => ({
+      id,
+      rules: { preset: "paper", stop: { case: "targetShifts" as const, value: Number(form.shifts) } },
+      seats: Array.from({ length: OTHER_SEATS }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent } })),
+      labels: LABELS[labels],
+    })),
+    stages,
+    traces: form.traces,
+  };
+}

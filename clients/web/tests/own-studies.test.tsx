@@ -1,0 +1,233 @@
+// A researcher's studies: creating one from a form or a file, the progress board, data as a ZIP.
+
+import { readFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { create } from "@bufbuild/protobuf";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import {
+  StudyHide,
+  StudyLabels,
+  StudyOrder,
+  type StudyParticipant,
+  StudyParticipantSchema,
+  StudyParticipantState,
+  StudySchema,
+} from "../src/gen/chefshat/v1/study_pb";
+import {
+  AddStudyParticipantsResponseSchema,
+  CreateStudyResponseSchema,
+  DeleteStudyParticipantResponseSchema,
+  ExportStudyResponseSchema,
+  ListStudyLinksResponseSchema,
+  RemoveStudyParticipantResponseSchema,
+} from "../src/gen/chefshat/v1/study_service_pb";
+import { startLanguage } from "../src/i18n";
+import { zipped } from "../src/parts/zip";
+import { forgetAll } from "../src/store";
+import { byCondition } from "../src/studies/board";
+import { studyApi } from "../src/studies/client";
+import { OwnStudy } from "../src/studies/OwnStudyPage";
+import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
+import { settingsFrom } from "../src/studies/settings-file";
+import { emptyForm, faultsOf, settingsOf } from "../src/studies/study-form";
+import { root } from "./mounted";
+
+const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
+const TOKEN = "ab".repeat(48);
+
+beforeAll(startLanguage);
+afterEach(() => {
+  vi.restoreAllMocks();
+  forgetAll();
+});
+
+const study = create(StudySchema, {
+  studyId: ID,
+  settings: { name: "Trust 1", participants: 8, conditions: [{ id: "A" }, { id: "B" }] },
+  steps: 5,
+  completed: 1,
+});
+const participant = (number: number, state: StudyParticipantState, conditions: string[]): StudyParticipant =>
+  create(StudyParticipantSchema, { number, pseudonym: `P0${number}`, state, conditions, step: 2, sessions: 1 });
+const participants = [
+  participant(1, StudyParticipantState.COMPLETED, ["A"]),
+  participant(2, StudyParticipantState.ACTIVE, ["B"]),
+  participant(3, StudyParticipantState.INVITED, []),
+];
+const button = (words: string) =>
+  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
+const press = (words: string) => act(async () => button(words)?.click());
+
+test("the form makes the settings of a study, and says what is missing", () => {
+  const form = emptyForm("en");
+  expect(Object.keys(faultsOf(form))).toEqual(["name", "title", "consent"]);
+  const filled = { ...form, name: "Trust", title: "Cooking", consent: "We record.", godspeed: true, debriefing: "Bye" };
+  expect(faultsOf(filled)).toEqual({});
+  const settings = settingsOf(filled);
+  expect(settings.order).toBe(StudyOrder.BETWEEN);
+  expect(settings.conditions?.map(({ id, labels, seats }) => [id, labels, seats?.length])).toEqual([
+    ["A", StudyLabels.PLAYERS, 3],
+    ["B", StudyLabels.PLAYERS, 3],
+  ]);
+  expect(settings.stages?.map(({ stage }) => stage?.case)).toEqual([
+    "consent",
+    "practice",
+    "games",
+    "questionnaire",
+    "text",
+  ]);
+  const within = settingsOf({ ...filled, within: true });
+  expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
+});
+
+test.each([
+  [{ participants: "0" }, "participants"],
+  [{ games: "many" }, "games"],
+  [{ external: "http://forms.example" }, "external"],
+  [
+    {
+      conditions: [
+        { id: "A", agent: "greedy", labels: "kinds" as const },
+        { id: "A", agent: "random", labels: "kinds" as const },
+      ],
+    },
+    "condition.1",
+  ],
+  [{ conditions: [{ id: "two words", agent: "greedy", labels: "kinds" as const }] }, "condition.0"],
+])("%j is refused", (changed, field) => {
+  const form = { ...emptyForm("en"), name: "Trust", title: "Cooking", consent: "We record.", ...changed };
+  expect(Object.keys(faultsOf(form))).toEqual([field]);
+});
+
+const HEX = "0a".repeat(32);
+
+test.each([
+  [
+    "study.json",
+    `{"name": "Trust", "seeds": ["${HEX}"], "conditions": [{"id": "A", "labels": "STUDY_LABELS_KINDS", "hide": ["log"]}]}`,
+  ],
+  ["study.toml", `name = "Trust"\nseeds = ["${HEX}"]\n[[conditions]]\nid = "A"\nlabels = "kinds"\nhide = ["log"]\n`],
+])("settings are read from %s", async (name, text) => {
+  const settings = await settingsFrom(text, name);
+  const [condition] = settings.conditions;
+  expect([settings.name, condition?.id, condition?.labels, condition?.hide]).toEqual([
+    "Trust",
+    "A",
+    StudyLabels.KINDS,
+    [StudyHide.LOG],
+  ]);
+  expect(settings.seeds).toEqual([new Uint8Array(32).fill(10)]);
+});
+
+test("the example of the documentation is read", async () => {
+  const path = resolve(import.meta.dirname, "../../../docs/studies/example.toml");
+  const settings = await settingsFrom(readFileSync(path, "utf8"), path);
+  expect(settings.order).toBe(StudyOrder.BETWEEN);
+  expect(settings.conditions.map(({ labels }) => labels)).not.toContain(StudyLabels.UNSPECIFIED);
+  const scales = settings.stages.flatMap(({ stage }) => (stage.case === "questionnaire" ? stage.value.items : []));
+  expect(scales.flatMap(({ kind }) => (kind.case === "likert" ? kind.value.labels : []))[0]).not.toMatch(/^STUDY_/);
+});
+
+test.each([
+  ["study.json", "{"],
+  ["study.json", '{"nome": "x"}'],
+  ["study.json", '{"name": "x"}'],
+  ["study.toml", "name ="],
+])("a file that cannot be used says why: %s %s", async (name, text) => {
+  await expect(settingsFrom(text, name)).rejects.toThrow(/./);
+});
+
+test("creating a study stores its owner token", async () => {
+  vi.spyOn(studyApi, "createStudy").mockResolvedValue(create(CreateStudyResponseSchema, { study, ownerToken: TOKEN }));
+  expect(await createStudy({ name: "Trust" }, new Uint8Array(32))).toBe(ID);
+  expect(ownerTokenOf(ID)).toBe(TOKEN);
+});
+
+test("the board counts participants by condition and state", () => {
+  expect(byCondition(study, participants)).toEqual([
+    { condition: "A", counts: [0, 0, 1, 0, 0, 0] },
+    { condition: "B", counts: [0, 1, 0, 0, 0, 0] },
+    { condition: undefined, counts: [1, 1, 1, 0, 0, 0] },
+  ]);
+});
+
+test("the page shows progress, adds participants, shows links, and asks before it removes or deletes", async () => {
+  keepOwnerToken(ID, TOKEN);
+  const add = vi.spyOn(studyApi, "addStudyParticipants").mockResolvedValue(create(AddStudyParticipantsResponseSchema));
+  const link = "Xk3_abcdefghijklmnopqrstuvwxy1";
+  vi.spyOn(studyApi, "listStudyLinks").mockResolvedValue(
+    create(ListStudyLinksResponseSchema, { links: [{ number: 3, pseudonym: "P03", link }] }),
+  );
+  const remove = vi
+    .spyOn(studyApi, "removeStudyParticipant")
+    .mockResolvedValue(create(RemoveStudyParticipantResponseSchema));
+  const erase = vi
+    .spyOn(studyApi, "deleteStudyParticipant")
+    .mockResolvedValue(create(DeleteStudyParticipantResponseSchema));
+  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  expect(root.textContent).toContain("1 of 8 completed");
+  const rows = [...root.querySelectorAll('[data-part="participants"] tbody tr')];
+  expect(rows.map((row) => row.querySelectorAll("td")[2]?.textContent)).toEqual([
+    "completed",
+    "taking part",
+    "not begun",
+  ]);
+
+  await press("Add");
+  expect(add).not.toHaveBeenCalled();
+  expect(root.querySelector('[data-part="add-participants"] [role="alert"]')).not.toBeNull();
+  const area = root.querySelector<HTMLTextAreaElement>('[data-part="add-participants"] textarea');
+  await act(() => {
+    if (area) area.value = "P10-P12";
+    area?.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  await press("Add");
+  expect(add.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, count: 0, pseudonyms: ["P10", "P11", "P12"] });
+
+  await press("Show the links");
+  await vi.waitFor(() => {
+    expect(root.querySelector('[data-part="links"]')?.textContent).toContain(`/study/${link}`);
+  });
+
+  // The first row has ended: it can only be deleted.
+  await press("Delete data…");
+  expect(root.querySelector('[data-part="question"]')?.textContent).toContain("P01");
+  await press("Delete now");
+  expect(erase.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, number: 1 });
+  await press("Remove…");
+  await press("Remove now");
+  expect(remove.mock.calls[0]?.[0]).toMatchObject({ number: 2, replace: false });
+});
+
+test("the data are one ZIP with the files of the server", async () => {
+  keepOwnerToken(ID, TOKEN);
+  vi.spyOn(studyApi, "exportStudy").mockImplementation(async function* () {
+    const part = (file: string, text: string) =>
+      create(ExportStudyResponseSchema, { file, data: new TextEncoder().encode(text) });
+    yield part("participants.csv", "1234");
+    yield part("participants.csv", "56789");
+    yield part("records/ä.jsonl", "{}");
+  });
+  const counted: number[] = [];
+  const files = await exportStudy(ID, (count) => counted.push(count));
+  expect(counted).toEqual([1, 2]);
+  const bytes = new Uint8Array(await zipped(files).arrayBuffer());
+  const view = new DataView(bytes.buffer);
+  expect(view.getUint32(0, true)).toBe(0x04034b50);
+  // The check value of CRC-32.
+  expect(view.getUint32(14, true)).toBe(0xcbf43926);
+  expect([view.getUint32(18, true), view.getUint16(26, true)]).toEqual([9, "participants.csv".length]);
+  const end = bytes.length - 22;
+  expect(view.getUint32(end, true)).toBe(0x06054b50);
+  expect(view.getUint16(end + 10, true)).toBe(2);
+  const central = view.getUint32(end + 16, true);
+  expect(view.getUint32(central, true)).toBe(0x02014b50);
+  // The second entry points to its local header.
+  const second = central + 46 + "participants.csv".length;
+  const local = view.getUint32(second + 42, true);
+  expect(view.getUint32(local, true)).toBe(0x04034b50);
+  const name = new TextDecoder().decode(bytes.slice(local + 30, local + 30 + view.getUint16(local + 26, true)));
+  expect(name).toBe("records/ä.jsonl");
+});

@@ -1,0 +1,131 @@
+// The results of a tournament to print, and certificates as PDF.
+
+import { create } from "@bufbuild/protobuf";
+import { PDFDocument } from "pdf-lib";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { tournamentApi } from "../src/api/client";
+import {
+  TournamentFormat,
+  TournamentGameState,
+  TournamentSchema,
+  TournamentStandingSchema,
+  TournamentState,
+} from "../src/gen/chefshat/v1/tournament_pb";
+import { ListTournamentGamesResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
+import { setLanguage } from "../src/i18n";
+import { fileName } from "../src/parts/download";
+import { forgetAll } from "../src/store";
+import { certificatesOf } from "../src/tournaments/certificate";
+import { certificatesPdf } from "../src/tournaments/certificate-pdf";
+import { Results } from "../src/tournaments/ResultsPage";
+import { root } from "./mounted";
+
+const CREATED_MS = Date.UTC(2026, 2, 14, 12);
+const NAMES = ["Ada", "Bo & Çem", "greedy", "Zoë", "Łucja 你好"];
+
+function tournament(state = TournamentState.FINISHED) {
+  return create(TournamentSchema, {
+    tournamentId: "5f0c6a4de2b14b7f8a3d9c1e7b60425d",
+    state,
+    rounds: 3,
+    round: 3,
+    games: 3,
+    gamesOver: 3,
+    createdAtMs: BigInt(CREATED_MS),
+    settings: { name: "Spring cup", format: TournamentFormat.SWISS, rounds: 3, gamesPerPairing: 1 },
+    participants: NAMES.map((name, participant) => ({
+      participant,
+      name,
+      builtInAgent: name === "greedy" ? name : "",
+      withdrawn: name === "Zoë",
+    })),
+  });
+}
+const standings = NAMES.map((_, participant) =>
+  create(TournamentStandingSchema, {
+    participant,
+    place: participant + 1,
+    games: 3,
+    score: BigInt(9 - participant),
+    places: participant === 0 ? [2, 1] : [],
+  }),
+);
+const game = (number: number, state: TournamentGameState) => ({
+  game: number,
+  round: 1 + (number % 2),
+  table: 1,
+  number: 1,
+  state,
+  seats: [
+    { participant: 1, place: 2, score: 1 },
+    { participant: 0, place: 1, score: 3 },
+  ],
+});
+
+beforeEach(() => {
+  const games = [game(0, TournamentGameState.COUNTED), game(1, TournamentGameState.VOID)];
+  vi.spyOn(tournamentApi, "listTournamentGames").mockResolvedValue(
+    create(ListTournamentGamesResponseSchema, { games }),
+  );
+});
+afterEach(() => {
+  vi.restoreAllMocks();
+  forgetAll();
+});
+
+test("the page has standings, date, settings and the games that count", async () => {
+  await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
+  await vi.waitFor(() => expect(root.textContent).toContain("1. Ada +3 · 2. Bo & Çem +1"));
+  expect(root.textContent).toContain("2026");
+  expect(root.textContent).toContain("Swiss");
+  expect(root.querySelectorAll('[data-part~="standings"] tbody tr')).toHaveLength(NAMES.length);
+  // The void game is not listed.
+  expect(root.textContent).toContain("Round 1");
+  expect(root.textContent).not.toContain("Round 2");
+});
+
+test.each([
+  ["en", "took 1st place of 5 in the tournament", "took part in the tournament", "first in 2 games"],
+  ["it", "ha ottenuto il 1º posto su 5 nel torneo", "ha partecipato al torneo", "2 partite vinte"],
+] as const)("certificates in %s say who achieved what", async (language, first, part, wins) => {
+  await setLanguage(language);
+  const certificates = certificatesOf(tournament(), standings);
+  // Built-in agents get none.
+  expect(certificates.map(({ name }) => name)).toEqual(["Ada", "Bo & Çem", "Zoë", "Łucja 你好"]);
+  expect(certificates[0]).toMatchObject({ achieved: first, tournament: "Spring cup" });
+  expect(certificates[0]?.lines.join()).toContain(wins);
+  // Whoever left has no place.
+  expect(certificates[2]?.achieved).toBe(part);
+  await setLanguage("en");
+});
+
+test("there are none before the end, or if it was closed early", () => {
+  expect(certificatesOf(tournament(TournamentState.PLAYING), standings)).toEqual([]);
+  expect(certificatesOf(tournament(TournamentState.CLOSED), standings)).toEqual([]);
+});
+
+test("the PDF has a page for each, and a picture for what its fonts cannot write", async () => {
+  const drawn: string[] = [];
+  // One white pixel.
+  const png = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8/5+hHgAHggJ/PchI7wAAAABJRU5ErkJggg==";
+  const bytes = await certificatesPdf(certificatesOf(tournament(), standings), async (text) => {
+    drawn.push(text);
+    return Uint8Array.from(atob(png), (character) => character.charCodeAt(0));
+  });
+  const pdf = await PDFDocument.load(bytes);
+  expect(pdf.getPageCount()).toBe(4);
+  expect(pdf.getTitle()).toBe("Certificate · Spring cup");
+  expect(drawn).toEqual(["Łucja 你好"]);
+});
+
+test("without a canvas, other scripts become question marks", async () => {
+  const bytes = await certificatesPdf(certificatesOf(tournament(), standings), async () => null);
+  expect((await PDFDocument.load(bytes)).getPageCount()).toBe(4);
+});
+
+test.each([
+  ["Spring cup: Çem/Bo", "Spring-cup-Çem-Bo"],
+  ["…", "file"],
+])("%s is saved as %s", (name, expected) => expect(fileName(name)).toBe(expected));

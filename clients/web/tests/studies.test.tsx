@@ -1,0 +1,290 @@
+// A participant of a study: stages, answers, withdrawing, another device, and what is stored.
+
+import { create } from "@bufbuild/protobuf";
+import { Code } from "@connectrpc/connect";
+import { signal } from "@preact/signals";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { roomApi } from "../src/api/client";
+import { type StudyShownItem, StudyShownItemSchema, StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
+import { setLanguage } from "../src/i18n";
+import { remembered } from "../src/store";
+import { answersOf, dropDraft, keepDraft, keptDraft, missingItems } from "../src/studies/answers";
+import { participationApi } from "../src/studies/client";
+import type { Trace } from "../src/studies/participating";
+import { StudyPage } from "../src/studies/StudyPage";
+import { startTracing, targetOf } from "../src/studies/tracing";
+import { startLive } from "../src/table/model/live";
+import { emptyTable } from "../src/table/model/state";
+import { root } from "./mounted";
+import { fakeStudy, refused, viewOf } from "./study-fake";
+
+const LINK = "Xk3_abcdefghijklmnopqrstuvwxy1";
+const CONSENT = { case: "consent" as const, value: { text: "We record your games.\n\nYou may stop.", version: "2" } };
+const TEXT = { case: "text" as const, value: { title: "Welcome", text: "Read this." } };
+const OUTSIDE = {
+  case: "externalQuestionnaire" as const,
+  value: { text: "Please go there.", url: "https://forms.example/q?id=P07" },
+};
+const ITEMS = [
+  { item: 4, text: "I trusted them", kind: { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } } },
+  { item: 1, kind: { case: "semanticDifferential" as const, value: { points: 5, left: "fake", right: "natural" } } },
+  {
+    item: 2,
+    text: "Effort",
+    kind: { case: "slider" as const, value: { min: 0, max: 100, step: 5, left: "low", right: "high" } },
+  },
+  { item: 3, text: "Which", kind: { case: "choice" as const, value: { options: ["a", "b", "c"], multiple: true } } },
+  {
+    item: 0,
+    text: "Anything else",
+    optional: true,
+    kind: { case: "freeText" as const, value: { maxCharacters: 200 } },
+  },
+];
+const QUESTIONS = { case: "questionnaire" as const, value: { title: "About the game", items: ITEMS } };
+const items: StudyShownItem[] = ITEMS.map((item) => create(StudyShownItemSchema, item));
+
+beforeEach(() => {
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
+});
+afterEach(async () => {
+  // Leaving the page stops its stream.
+  await act(() => render(null, root));
+  vi.useRealTimers();
+  vi.restoreAllMocks();
+  dropDraft();
+  await setLanguage("en");
+  localStorage.clear();
+});
+
+const show = () =>
+  act(async () => {
+    render(<StudyPage route={{ page: "study", link: LINK }} />, root);
+  }).then(settled);
+const settled = () =>
+  act(async () => {
+    for (let turn = 0; turn < 5; turn += 1) await vi.advanceTimersByTimeAsync(0);
+  });
+const button = (words: string) =>
+  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
+const press = async (words: string) => {
+  const found = button(words);
+  expect(found, words).toBeDefined();
+  await act(() => found?.click());
+  await settled();
+};
+const input = (within: number, which: string) => {
+  const found = root.querySelector<HTMLInputElement>(`[data-item="${within}"] ${which}`);
+  if (!found) throw new Error(`${within} has no ${which}`);
+  return found;
+};
+const title = () => root.querySelector("h1")?.textContent;
+
+test("a participant goes through all stages, and nothing is stored on the device", async () => {
+  const { sent } = fakeStudy([CONSENT, TEXT, QUESTIONS, OUTSIDE]);
+  const before = new Map(remembered());
+  await show();
+  expect(title()).toBe("Before you begin");
+  expect(root.textContent).toContain("Step 1 of 4");
+  await press("Agree and continue");
+  expect(sent.map(({ call }) => call)).toEqual(["open"]);
+  expect(root.querySelector('[role="alert"]')?.textContent).toContain("Tick the box");
+  await act(() => root.querySelector<HTMLInputElement>('[data-part="consent"] input')?.click());
+  await press("Agree and continue");
+
+  expect(title()).toBe("Welcome");
+  await press("Continue");
+
+  expect(title()).toBe("About the game");
+  await press("Send the answers");
+  expect(root.querySelectorAll("[data-missing]")).toHaveLength(4);
+  // The first one is shown first, whatever its number.
+  expect(document.activeElement?.closest("[data-item]")?.getAttribute("data-item")).toBe("4");
+  await act(() => input(4, 'input[value="2"]').click());
+  await act(() => input(1, 'input[value="5"]').click());
+  const slider = input(2, 'input[type="range"]');
+  expect(slider.getAttribute("aria-valuetext")).toBe("no answer yet");
+  await act(() => {
+    slider.value = "35";
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  expect(input(2, 'input[type="range"]').getAttribute("aria-valuetext")).toBe("35, from 0 to 100");
+  await act(() => root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[2]?.click());
+  await act(() => root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[0]?.click());
+  await press("Send the answers");
+
+  expect(title()).toBe("A questionnaire");
+  expect(root.querySelector("a[target]")?.getAttribute("href")).toBe("https://forms.example/q?id=P07");
+  await press("I have filled it in");
+  expect(title()).toBe("Thank you for taking part");
+  expect(root.textContent).toContain("P07");
+
+  expect(sent.map(({ call }) => call)).toEqual(["open", "consent", "continue", "answer", "continue"]);
+  const { answers } = { answers: [], ...sent[3]?.request } as {
+    answers: { item: number; value: { value: unknown } }[];
+  };
+  expect(answers.map(({ item, value }) => [item, value.value])).toEqual([
+    [4, 2],
+    [1, 5],
+    [2, 35],
+    [3, { options: [0, 2] }],
+  ]);
+  expect(remembered()).toEqual(before);
+  expect(sessionStorage.getItem("chefshat.answers")).toBeNull();
+});
+
+test("the study is shown in its own language, which is not stored", async () => {
+  const { view } = fakeStudy([CONSENT]);
+  vi.spyOn(participationApi, "openStudy").mockImplementation(async () => {
+    const { create: make } = await import("@bufbuild/protobuf");
+    const { OpenStudyResponseSchema } = await import("../src/gen/chefshat/v1/study_service_pb");
+    return make(OpenStudyResponseSchema, { session: "s", view: { ...view(), language: "it" } });
+  });
+  await show();
+  await vi.waitFor(() => expect(title()).toBe("Prima di cominciare"));
+  expect(localStorage.getItem("chefshat.language")).not.toBe("it");
+});
+
+test.each([
+  ["consent", CONSENT],
+  ["text", TEXT],
+  ["questionnaire", QUESTIONS],
+  ["external", OUTSIDE],
+  ["game", { case: "game" as const, value: { game: 1, games: 2 } }],
+])("withdrawing is possible at the stage %s, says what it does and asks once", async (_, stage) => {
+  const { sent } = fakeStudy([stage]);
+  await show();
+  await press("Withdraw from the study…");
+  expect(root.querySelector('[data-part="question"]')?.textContent).toContain("ends at once");
+  expect(sent.map(({ call }) => call)).toEqual(["open"]);
+  await press("Withdraw now");
+  expect(sent.at(-1)).toEqual({ call: "withdraw", request: { link: LINK, deleteData: false } });
+  expect(root.textContent).toContain("You have withdrawn. Your data recorded so far are kept.");
+  // The data can still be deleted.
+  await press("Delete my data…");
+  await press("Delete now");
+  expect(sent.at(-1)).toEqual({ call: "withdraw", request: { link: LINK, deleteData: true } });
+  expect(root.querySelector('[data-part="withdraw"]')).toBeNull();
+});
+
+test("another device that opens the study is said clearly, and can be answered", async () => {
+  const { streams, sent } = fakeStudy([CONSENT, TEXT]);
+  await show();
+  streams[0]?.fail(refused("SESSION_SUPERSEDED", Code.Aborted));
+  await settled();
+  expect(title()).toBe("You continue on another device or page");
+  expect(button("Withdraw")).toBeUndefined();
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(sent.map(({ call }) => call)).toEqual(["open"]);
+  await press("Continue here instead");
+  expect(sent.map(({ call }) => call)).toEqual(["open", "open"]);
+  expect(title()).toBe("Before you begin");
+});
+
+test("a server that has forgotten the session is asked with the link again", async () => {
+  const { streams, sent } = fakeStudy([CONSENT, TEXT]);
+  await show();
+  streams[0]?.fail(refused("SESSION_UNKNOWN", Code.Unauthenticated));
+  await settled();
+  expect(sent.map(({ call }) => call)).toEqual(["open", "open"]);
+  expect(title()).toBe("Before you begin");
+});
+
+test("what the server shows replaces the stage, but never leads back", async () => {
+  const { streams } = fakeStudy([CONSENT, TEXT]);
+  await show();
+  streams[0]?.push(viewOf([CONSENT, TEXT], 1));
+  await settled();
+  expect(title()).toBe("Welcome");
+  streams[0]?.push(viewOf([CONSENT, TEXT], 0));
+  await settled();
+  expect(title()).toBe("Welcome");
+});
+
+test("a page that is behind shows the newest stage", async () => {
+  const { state } = fakeStudy([TEXT, QUESTIONS]);
+  await show();
+  vi.spyOn(participationApi, "continueStudy").mockRejectedValue(refused("STEP_OVER"));
+  state.step = 1;
+  await press("Continue");
+  expect(title()).toBe("About the game");
+});
+
+test.each(["LINK_UNKNOWN", "STUDY_CLOSED", "STUDY_FULL"])("%s is said in words", async (reason) => {
+  vi.spyOn(participationApi, "openStudy").mockRejectedValue(refused(reason));
+  await show();
+  const said = root.querySelector('[role="alert"]')?.textContent ?? "";
+  expect(said).not.toContain(reason);
+  expect(said.length).toBeGreaterThan(20);
+});
+
+test("a game is prepared, and its room is asked for with the ticket alone", async () => {
+  const game = { game: 1, games: 2, roomId: "ab".repeat(16), gameId: "cd".repeat(16), ticket: "ef".repeat(48) };
+  const { streams } = fakeStudy([{ case: "game", value: { game: 1, games: 2 } }]);
+  await show();
+  expect(root.textContent).toContain("Your game is being prepared.");
+  const ask = vi.spyOn(roomApi, "getRoom").mockReturnValue(new Promise(() => {}));
+  streams[0]?.push(viewOf([{ case: "game", value: game }], 0));
+  await settled();
+  expect(ask.mock.calls[0]?.[1]?.headers).toEqual({ "chefshat-secret": game.ticket });
+  expect([...remembered().values()].join()).not.toContain(game.ticket);
+});
+
+test("answers are checked, sent in the order of the items, and survive a reload at the same step", () => {
+  const draft = {
+    4: { value: 3, afterMs: 10.4 },
+    3: { value: [2, 0], afterMs: 20 },
+    0: { value: "  ", afterMs: 30 },
+  };
+  expect(missingItems(items, draft)).toEqual([1, 2]);
+  expect(answersOf(items, draft)).toEqual([
+    { item: 4, value: { case: "number", value: 3 }, answeredAfterMs: 10 },
+    { item: 3, value: { case: "options", value: { options: [0, 2] } }, answeredAfterMs: 20 },
+  ]);
+  keepDraft(LINK, 2, draft);
+  expect(keptDraft(LINK, 2)).toEqual(draft);
+  expect(keptDraft(LINK, 3)).toEqual({});
+  expect(keptDraft("another", 2)).toEqual({});
+});
+
+test("traces name what was touched and how long, and wait for the server", async () => {
+  root.innerHTML = '<i data-card="7"></i><b data-action="pass"></b><u data-part="sheet log"></u><s></s>';
+  const [card, pass, log, other] = [...root.children];
+  expect([card, pass, log, other].map((element) => targetOf(element ?? null))).toEqual([
+    "card:7",
+    "pass",
+    "part:log",
+    undefined,
+  ]);
+  const live = signal(startLive(emptyTable(), 0));
+  const batches: Trace[][] = [];
+  const send = vi.fn(async (traces: Trace[]) => {
+    if (batches.length === 0 && send.mock.calls.length === 1) throw new Error("away");
+    batches.push(traces);
+  });
+  let nowMs = 1_000;
+  vi.spyOn(performance, "now").mockImplementation(() => nowMs);
+  const tracing = startTracing(root, live, send);
+  tracing.pick("7", true);
+  card?.dispatchEvent(new Event("pointerover", { bubbles: true }));
+  nowMs = 1_050;
+  // Passing by.
+  log?.dispatchEvent(new Event("pointerover", { bubbles: true }));
+  nowMs = 1_950;
+  root.dispatchEvent(new Event("pointerleave"));
+  tracing.answered(12);
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(batches).toEqual([]);
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(batches.flat().map(({ kind, target, atMs, durationMs }) => [kind, target, atMs, durationMs])).toEqual([
+    [StudyTraceKind.CARD_PICKED, "card:7", 0n, 0],
+    [StudyTraceKind.HOVER, "part:log", 50n, 900],
+    [StudyTraceKind.ANSWER_SENT, "action:12", 950n, 0],
+  ]);
+  tracing.stop();
+  pass?.dispatchEvent(new Event("pointerover", { bubbles: true }));
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(send).toHaveBeenCalledTimes(2);
+});

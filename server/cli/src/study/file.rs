@@ -1,0 +1,189 @@
+//! The TOML file of a study: the fields of `StudySettings` by their names in the protocol. Values of
+//! enums are written in short ("within"), seeds in hexadecimal digits, and long texts may be in
+//! files of their own (`text_file`).
+
+use std::fs;
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use chefshat_proto::v1;
+use serde_json::{Map, Value};
+use toml::de::{DeTable, DeValue};
+
+use crate::CommandError;
+
+/// Fields with values of enums, and the prefixes of their values.
+const ENUMS: [(&str, &str); 10] = [
+    ("order", "STUDY_ORDER_"),
+    ("labels", "STUDY_LABELS_"),
+    ("hide", "STUDY_HIDE_"),
+    ("opening", "OPENING_"),
+    ("pass_scope", "PASS_SCOPE_"),
+    ("abort", "ABORT_POLICY_"),
+    ("reward_scheme", "REWARD_SCHEME_"),
+    ("reserved_for", "PARTICIPANT_KIND_"),
+    ("kind", "PARTICIPANT_KIND_"),
+    ("durability", "DURABILITY_"),
+];
+/// Fields with bytes.
+const BYTES: [&str; 2] = ["seeds", "assignment_seed"];
+
+/// Reads the settings of a study.
+///
+/// # Errors
+/// The file cannot be read, is not TOML, or has a field that the protocol does not have.
+pub(super) fn settings(path: &Path) -> Result<v1::StudySettings, CommandError> {
+    let shown = path.display();
+    let text = fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(&text, folder).map_err(|problem| format!("{shown}: {problem}").into())
+}
+
+fn parse(text: &str, folder: &Path) -> Result<v1::StudySettings, String> {
+    let table = DeTable::parse(text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        let line = text[..at].matches('\n').count() + 1;
+        format!("line {line}: {}", error.message())
+    })?;
+    let json = object(table.get_ref(), folder)?;
+    serde_json::from_value(Value::Object(json)).map_err(|error| error.to_string())
+}
+
+fn object(table: &DeTable<'_>, folder: &Path) -> Result<Map<String, Value>, String> {
+    let mut fields = Map::new();
+    for (key, value) in table {
+        let key = key.get_ref().to_string();
+        let value = value.get_ref();
+        if key == "text_file" {
+            let name = value.as_str().ok_or("text_file: give the name of a file")?;
+            let text = fs::read_to_string(folder.join(name))
+                .map_err(|error| format!("text_file {name:?}: {error}"))?;
+            fields.insert("text".to_owned(), text.trim().into());
+            continue;
+        }
+        let value = convert(&key, value, folder)?;
+        fields.insert(key, value);
+    }
+    Ok(fields)
+}
+
+fn convert(key: &str, value: &DeValue<'_>, folder: &Path) -> Result<Value, String> {
+    Ok(match value {
+        DeValue::String(text) => word(key, text)?,
+        DeValue::Integer(number) => {
+            let digits = number.as_str().replace('_', "");
+            let number = i64::from_str_radix(&digits, number.radix())
+                .map_err(|_| format!("{key}: {digits} is too large"))?;
+            number.into()
+        }
+        DeValue::Float(number) => {
+            let number = number.as_str().parse::<f64>();
+            number.map_err(|_| format!("{key}: not a number"))?.into()
+        }
+        DeValue::Boolean(set) => (*set).into(),
+        DeValue::Datetime(_) => {
+            return Err(format!("{key}: give milliseconds since the Unix epoch"));
+        }
+        DeValue::Array(items) => {
+            // Labels of a condition are a value of an enum, those of an item a list of texts.
+            let key = if key == "labels" { "" } else { key };
+            let items = items
+                .iter()
+                .map(|item| convert(key, item.get_ref(), folder));
+            Value::Array(items.collect::<Result<_, _>>()?)
+        }
+        // The keys are names of factors, not fields.
+        DeValue::Table(levels) if key == "levels" => {
+            let level = |value: &DeValue<'_>| value.as_str().map(Value::from);
+            let levels = levels.iter().map(|(factor, value)| {
+                let value = level(value.get_ref());
+                let value = value.ok_or_else(|| format!("{key}: a level is a text"))?;
+                Ok((factor.get_ref().to_string(), value))
+            });
+            Value::Object(levels.collect::<Result<_, String>>()?)
+        }
+        DeValue::Table(table) => Value::Object(object(table, folder)?),
+    })
+}
+
+fn word(key: &str, text: &str) -> Result<Value, String> {
+    if BYTES.contains(&key) {
+        let bytes = hex::decode(text)
+            .map_err(|_| format!("{key}: a seed has 64 hexadecimal digits, not {text:?}"))?;
+        return Ok(STANDARD.encode(bytes).into());
+    }
+    let prefix = ENUMS.iter().find(|(name, _)| *name == key);
+    Ok(match prefix {
+        Some((_, prefix)) => format!("{prefix}{}", text.to_uppercase().replace('-', "_")).into(),
+        None => text.into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_written_in_short() {
+        let text = r#"
+            name = "n"
+            order = "within"
+            seeds = ["0000000000000000000000000000000000000000000000000000000000000001"]
+            drop_out_after_ms = 60_000
+            [[conditions]]
+            id = "a"
+            labels = "players"
+            hide = ["log", "pages"]
+            levels = { kind = "calm" }
+            rules = { target_shifts = 1 }
+            policy = { abort = "never" }
+            [[conditions.seats]]
+            built_in_agent = "greedy"
+            [[conditions.seats]]
+            reserved_for = "robot"
+            [[stages]]
+            consent = { text = "I agree.", version = "1" }
+            [[stages]]
+            [stages.per_condition]
+            stages = [{ games = { count = 2 } }]
+        "#;
+        let settings = parse(text, Path::new("")).expect("valid");
+        assert_eq!(settings.order(), v1::StudyOrder::Within);
+        assert_eq!(settings.seeds[0][31], 1);
+        assert_eq!(settings.drop_out_after_ms, 60_000);
+        let condition = &settings.conditions[0];
+        assert_eq!(condition.labels(), v1::StudyLabels::Players);
+        assert_eq!(condition.hide().count(), 2);
+        assert_eq!(condition.levels["kind"], "calm");
+        assert_eq!(condition.seats.len(), 2);
+        assert_eq!(settings.stages.len(), 2);
+    }
+
+    #[test]
+    fn the_example_is_valid() {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+        let settings = settings(&docs.join("studies/example.toml")).expect("it is read");
+        let complete = chefshat_server::convert::complete_settings(settings, || [1; 32], true);
+        let complete = complete.expect("the server accepts it");
+        assert_eq!(complete.conditions.len(), 2);
+        assert_eq!(complete.block_size, 2);
+    }
+
+    #[test]
+    fn a_problem_names_what_is_wrong() {
+        for (text, expected) in [
+            ("name = ", "line 1"),
+            ("nam = \"x\"", "nam"),
+            ("seeds = [\"12\", \"x\"]", "seeds"),
+            ("order = \"sideways\"", "SIDEWAYS"),
+            (
+                "stages = [{ text = { text_file = \"missing.md\" } }]",
+                "missing.md",
+            ),
+        ] {
+            let problem = parse(text, Path::new("/nonexistent")).expect_err(text);
+            assert!(problem.contains(expected), "{text}: {problem}");
+        }
+    }
+}

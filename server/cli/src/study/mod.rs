@@ -1,0 +1,127 @@
+//! `chefshat study`: creates studies with people, adds participants, follows, exports and closes
+//! them, and deletes the data of participants. The server assigns conditions and runs the games.
+
+mod connection;
+mod file;
+mod owner;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_proto::v1;
+use chefshat_room::ids::random_bytes;
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use self::connection::{refused, service};
+use super::connect::ServerArg;
+use super::secret_file::SecretFile;
+use super::{CommandError, say};
+
+/// Run studies with people: conditions, participants, questionnaires, data.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+                  chefshat study create docs/studies/example.toml --owner-file ./owner\n  \
+                  chefshat study links STUDY-ID --add 16 --owner-file ./owner\n  \
+                  chefshat study follow STUDY-ID --owner-file ./owner\n  \
+                  chefshat study export STUDY-ID --out data --owner-file ./owner\n\n\
+                  docs/studies.md goes through a study from its file to its data.")]
+pub(super) struct StudyCommand {
+    #[command(subcommand)]
+    action: StudyAction,
+}
+
+#[derive(Debug, Subcommand)]
+enum StudyAction {
+    /// Create a study from a TOML file.
+    Create(Create),
+    /// List the studies of an owner token, or all for the operator.
+    List(owner::List),
+    /// Show a study and its participants.
+    Show(owner::Show),
+    /// Print the links of the participants, after adding some if wanted.
+    Links(owner::Links),
+    /// Follow the progress of a study until it is closed and nobody is active.
+    Follow(owner::Follow),
+    /// Write the data of a study into a folder.
+    Export(owner::Export),
+    /// Close a study: nobody may begin any more.
+    Close(owner::Owned),
+    /// Remove a participant, whose slot is free again.
+    Remove(owner::Remove),
+    /// Delete the data of a participant.
+    DeleteParticipant(owner::DeleteParticipant),
+}
+
+impl StudyCommand {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        match self.action {
+            StudyAction::Create(command) => command.run().await?,
+            StudyAction::List(command) => command.run().await?,
+            StudyAction::Show(command) => command.run().await?,
+            StudyAction::Links(command) => command.run().await?,
+            StudyAction::Follow(command) => command.run().await?,
+            StudyAction::Export(command) => command.run().await?,
+            StudyAction::Close(command) => command.close().await?,
+            StudyAction::Remove(command) => command.run().await?,
+            StudyAction::DeleteParticipant(command) => command.run().await?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Create a study from a TOML file.
+#[derive(Debug, Args)]
+struct Create {
+    /// The settings: docs/studies/example.toml is an example with comments.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Write the owner token to this file, readable only by its owner.
+    #[arg(long, value_name = "FILE")]
+    owner_file: Option<PathBuf>,
+    /// Print the study and its owner token as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Create {
+    async fn run(self) -> Result<(), CommandError> {
+        let settings = file::settings(&self.file)?;
+        let mut service = service(&self.server).await?;
+        let owner_file = (self.owner_file.as_deref())
+            .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
+            .transpose()?;
+        let request = v1::CreateStudyRequest {
+            settings: Some(settings),
+            request_id: random_bytes::<32>().to_vec(),
+        };
+        let created = service.create_study(request).await.map_err(refused)?;
+        let created = created.into_inner();
+        let study = created.study.ok_or("the server did not return the study")?;
+        let owner = created.owner_token;
+        if let Some(file) = owner_file {
+            file.write(&owner)?;
+        }
+        if self.json {
+            return say(json!({"event": "created", "study": study, "owner_token": owner}));
+        }
+        say(format_args!("study        {}", study.study_id))?;
+        match &self.owner_file {
+            Some(file) => say(format_args!("owner token  in {}", file.display()))?,
+            None => say(format_args!("owner token  {owner}"))?,
+        }
+        say(format_args!(
+            "seeds sha256 {}",
+            hex::encode(&study.seeds_sha256)
+        ))?;
+        say(format_args!(
+            "each of {} participants has {} steps with {} games and {} for practice",
+            study.settings.map_or(0, |it| it.participants),
+            study.steps,
+            study.games,
+            study.practice_games
+        ))
+    }
+}

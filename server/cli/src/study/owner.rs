@@ -1,0 +1,353 @@
+//! Commands for the owner of a study.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use chefshat_proto::v1;
+use clap::Args;
+use serde_json::json;
+
+use super::connection::{refused, service};
+use crate::connect::{OwnerArgs, ServerArg};
+use crate::{CommandError, say};
+
+/// A study and the proof of ownership.
+#[derive(Debug, Args)]
+pub(super) struct Owned {
+    /// ID of the study.
+    #[arg(value_name = "STUDY-ID")]
+    study_id: String,
+    #[command(flatten)]
+    owner: OwnerArgs,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print JSON lines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// List the studies of an owner token, or all for the operator.
+#[derive(Debug, Args)]
+pub(super) struct List {
+    #[command(flatten)]
+    owner: OwnerArgs,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print each study as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Show a study and its participants.
+#[derive(Debug, Args)]
+pub(super) struct Show {
+    #[command(flatten)]
+    owned: Owned,
+}
+
+/// Print the links of the participants, after adding some if wanted.
+#[derive(Debug, Args)]
+pub(super) struct Links {
+    #[command(flatten)]
+    owned: Owned,
+    /// Add this many participants, named by number, and print their links alone.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    add: u32,
+    /// Add a participant with this pseudonym. Do not use names of people. Repeatable.
+    #[arg(long = "pseudonym", value_name = "NAME")]
+    pseudonyms: Vec<String>,
+}
+
+/// Follow the progress of a study until it is closed and nobody is active.
+#[derive(Debug, Args)]
+pub(super) struct Follow {
+    #[command(flatten)]
+    owned: Owned,
+}
+
+/// Write the data of a study into a folder.
+#[derive(Debug, Args)]
+pub(super) struct Export {
+    #[command(flatten)]
+    owned: Owned,
+    /// The folder, which must not exist yet.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+}
+
+/// Remove a participant, whose slot is free again. Its data are kept.
+#[derive(Debug, Args)]
+pub(super) struct Remove {
+    #[command(flatten)]
+    owned: Owned,
+    /// Number of the participant.
+    #[arg(value_name = "NUMBER")]
+    number: u32,
+    /// Add another participant and print its link.
+    #[arg(long)]
+    replace: bool,
+}
+
+/// Delete the data of a participant: its pseudonym, answers, interface traces and games.
+#[derive(Debug, Args)]
+pub(super) struct DeleteParticipant {
+    #[command(flatten)]
+    owned: Owned,
+    /// Number of the participant.
+    #[arg(value_name = "NUMBER")]
+    number: u32,
+}
+
+impl List {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        // The operator needs none.
+        let owner_tokens = self.owner.token().ok().into_iter().collect();
+        let mut service = service(&self.server).await?;
+        let request = v1::ListStudiesRequest { owner_tokens };
+        let listed = service.list_studies(request).await.map_err(refused)?;
+        for study in listed.into_inner().studies {
+            match self.json {
+                true => say(json!(study))?,
+                false => say(summary(&study))?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Show {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let request = v1::GetStudyRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+        };
+        let shown = service.get_study(request).await.map_err(refused)?;
+        let shown = shown.into_inner();
+        if owned.json {
+            return say(json!(shown));
+        }
+        say(summary(&shown.study.unwrap_or_default()))?;
+        shown.participants.iter().try_for_each(|it| say(line(it)))
+    }
+}
+
+impl Links {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
+        let links = if self.add == 0 && self.pseudonyms.is_empty() {
+            let request = v1::ListStudyLinksRequest {
+                study_id,
+                owner_token,
+            };
+            let listed = service.list_study_links(request).await.map_err(refused)?;
+            listed.into_inner().links
+        } else {
+            let request = v1::AddStudyParticipantsRequest {
+                study_id,
+                owner_token,
+                pseudonyms: self.pseudonyms,
+                count: self.add,
+            };
+            let added = service.add_study_participants(request).await;
+            added.map_err(refused)?.into_inner().links
+        };
+        for link in &links {
+            print_link(link, owned.server.url(), owned.json)?;
+        }
+        Ok(())
+    }
+}
+
+impl Follow {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let request = v1::FollowStudyRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+        };
+        let followed = service.follow_study(request).await.map_err(refused)?;
+        let mut updates = followed.into_inner();
+        while let Some(update) = updates.message().await.map_err(refused)? {
+            if owned.json {
+                if update != v1::FollowStudyResponse::default() {
+                    say(json!(update))?;
+                }
+                continue;
+            }
+            if let Some(study) = &update.study {
+                say(summary(study))?;
+            }
+            update
+                .participants
+                .iter()
+                .try_for_each(|it| say(line(it)))?;
+        }
+        Ok(())
+    }
+}
+
+impl Export {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let out = self.out.display();
+        if self.out.exists() {
+            return Err(format!("--out: {out} exists; choose a new folder").into());
+        }
+        let mut service = service(&owned.server).await?;
+        let request = v1::ExportStudyRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+        };
+        let exported = service.export_study(request).await.map_err(refused)?;
+        let mut parts = exported.into_inner();
+        let mut sizes: BTreeMap<String, u64> = BTreeMap::new();
+        let mut open: Option<(String, File)> = None;
+        while let Some(part) = parts.message().await.map_err(refused)? {
+            let file = match open.take().filter(|(name, _)| *name == part.file) {
+                Some((_, file)) => file,
+                None => create(&self.out, &part.file)?,
+            };
+            let (_, file) = open.insert((part.file.clone(), file));
+            file.write_all(&part.data)?;
+            *sizes.entry(part.file).or_default() += part.data.len() as u64;
+        }
+        let (records, files): (Vec<_>, Vec<_>) = sizes
+            .iter()
+            .partition(|(name, _)| name.starts_with("records/"));
+        if owned.json {
+            return say(json!({"event": "exported", "folder": self.out, "files": sizes}));
+        }
+        for (name, bytes) in files {
+            say(format_args!("{name} ({bytes} bytes)"))?;
+        }
+        say(format_args!("records/ ({} games)", records.len()))
+    }
+}
+
+/// Creates a file of the export. The server names it: it must stay in the folder.
+fn create(folder: &Path, name: &str) -> Result<File, CommandError> {
+    let is_plain = |part: &str| {
+        let allowed = |letter: char| letter.is_ascii_alphanumeric() || "_-.".contains(letter);
+        !part.is_empty() && !part.starts_with('.') && part.chars().all(allowed)
+    };
+    if name.split('/').count() > 2 || !name.split('/').all(is_plain) {
+        return Err(format!("the server named a file {name:?}; nothing more is written").into());
+    }
+    let path = folder.join(name);
+    if let Some(parent) = path.parent() {
+        fs::create_dir_all(parent)?;
+    }
+    let created = File::create_new(&path);
+    created.map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+impl Owned {
+    pub(super) async fn close(self) -> Result<(), CommandError> {
+        let mut service = service(&self.server).await?;
+        let request = v1::CloseStudyRequest {
+            study_id: self.study_id.clone(),
+            owner_token: self.owner.token()?,
+        };
+        let closed = service.close_study(request).await.map_err(refused)?;
+        let study = closed.into_inner().study.unwrap_or_default();
+        match self.json {
+            true => say(json!({"event": "closed", "study": study})),
+            false => say(summary(&study)),
+        }
+    }
+}
+
+impl Remove {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let request = v1::RemoveStudyParticipantRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+            number: self.number,
+            replace: self.replace,
+        };
+        let removed = service.remove_study_participant(request).await;
+        let removed = removed.map_err(refused)?.into_inner();
+        if owned.json {
+            return say(json!(removed));
+        }
+        say(line(&removed.participant.unwrap_or_default()))?;
+        match removed.replacement {
+            Some(link) => print_link(&link, owned.server.url(), false),
+            None => Ok(()),
+        }
+    }
+}
+
+impl DeleteParticipant {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let request = v1::DeleteStudyParticipantRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+            number: self.number,
+        };
+        let deleted = service.delete_study_participant(request).await;
+        let deleted = deleted.map_err(refused)?.into_inner();
+        if owned.json {
+            return say(json!(deleted));
+        }
+        say(format_args!(
+            "the data of participant {} are deleted, with {} games",
+            self.number, deleted.games
+        ))
+    }
+}
+
+fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), CommandError> {
+    let address = format!("{}/study/{}", server.trim_end_matches('/'), link.link);
+    if json {
+        let (number, pseudonym) = (link.number, &link.pseudonym);
+        return say(json!({
+            "number": number, "pseudonym": pseudonym, "link": link.link, "address": address,
+        }));
+    }
+    say(format_args!(
+        "{}\t{}\t{address}",
+        link.number, link.pseudonym
+    ))
+}
+
+/// A study in a line.
+fn summary(study: &v1::Study) -> String {
+    let name = study.settings.as_ref().map_or("", |it| it.name.as_str());
+    let state = if study.closed { "closed" } else { "open" };
+    format!(
+        "study {} ({name}) is {state}: {} completed, {} active, {} invited, {} left",
+        study.study_id, study.completed, study.active, study.invited, study.left
+    )
+}
+
+/// A participant in a line.
+fn line(participant: &v1::StudyParticipant) -> String {
+    let state = participant.state().as_str_name();
+    let state = state
+        .trim_start_matches("STUDY_PARTICIPANT_STATE_")
+        .to_lowercase();
+    let present = if participant.connected {
+        ", present"
+    } else {
+        ""
+    };
+    format!(
+        "{}\t{}\t{state}{present}\tstep {}\t{}",
+        participant.number,
+        participant.pseudonym,
+        participant.step,
+        participant.conditions.join(" ")
+    )
+}

@@ -1,0 +1,96 @@
+//! What is shown of the participants of a room whose study hides them: to everybody, in every message
+//! about the room but its record. Which labels a room has is part of its header.
+
+use std::sync::Arc;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1;
+use chefshat_room::Core;
+use chefshat_room::journal::{GameHeader, ParticipantKind, SeatLabels, StudyGame};
+
+use super::kind::kind_to_proto;
+use super::policy::policy_of;
+
+/// The seats of a room, labelled as its study wants.
+pub(super) fn labelled(core: &Core, mut seats: Vec<v1::Participant>) -> Vec<v1::Participant> {
+    if core.header().labels() == SeatLabels::AsTheyAre {
+        return seats;
+    }
+    for (seat, shown) in core.all_seats().zip(&mut seats) {
+        let standing = core.standing(seat);
+        let kind = match (standing.participant, standing.fill.is_built_in()) {
+            (Some(participant), _) => Some(participant.kind),
+            (None, true) => Some(ParticipantKind::Agent),
+            (None, false) => None,
+        };
+        let (name, kind) = shown_name(core, seat, &shown.name, kind);
+        *shown = v1::Participant {
+            seat: shown.seat,
+            name,
+            kind: kind_to_proto(kind),
+            connected: shown.connected,
+            substituted: shown.substituted,
+            ..v1::Participant::default()
+        };
+    }
+    seats
+}
+
+/// The policy of a room, without the name of the substitute if the names of agents are hidden.
+pub(super) fn shown_policy(core: &Core) -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        substitute: shown_substitute(core),
+        ..policy_of(core)
+    }
+}
+
+/// The name of the agent that substitutes seats; empty if the names of agents are hidden.
+pub(super) fn shown_substitute(core: &Core) -> String {
+    let header = core.header();
+    match header.labels() {
+        SeatLabels::AsTheyAre => header.policy.substitute.name(),
+        SeatLabels::Kinds | SeatLabels::Players => String::new(),
+    }
+}
+
+/// The name and kind of the participant of a seat, as they are shown. The participant of the study
+/// keeps its own.
+pub(super) fn shown_name(
+    core: &Core,
+    seat: Seat,
+    name: &str,
+    kind: Option<ParticipantKind>,
+) -> (String, Option<ParticipantKind>) {
+    let number = seat.index() + 1;
+    let is_own = (core.header().study.as_ref()).is_some_and(|game| game.seat == seat);
+    match (core.header().labels(), kind) {
+        (SeatLabels::AsTheyAre, _) => (name.to_owned(), kind),
+        (_, kind) if is_own => (name.to_owned(), kind),
+        // The seat is free.
+        (_, None) => (String::new(), None),
+        (SeatLabels::Kinds, Some(kind)) => {
+            let word = match kind {
+                ParticipantKind::Agent => "Agent",
+                ParticipantKind::Human => "Player",
+                ParticipantKind::Robot => "Robot",
+            };
+            (format!("{word} {number}"), Some(kind))
+        }
+        (SeatLabels::Players, Some(_)) => (format!("Player {number}"), None),
+    }
+}
+
+/// The header of a game with the names of its participants, for its record.
+pub(super) fn without_labels(header: &Arc<GameHeader>) -> Arc<GameHeader> {
+    let Some(game) = header.study.as_deref() else {
+        return Arc::clone(header);
+    };
+    let game = StudyGame {
+        labels: SeatLabels::AsTheyAre,
+        ..game.clone()
+    };
+    Arc::new(GameHeader {
+        study: Some(Arc::new(game)),
+        ..GameHeader::clone(header)
+    })
+}

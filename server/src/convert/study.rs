@@ -1,0 +1,618 @@
+//! The settings of a study, checked, and what researchers see of it. `study_view` has what
+//! participants see.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_engine::RuleSet;
+use chefshat_proto::v1::{self, rule_set, study_item, study_stage};
+use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
+use chefshat_room::policy::{Durability, Policy, Visibility};
+use chefshat_study::{
+    Condition, Consent, ExternalQuestionnaire, Factor, Hide, Item, ItemKind, Labels, Language,
+    Order, Outcome, Participant, PlayedGame, Questionnaire, Settings, SettingsProblem, Stage,
+    Status, Study, Task, Template, Text,
+};
+
+use super::agent::check_budget;
+use super::name::checked_name;
+use super::number;
+use super::policy::{policy_from_proto, policy_to_proto, requested_policy};
+use super::room::{display_names_from_proto, fills_from_proto};
+use crate::config::MAX_HOSTED_SHIFTS;
+
+/// How long a participant may be away by default, milliseconds.
+const DEFAULT_DROP_OUT_MS: u64 = 1_800_000;
+/// Longest text for programs of the researcher, characters.
+const MAX_ROBOT_BEHAVIOUR: usize = 2000;
+
+/// The checked settings of a study.
+#[derive(Debug)]
+pub struct StudyPlan {
+    /// The settings of its core.
+    pub core: Settings,
+    /// Name for researchers.
+    pub name: String,
+    /// What the core does not know of each condition.
+    pub conditions: Vec<ConditionPlan>,
+}
+
+/// The games of a condition.
+#[derive(Debug)]
+pub struct ConditionPlan {
+    /// The rules.
+    pub rules: RuleSet,
+    /// The rules of practice: the same for one Shift.
+    pub practice_rules: RuleSet,
+    /// The policy.
+    pub policy: Policy,
+    /// What fills the other seats, in their order.
+    pub fills: Vec<Fill>,
+    /// Display names of built-in agents, by index in `fills`.
+    pub names: BTreeMap<usize, String>,
+    /// Text for programs of the researcher.
+    pub robot_behaviour: String,
+    /// What is shown of the seats.
+    pub labels: SeatLabels,
+}
+
+fn problem(field: impl Into<String>, problem: impl Into<String>) -> SettingsProblem {
+    SettingsProblem {
+        field: field.into(),
+        problem: problem.into(),
+    }
+}
+
+/// The settings of a request with every field set. `random` returns random bytes; `durable` says
+/// whether the server's games survive a restart.
+///
+/// # Errors
+/// The first invalid field among those that have defaults.
+pub fn complete_settings(
+    mut message: v1::StudySettings,
+    mut random: impl FnMut() -> [u8; 32],
+    durable: bool,
+) -> Result<v1::StudySettings, SettingsProblem> {
+    message.name = checked_name("name", &message.name, 1).map_err(|it| inner("", &it))?;
+    if message.language.is_empty() {
+        message.language = Language::English.code().to_owned();
+    }
+    let language = language(&message.language)?;
+    if message.order() == v1::StudyOrder::Unspecified {
+        message.order = v1::StudyOrder::Between.into();
+    }
+    if message.assignment_seed.is_empty() {
+        message.assignment_seed = random().to_vec();
+    }
+    if message.drop_out_after_ms == 0 {
+        message.drop_out_after_ms = DEFAULT_DROP_OUT_MS;
+    }
+    for (index, condition) in message.conditions.iter_mut().enumerate() {
+        complete_condition(&format!("conditions[{index}]"), condition, durable)?;
+    }
+    for stage in &mut message.stages {
+        let stages = match &mut stage.stage {
+            Some(study_stage::Stage::PerCondition(block)) => block.stages.iter_mut().collect(),
+            _ => vec![stage],
+        };
+        for stage in stages {
+            if let Some(study_stage::Stage::Questionnaire(it)) = &mut stage.stage {
+                complete_questionnaire(it, language)?;
+            }
+        }
+    }
+    let has_own = |condition: &v1::StudyCondition| !condition.seeds.is_empty();
+    if message.seeds.is_empty() && !message.conditions.iter().all(has_own) {
+        // As many as a participant has games.
+        let probe = v1::StudySettings {
+            seeds: vec![vec![0; 32]],
+            ..message.clone()
+        };
+        let plan = study_plan(&probe)?;
+        Study::new(plan.core.clone())?;
+        let (games, _) = plan.core.games();
+        message.seeds = (0..games.max(1)).map(|_| random().to_vec()).collect();
+    }
+    if message.block_size == 0 {
+        let plan = study_plan(&message)?;
+        Study::new(plan.core.clone())?;
+        message.block_size = number(plan.core.sequences().len());
+    }
+    Ok(message)
+}
+
+fn complete_condition(
+    field: &str,
+    condition: &mut v1::StudyCondition,
+    durable: bool,
+) -> Result<(), SettingsProblem> {
+    let rules = rules_from_proto(&condition.rules.clone().unwrap_or_default())
+        .map_err(|it| inner(&format!("{field}.rules."), &it))?;
+    condition.rules = Some(rules_to_proto(&rules));
+    let length = match rules.stop() {
+        chefshat_engine::Stop::Points(length) | chefshat_engine::Stop::Shifts(length) => length,
+    };
+    if length > MAX_HOSTED_SHIFTS {
+        let words = format!("a game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts");
+        return Err(problem(format!("{field}.rules"), words));
+    }
+    let mut asked = condition.policy.clone().unwrap_or_default();
+    if asked.abort() == v1::AbortPolicy::Unspecified {
+        asked.abort = v1::AbortPolicy::Never.into();
+    }
+    asked.spectators_see_hands = None;
+    let of_policy = |it: FieldProblem| inner(&format!("{field}.policy."), &it);
+    let mut policy = requested_policy(&asked).map_err(of_policy)?;
+    check_budget("substitute", policy.substitute).map_err(of_policy)?;
+    policy.visibility = Visibility::Private;
+    policy.spectators = false;
+    policy.durability = match durable {
+        true => Durability::Durable,
+        false => Durability::Ephemeral,
+    };
+    condition.policy = Some(policy_to_proto(&policy));
+    if condition.labels() == v1::StudyLabels::Unspecified {
+        condition.labels = v1::StudyLabels::AsTheyAre.into();
+    }
+    Ok(())
+}
+
+fn complete_questionnaire(
+    message: &mut v1::StudyQuestionnaire,
+    language: Language,
+) -> Result<(), SettingsProblem> {
+    if message.template.is_empty() {
+        return Ok(());
+    }
+    let name = &message.template;
+    let template = Template::from_name(name)
+        .ok_or_else(|| problem("stages", format!("there is no template {name:?}")))?;
+    let standard = template.questionnaire(language);
+    let default = |text: &mut String, standard: String| {
+        if text.is_empty() {
+            *text = standard;
+        }
+    };
+    default(&mut message.id, standard.id);
+    default(&mut message.title, standard.title);
+    default(&mut message.instructions, standard.instructions);
+    if message.items.is_empty() {
+        message.items = standard.items.iter().map(item_to_proto).collect();
+    }
+    Ok(())
+}
+
+/// Reads complete settings. What the core knows is checked by [`Study::new`].
+///
+/// # Errors
+/// The first invalid field.
+pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProblem> {
+    let mut plans = Vec::new();
+    let mut conditions = Vec::new();
+    for (index, condition) in message.conditions.iter().enumerate() {
+        let (condition, plan) = condition_of(&format!("conditions[{index}]"), condition)?;
+        conditions.push(condition);
+        plans.push(plan);
+    }
+    let mut stages = Vec::new();
+    for (index, stage) in message.stages.iter().enumerate() {
+        stages.push(stage_of(&format!("stages[{index}]"), stage)?);
+    }
+    Ok(StudyPlan {
+        core: Settings {
+            title: message.title.clone(),
+            language: language(&message.language)?,
+            participants: message.participants,
+            factors: (message.factors.iter())
+                .map(|factor| Factor {
+                    name: factor.name.clone(),
+                    levels: factor.levels.clone(),
+                })
+                .collect(),
+            conditions,
+            order: match v1::StudyOrder::try_from(message.order) {
+                Ok(v1::StudyOrder::Unspecified | v1::StudyOrder::Between) => Order::Between,
+                Ok(v1::StudyOrder::Within) => Order::Within,
+                Err(_) => return Err(problem("order", "it is not an order")),
+            },
+            block_size: usize::try_from(message.block_size)
+                .ok()
+                .filter(|size| *size > 0),
+            assignment_seed: seed("assignment_seed", &message.assignment_seed)?,
+            seeds: seeds("seeds", &message.seeds)?,
+            stages,
+            traces: message.traces,
+            drop_out_after_ms: message.drop_out_after_ms,
+            closes_at_ms: Some(message.closes_at_ms).filter(|at_ms| *at_ms > 0),
+        },
+        name: message.name.clone(),
+        conditions: plans,
+    })
+}
+
+fn condition_of(
+    field: &str,
+    message: &v1::StudyCondition,
+) -> Result<(Condition, ConditionPlan), SettingsProblem> {
+    let rules_message = message.rules.clone().unwrap_or_default();
+    let rules =
+        rules_from_proto(&rules_message).map_err(|it| inner(&format!("{field}.rules."), &it))?;
+    let practice_rules = rules_from_proto(&v1::RuleSet {
+        stop: Some(rule_set::Stop::TargetShifts(1)),
+        ..rules_message
+    })
+    .map_err(|it| inner(&format!("{field}.rules."), &it))?;
+    let policy = policy_from_proto(&message.policy.clone().unwrap_or_default())
+        .map_err(|it| inner(&format!("{field}.policy."), &it))?;
+    let players = rules.players();
+    let seats_field = format!("{field}.seats");
+    if message.seats.len() + 1 != players {
+        let words = format!(
+            "{} other seats are described, but the rule set has {players} players, of whom one is the participant",
+            message.seats.len()
+        );
+        return Err(problem(seats_field, words));
+    }
+    let of_seats = |it: FieldProblem| problem(seats_field.clone(), it.message);
+    let mut seats = message.seats.clone();
+    // Only the number of seats counts here.
+    seats.push(v1::SeatConfig::default());
+    let mut fills = fills_from_proto(&seats, &rules).map_err(of_seats)?;
+    let names = display_names_from_proto(&seats).map_err(of_seats)?;
+    fills.pop();
+    for fill in &fills {
+        match fill {
+            Fill::Open { .. } => {}
+            Fill::BuiltIn(agent) => check_budget("seats", *agent).map_err(of_seats)?,
+            Fill::Replay(_) | Fill::AtTable(_) => {
+                let words = "choose a built-in agent or `reserved_for`";
+                return Err(problem(seats_field, words));
+            }
+        }
+    }
+    let behaviour = message.robot_behaviour.chars().count();
+    if behaviour > MAX_ROBOT_BEHAVIOUR {
+        let words = format!("{behaviour} characters are more than {MAX_ROBOT_BEHAVIOUR}");
+        return Err(problem(format!("{field}.robot_behaviour"), words));
+    }
+    let (labels, shown) = match v1::StudyLabels::try_from(message.labels) {
+        Ok(v1::StudyLabels::Unspecified | v1::StudyLabels::AsTheyAre) => {
+            (Labels::AsTheyAre, SeatLabels::AsTheyAre)
+        }
+        Ok(v1::StudyLabels::Kinds) => (Labels::Kinds, SeatLabels::Kinds),
+        Ok(v1::StudyLabels::Players) => (Labels::Players, SeatLabels::Players),
+        Err(_) => return Err(problem(format!("{field}.labels"), "they are not labels")),
+    };
+    let condition = Condition {
+        id: message.id.clone(),
+        levels: (message.levels.iter())
+            .map(|(factor, level)| (factor.clone(), level.clone()))
+            .collect(),
+        players,
+        participant_seat: (message.participant_seat)
+            .map(|seat| usize::try_from(seat).unwrap_or(usize::MAX)),
+        hide: hidden(&format!("{field}.hide"), &message.hide)?,
+        labels,
+        seeds: seeds(&format!("{field}.seeds"), &message.seeds)?,
+    };
+    let plan = ConditionPlan {
+        rules,
+        practice_rules,
+        policy,
+        fills,
+        names,
+        robot_behaviour: message.robot_behaviour.clone(),
+        labels: shown,
+    };
+    Ok((condition, plan))
+}
+
+fn hidden(field: &str, messages: &[i32]) -> Result<BTreeSet<Hide>, SettingsProblem> {
+    let hide = |message: &i32| match v1::StudyHide::try_from(*message) {
+        Ok(v1::StudyHide::Log) => Ok(Hide::Log),
+        Ok(v1::StudyHide::Lookup) => Ok(Hide::Lookup),
+        Ok(v1::StudyHide::Expressions) => Ok(Hide::Expressions),
+        Ok(v1::StudyHide::Played) => Ok(Hide::Played),
+        Ok(v1::StudyHide::Pages) => Ok(Hide::Pages),
+        Ok(v1::StudyHide::Unspecified) | Err(_) => Err(problem(
+            field,
+            format!("{message} is not a part of the page"),
+        )),
+    };
+    messages.iter().map(hide).collect()
+}
+
+fn stage_of(field: &str, message: &v1::StudyStage) -> Result<Stage, SettingsProblem> {
+    if let Some(study_stage::Stage::PerCondition(block)) = &message.stage {
+        let mut tasks = Vec::new();
+        for (index, stage) in block.stages.iter().enumerate() {
+            let field = format!("{field}.per_condition.stages[{index}]");
+            tasks.push(task_of(&field, stage)?);
+        }
+        return Ok(Stage::PerCondition(tasks));
+    }
+    task_of(field, message).map(Stage::Once)
+}
+
+fn task_of(field: &str, message: &v1::StudyStage) -> Result<Task, SettingsProblem> {
+    use study_stage::Stage as Message;
+    Ok(match &message.stage {
+        None => return Err(problem(field, "the stage is empty")),
+        Some(Message::PerCondition(_)) => {
+            return Err(problem(field, "a block cannot have another block in it"));
+        }
+        Some(Message::Consent(consent)) => Task::Consent(Consent {
+            text: consent.text.clone(),
+            version: consent.version.clone(),
+        }),
+        Some(Message::Questionnaire(it)) => {
+            let mut items = Vec::new();
+            for (index, item) in it.items.iter().enumerate() {
+                items.push(item_of(
+                    &format!("{field}.questionnaire.items[{index}]"),
+                    item,
+                )?);
+            }
+            Task::Questionnaire(Questionnaire {
+                id: it.id.clone(),
+                title: it.title.clone(),
+                instructions: it.instructions.clone(),
+                items,
+                shuffled: it.shuffled,
+            })
+        }
+        Some(Message::ExternalQuestionnaire(it)) => Task::External(ExternalQuestionnaire {
+            text: it.text.clone(),
+            url: it.url.clone(),
+        }),
+        Some(Message::Practice(practice)) => Task::Practice {
+            in_data: practice.in_data,
+        },
+        Some(Message::Games(games)) => Task::Games { count: games.count },
+        Some(Message::Text(text)) => Task::Text(Text {
+            title: text.title.clone(),
+            text: text.text.clone(),
+        }),
+    })
+}
+
+fn item_of(field: &str, message: &v1::StudyItem) -> Result<Item, SettingsProblem> {
+    use study_item::Kind;
+    let kind = match message.kind.clone() {
+        None => return Err(problem(field, "say how the item is answered")),
+        Some(Kind::Likert(it)) => ItemKind::Likert {
+            points: it.points,
+            labels: it.labels,
+        },
+        Some(Kind::SemanticDifferential(it)) => ItemKind::SemanticDifferential {
+            points: it.points,
+            left: it.left,
+            right: it.right,
+        },
+        Some(Kind::Slider(it)) => ItemKind::Slider {
+            min: it.min,
+            max: it.max,
+            step: it.step,
+            left: it.left,
+            right: it.right,
+        },
+        Some(Kind::Choice(it)) => ItemKind::Choice {
+            options: it.options,
+            multiple: it.multiple,
+        },
+        Some(Kind::FreeText(it)) => ItemKind::FreeText {
+            max_characters: usize::try_from(it.max_characters).unwrap_or(usize::MAX),
+        },
+    };
+    Ok(Item {
+        id: message.id.clone(),
+        scale: message.scale.clone(),
+        text: message.text.clone(),
+        required: !message.optional,
+        kind,
+    })
+}
+
+fn item_to_proto(item: &Item) -> v1::StudyItem {
+    v1::StudyItem {
+        id: item.id.clone(),
+        scale: item.scale.clone(),
+        text: item.text.clone(),
+        optional: !item.required,
+        kind: Some(item_kind(item.kind.clone())),
+    }
+}
+
+/// How an item is answered, as a message.
+pub(super) fn item_kind(kind: ItemKind) -> study_item::Kind {
+    use study_item::Kind;
+    match kind {
+        ItemKind::Likert { points, labels } => Kind::Likert(v1::StudyLikert { points, labels }),
+        ItemKind::SemanticDifferential {
+            points,
+            left,
+            right,
+        } => Kind::SemanticDifferential(v1::StudySemanticDifferential {
+            points,
+            left,
+            right,
+        }),
+        ItemKind::Slider {
+            min,
+            max,
+            step,
+            left,
+            right,
+        } => Kind::Slider(v1::StudySlider {
+            min,
+            max,
+            step,
+            left,
+            right,
+        }),
+        ItemKind::Choice { options, multiple } => {
+            Kind::Choice(v1::StudyChoice { options, multiple })
+        }
+        ItemKind::FreeText { max_characters } => Kind::FreeText(v1::StudyFreeText {
+            max_characters: number(max_characters),
+        }),
+    }
+}
+
+fn language(code: &str) -> Result<Language, SettingsProblem> {
+    Language::from_code(code).ok_or_else(|| {
+        problem(
+            "language",
+            format!("{code:?} is not a language of the page"),
+        )
+    })
+}
+
+fn seed(field: &str, bytes: &[u8]) -> Result<[u8; 32], SettingsProblem> {
+    bytes
+        .try_into()
+        .map_err(|_| problem(field, format!("{} bytes; a seed has 32", bytes.len())))
+}
+
+fn seeds(field: &str, seeds: &[Vec<u8>]) -> Result<Vec<[u8; 32]>, SettingsProblem> {
+    let seeds = seeds.iter().enumerate();
+    seeds
+        .map(|(index, bytes)| seed(&format!("{field}[{index}]"), bytes))
+        .collect()
+}
+
+/// A problem within a message, under the path of the message.
+fn inner(path: &str, of_field: &FieldProblem) -> SettingsProblem {
+    problem(
+        format!("{path}{}", of_field.field),
+        of_field.message.clone(),
+    )
+}
+
+/// A study as a message, for researchers.
+pub fn study_to_proto(
+    id: Id,
+    settings: &v1::StudySettings,
+    created_at_ms: u64,
+    study: &Study,
+) -> v1::Study {
+    let (games, practice_games) = study.settings().games();
+    let mut counts = [0; 4];
+    for participant in study.participants().values() {
+        counts[match participant.status {
+            Status::Invited => 0,
+            Status::Active => 1,
+            Status::Completed => 2,
+            Status::Withdrawn | Status::DroppedOut | Status::Removed => 3,
+        }] += 1;
+    }
+    let [invited, active, completed, left] = counts;
+    v1::Study {
+        study_id: id.to_string(),
+        settings: Some(settings.clone()),
+        seeds_sha256: study.settings().seeds_sha256().to_vec(),
+        created_at_ms,
+        closed: study.is_closed(),
+        steps: number(study.step_count()),
+        games,
+        practice_games,
+        added: number(study.participants().len()),
+        invited,
+        active,
+        completed,
+        left,
+    }
+}
+
+/// A participant as a message, for researchers. `join_code` has that of the room of a running game.
+pub fn study_participant(
+    study: &Study,
+    plan: &StudyPlan,
+    number_of: u32,
+    join_code: impl Fn(Id) -> String,
+) -> Option<v1::StudyParticipant> {
+    let participant = study.participant(number_of)?;
+    let conditions = &study.settings().conditions;
+    let sequence = study.sequence_of(participant).unwrap_or_default();
+    Some(v1::StudyParticipant {
+        number: number_of,
+        pseudonym: participant.pseudonym.clone(),
+        state: participant_state(participant.status).into(),
+        slot: participant.slot,
+        conditions: (sequence.iter())
+            .map(|condition| conditions[*condition].id.clone())
+            .collect(),
+        step: number(participant.step()),
+        connected: study.is_connected(number_of),
+        sessions: participant.session,
+        began_at_ms: participant.reached_at_ms.first().copied().unwrap_or(0),
+        ended_at_ms: participant.ended_at_ms.unwrap_or(0),
+        consent: participant
+            .consent
+            .as_ref()
+            .map(|consent| v1::StudyConsentGiven {
+                text_sha256: consent.text_sha256.to_vec(),
+                version: consent.version.clone(),
+                language: consent.language.clone(),
+                at_ms: consent.at_ms,
+            }),
+        games: (participant.games.iter())
+            .map(|game| study_game(study, plan, participant, game, &join_code))
+            .collect(),
+        data_deleted: participant.data_deleted,
+    })
+}
+
+fn study_game(
+    study: &Study,
+    plan: &StudyPlan,
+    participant: &Participant,
+    game: &PlayedGame,
+    join_code: &impl Fn(Id) -> String,
+) -> v1::StudyGame {
+    let placed = &game.placed;
+    let condition = &plan.conditions[placed.condition];
+    let (ended, ended_at_ms) = match game.ended {
+        None => (v1::RoomState::Unspecified, 0),
+        Some((Outcome::Finished, at_ms)) => (v1::RoomState::Finished, at_ms),
+        Some((Outcome::Aborted, at_ms)) => (v1::RoomState::Aborted, at_ms),
+    };
+    let runs = game.ended.is_none() && participant.status == Status::Active;
+    let has_open = (condition.fills.iter()).any(|fill| matches!(fill, Fill::Open { .. }));
+    v1::StudyGame {
+        step: number(placed.step),
+        condition: study.settings().conditions[placed.condition].id.clone(),
+        practice: placed.practice,
+        seed_index: placed.seed_index.map(number),
+        seat: number(placed.seat),
+        attempt: placed.attempt,
+        room_id: Id(placed.room).to_string(),
+        game_id: Id(placed.game).to_string(),
+        ended: ended.into(),
+        ended_at_ms,
+        join_code: match runs && has_open {
+            true => join_code(Id(placed.room)),
+            false => String::new(),
+        },
+        robot_behaviour: match runs {
+            true => condition.robot_behaviour.clone(),
+            false => String::new(),
+        },
+    }
+}
+
+/// The state of a participant as a message.
+pub fn participant_state(status: Status) -> v1::StudyParticipantState {
+    match status {
+        Status::Invited => v1::StudyParticipantState::Invited,
+        Status::Active => v1::StudyParticipantState::Active,
+        Status::Completed => v1::StudyParticipantState::Completed,
+        Status::Withdrawn => v1::StudyParticipantState::Withdrawn,
+        Status::DroppedOut => v1::StudyParticipantState::DroppedOut,
+        Status::Removed => v1::StudyParticipantState::Removed,
+    }
+}
+
+/// The kind of the participant's seat.
+pub const PARTICIPANT_KIND: ParticipantKind = ParticipantKind::Human;

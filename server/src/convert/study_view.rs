@@ -1,0 +1,132 @@
+//! What participants of a study see and answer, as messages. `chefshat_study::View` decides what
+//! that is.
+
+use chefshat_proto::v1::{self, study_item, study_item_answer, study_shown_item, study_view};
+use chefshat_room::ids::Id;
+use chefshat_study::{
+    Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownQuestionnaire, View,
+};
+
+use super::number;
+use super::study::item_kind;
+
+/// A view as a message. `ticket_of` has the ticket of the participant's seat in a room.
+pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::StudyView {
+    use study_view::Content as Message;
+    v1::StudyView {
+        title: view.title,
+        language: view.language.code().to_owned(),
+        pseudonym: view.pseudonym,
+        step: number(view.step),
+        steps: number(view.steps),
+        traces: view.traces,
+        content: Some(match view.content {
+            Content::Consent(consent) => Message::Consent(v1::StudyConsent {
+                text: consent.text,
+                version: consent.version,
+            }),
+            Content::Questionnaire(it) => Message::Questionnaire(questionnaire(it)),
+            Content::External(it) => {
+                Message::ExternalQuestionnaire(v1::StudyExternalQuestionnaire {
+                    text: it.text,
+                    url: it.url,
+                })
+            }
+            Content::Text(text) => Message::Text(v1::StudyText {
+                title: text.title,
+                text: text.text,
+            }),
+            Content::Game(game) => Message::Game(shown_game(&game, ticket_of)),
+            Content::End(end) => Message::End(v1::StudyEnd {
+                reason: end_reason(end).into(),
+            }),
+        }),
+    }
+}
+
+fn questionnaire(shown: ShownQuestionnaire) -> v1::StudyShownQuestionnaire {
+    v1::StudyShownQuestionnaire {
+        title: shown.title,
+        instructions: shown.instructions,
+        items: shown.items.into_iter().map(item).collect(),
+    }
+}
+
+fn item(shown: ShownItem) -> v1::StudyShownItem {
+    use study_item::Kind;
+    use study_shown_item::Kind as Shown;
+    v1::StudyShownItem {
+        item: number(shown.item),
+        text: shown.text,
+        optional: !shown.required,
+        kind: Some(match item_kind(shown.kind) {
+            Kind::Likert(it) => Shown::Likert(it),
+            Kind::SemanticDifferential(it) => Shown::SemanticDifferential(it),
+            Kind::Slider(it) => Shown::Slider(it),
+            Kind::Choice(it) => Shown::Choice(it),
+            Kind::FreeText(it) => Shown::FreeText(it),
+        }),
+    }
+}
+
+fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(Id) -> String) -> v1::StudyShownGame {
+    let (room_id, game_id, ticket) = match game.place {
+        None => (String::new(), String::new(), String::new()),
+        Some((room, game)) => {
+            let room = Id(room);
+            (room.to_string(), Id(game).to_string(), ticket_of(room))
+        }
+    };
+    let hide = game.hide.iter().map(|part| match part {
+        Hide::Log => v1::StudyHide::Log,
+        Hide::Lookup => v1::StudyHide::Lookup,
+        Hide::Expressions => v1::StudyHide::Expressions,
+        Hide::Played => v1::StudyHide::Played,
+        Hide::Pages => v1::StudyHide::Pages,
+    });
+    v1::StudyShownGame {
+        practice: game.practice,
+        game: game.game,
+        games: game.games,
+        hide: hide.map(i32::from).collect(),
+        room_id,
+        game_id,
+        ticket,
+        ended: game.ended,
+    }
+}
+
+fn end_reason(end: End) -> v1::StudyEndReason {
+    match end {
+        End::Completed => v1::StudyEndReason::Completed,
+        End::Withdrawn => v1::StudyEndReason::Withdrawn,
+        End::DataDeleted => v1::StudyEndReason::DataDeleted,
+        End::DroppedOut => v1::StudyEndReason::DroppedOut,
+        End::Removed => v1::StudyEndReason::Removed,
+    }
+}
+
+/// The answers of a request; `Err` is the item of one without a value.
+///
+/// # Errors
+/// An answer has no value.
+pub fn answers_from_proto(answers: Vec<v1::StudyItemAnswer>) -> Result<Vec<ItemAnswer>, u32> {
+    use study_item_answer::Value;
+    let wide = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
+    let answer = |message: v1::StudyItemAnswer| {
+        let value = match message.value {
+            None => return Err(message.item),
+            Some(Value::Number(number)) => Answer::Number(number),
+            Some(Value::Options(chosen)) => {
+                Answer::Options(chosen.options.into_iter().map(wide).collect())
+            }
+            Some(Value::Text(text)) => Answer::Text(text),
+        };
+        Ok(ItemAnswer {
+            item: wide(message.item),
+            value,
+            answered_after_ms: message.answered_after_ms,
+        })
+    };
+    answers.into_iter().map(answer).collect()
+}

@@ -1,0 +1,134 @@
+//! `InstrumentService`: what instruments and the researcher add to the recording of a room.
+
+use std::pin::Pin;
+use std::time::Duration;
+
+use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
+use chefshat_record::convert::{FieldProblem, check_label};
+use chefshat_room::ids::Token;
+use chefshat_room::journal::Marked;
+use chefshat_room::{MARKERS_AT_ONCE, MAX_MARKERS, MarkError};
+use futures::{Stream, stream};
+use tokio::time::Instant;
+use tonic::{Code, Request, Response, Status};
+
+use super::reach::Reach;
+use super::status::{Refusal, field, owner_token_wrong, room_gone, status};
+use crate::access::Caller;
+use crate::room::{Handle, MarkRequest, MarkerFollower};
+
+/// Why a marker is refused, if a field is.
+const REFUSED: &str = "MARKER_REFUSED";
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct Instruments {
+    reach: Reach,
+}
+
+impl Instruments {
+    /// Creates the service for the rooms that callers reach.
+    pub fn new(reach: Reach) -> Self {
+        Self { reach }
+    }
+
+    /// A room, and the secret of what may be its owner's token.
+    async fn find(
+        &self,
+        caller: Caller,
+        room_id: &str,
+        owner_token: &str,
+    ) -> Result<(Handle, [u8; 32]), Status> {
+        let caller = caller.showing(owner_token);
+        let room = self.reach.room(&caller, room_id).await?;
+        let token = Token::parse(owner_token).filter(|token| token.room == room.id());
+        Ok((room, token.ok_or_else(owner_token_wrong)?.secret))
+    }
+}
+
+#[tonic::async_trait]
+impl InstrumentService for Instruments {
+    type FollowMarkersStream =
+        Pin<Box<dyn Stream<Item = Result<v1::FollowMarkersResponse, Status>> + Send>>;
+
+    async fn add_marker(
+        &self,
+        request: Request<v1::AddMarkerRequest>,
+    ) -> Result<Response<v1::AddMarkerResponse>, Status> {
+        let arrived = Instant::now();
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (room, secret) = self
+            .find(caller, &request.room_id, &request.owner_token)
+            .await?;
+        check_label(&request.label).map_err(|problem| field(REFUSED, &problem))?;
+        let moment = match request.elapsed_us {
+            Some(elapsed_us) => Duration::from_micros(elapsed_us),
+            None => room.clock().at(arrived),
+        };
+        let marked = Marked {
+            label: request.label,
+            moment,
+        };
+        let marker = room.mark(MarkRequest { secret, marked }).await;
+        let marker = marker.map_err(Refusal::from)?;
+        let marker = marker.ok_or_else(owner_token_wrong)?.map_err(refused)?;
+        Ok(Response::new(v1::AddMarkerResponse {
+            marker: Some(marker),
+        }))
+    }
+
+    async fn follow_markers(
+        &self,
+        request: Request<v1::FollowMarkersRequest>,
+    ) -> Result<Response<Self::FollowMarkersStream>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (room, secret) = self
+            .find(caller, &request.room_id, &request.owner_token)
+            .await?;
+        let from = request.from_number.saturating_sub(1);
+        let from = usize::try_from(from).unwrap_or(usize::MAX);
+        let following = room.follow_markers(secret, from).await;
+        let following = following.map_err(Refusal::from)?;
+        let following = following.ok_or_else(owner_token_wrong)?;
+        let following = following.map_err(Refusal::from)?;
+        Ok(Response::new(Box::pin(followed(following))))
+    }
+}
+
+/// The messages of a stream that follows markers.
+fn followed(
+    follower: MarkerFollower,
+) -> impl Stream<Item = Result<v1::FollowMarkersResponse, Status>> {
+    stream::unfold(Some(follower), |follower| async move {
+        let mut follower = follower?;
+        match follower.next().await {
+            Ok(Some(markers)) => {
+                let response = v1::FollowMarkersResponse { markers };
+                Some((Ok(response), Some(follower)))
+            }
+            Ok(None) => None,
+            Err(_) => Some((Err(room_gone()), None)),
+        }
+    })
+}
+
+/// The status for a refused marker.
+fn refused(error: MarkError) -> Status {
+    let too_many = |limit: &str| {
+        let metadata = [("limit", limit)];
+        status(
+            Code::ResourceExhausted,
+            "TOO_MANY_MARKERS",
+            error.to_string(),
+            metadata,
+        )
+    };
+    match error {
+        MarkError::GameOver => status(Code::FailedPrecondition, "GAME_OVER", error.to_string(), []),
+        MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
+        MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
+        MarkError::Future => field(REFUSED, &FieldProblem::new("elapsed_us", error.to_string())),
+    }
+}

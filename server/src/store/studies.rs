@@ -1,0 +1,44 @@
+//! The stored values of a study: its header, the changes of its journal, and interface traces. Games
+//! are stored as games. The encoding belongs to the store that needs one.
+
+use chefshat_proto::v1;
+use chefshat_study::Change;
+
+use chefshat_room::ids::{Id, SecretHash};
+
+/// The header of a study, which exists before it has participants.
+#[derive(Debug, Clone)]
+pub struct StudyHeader {
+    /// The study. Its last four bytes are 0, so that links can leave them out.
+    pub id: Id,
+    /// The settings, every field set.
+    pub settings: v1::StudySettings,
+    /// When it was created, milliseconds since the Unix epoch.
+    pub created_at_ms: u64,
+    /// The hash of the owner token.
+    pub owner: SecretHash,
+    /// The key of its links, sessions and tickets.
+    pub key: [u8; 32],
+}
+
+/// A study in the store.
+#[derive(Debug, Clone)]
+pub struct StoredStudy {
+    /// Its header.
+    pub header: StudyHeader,
+    /// The changes of its journal, in order.
+    pub changes: Vec<Change>,
+    /// Number of rows of the journal.
+    pub rows: u64,
+}
+
+/// Interface traces of a game.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredTraces {
+    /// Number of the participant.
+    pub number: u32,
+    /// The game.
+    pub game: Id,
+    /// The traces, in order.
+    pub traces: Vec<v1::StudyTrace>,
+}

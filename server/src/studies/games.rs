@@ -1,0 +1,223 @@
+//! The games of participants and their rooms: a due game is assigned a room, which is created once
+//! that is committed, and after its end its outcome is read from the store. The core decides which
+//! game comes next.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_engine::Seat;
+use chefshat_study::{Outcome, PlayedGame};
+use tokio::time::Instant;
+use tracing::warn;
+
+use super::task::Task;
+use crate::clock::since_epoch_ms;
+use crate::config::TOURNAMENT_RETRY;
+use crate::convert::PARTICIPANT_KIND;
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use crate::store::{StoreError, StoredGame};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame};
+
+impl Task {
+    /// Assigns rooms to the games of participants who are there and have none.
+    pub(super) fn place_due_games(&mut self) {
+        for number in std::mem::take(&mut self.touched) {
+            if !self.state.is_connected(number) {
+                continue;
+            }
+            let (room, game) = (Id::random(), Id::random());
+            if let Some(change) = self.state.place(number, room.0, game.0) {
+                self.fold(change);
+            }
+        }
+        // Placing a game touches its participant, for whom nothing is due then.
+        self.touched.clear();
+    }
+
+    /// Reads the outcomes of games that have ended.
+    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
+        let playing: Vec<u32> = self.playing.iter().copied().collect();
+        for number in playing {
+            let participant = self.state.participant(number);
+            let Some(game) = participant.and_then(|it| it.games.last()).cloned() else {
+                continue;
+            };
+            if self.without_room.contains(&number) {
+                if !self.is_active(number) {
+                    self.end_game(number, &game, Outcome::Aborted);
+                }
+                continue;
+            }
+            let room = Id(game.placed.room);
+            if self.rooms.is_over(room) == Some(false) || self.rooms.is_suspended(room) {
+                continue;
+            }
+            match self.outcome(&game).await? {
+                Some(outcome) => self.end_game(number, &game, outcome),
+                // The server ended before the room was created.
+                None if self.is_active(number) => drop(self.without_room.insert(number)),
+                None => self.end_game(number, &game, Outcome::Aborted),
+            }
+        }
+        Ok(())
+    }
+
+    fn end_game(&mut self, number: u32, game: &PlayedGame, outcome: Outcome) {
+        let id = game.placed.game;
+        if let Some(change) = (self.state).game_ended(number, id, outcome, since_epoch_ms()) {
+            self.fold(change);
+        }
+        self.closing.remove(&Id(game.placed.room));
+    }
+
+    /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
+    async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
+        let stored = self.rooms.store().finished(Id(game.placed.game)).await?;
+        if let Some(StoredGame::Hosted(_, entries, _)) = stored {
+            let was_aborted = (entries.iter()).any(|it| matches!(it.change, Change::Aborted(_)));
+            return Ok(Some(match was_aborted {
+                true => Outcome::Aborted,
+                false => Outcome::Finished,
+            }));
+        }
+        // A game that was aborted before it began has no record.
+        let had_room = self.rooms.get(Id(game.placed.room)).is_some();
+        Ok(had_room.then_some(Outcome::Aborted))
+    }
+
+    /// Creates the rooms of placed games. Returns whether there were any.
+    pub(super) async fn make_rooms(&mut self) -> Result<bool, StoreError> {
+        if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+            return Ok(false);
+        }
+        self.retry = None;
+        let mut any = false;
+        for number in self.without_room.clone() {
+            let Some(new) = self.new_room(number) else {
+                continue;
+            };
+            match self.rooms.create(new).await {
+                Ok(_) => {
+                    self.without_room.remove(&number);
+                    self.handle.notify(number);
+                    any = true;
+                }
+                // The game was aborted before it began, and then the server was restarted; or its
+                // id is taken by another one.
+                Err(CreateError::Store(StoreError::Taken(_))) => {
+                    let participant = self.state.participant(number);
+                    if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
+                        self.end_game(number, &game, Outcome::Aborted);
+                    }
+                }
+                Err(CreateError::Store(error)) => return Err(error),
+                // When the server is restarted, the game gets its room.
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(error) => {
+                    if self.retry.replace(retry()).is_none() {
+                        warn!(study = %self.handle.id(), %error, "games of a study wait for rooms");
+                    }
+                }
+            }
+        }
+        Ok(any)
+    }
+
+    /// Closes the rooms of participants who have left.
+    pub(super) fn close_rooms(&mut self) {
+        for number in &self.playing {
+            let participant = self.state.participant(*number);
+            let Some(game) = participant.and_then(|it| it.games.last()) else {
+                continue;
+            };
+            let room = Id(game.placed.room);
+            if !self.is_active(*number)
+                && let Some(handle) = self.rooms.get(room)
+                && self.closing.insert(room)
+            {
+                tokio::spawn(async move { handle.close_without_token().await });
+            }
+        }
+    }
+
+    /// The settings of the room of a participant's game.
+    fn new_room(&self, number: u32) -> Option<NewRoom> {
+        let participant = self.state.participant(number)?;
+        let placed = &participant.games.last()?.placed;
+        let settings = self.state.settings();
+        let condition = &settings.conditions[placed.condition];
+        let plan = &self.handle.plan.conditions[placed.condition];
+        let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let room = Id(placed.room);
+        let seat = placed.seat;
+        let mut fills = plan.fills.clone();
+        fills.insert(
+            seat.min(fills.len()),
+            Fill::Open {
+                reserved_for: Some(PARTICIPANT_KIND),
+            },
+        );
+        let names = plan.names.iter();
+        let display_names = names.map(|(index, name)| {
+            let behind = usize::from(*index >= seat);
+            (index + behind, name.clone())
+        });
+        let seated = SeatedParticipant {
+            name: participant.pseudonym.clone(),
+            kind: PARTICIPANT_KIND,
+            ticket: self.handle.ticket_of(room).hash(),
+        };
+        let seeds = match condition.seeds.is_empty() {
+            true => &settings.seeds,
+            false => &condition.seeds,
+        };
+        Some(NewRoom {
+            // What everybody with a seat sees: it must not name the condition.
+            name: settings
+                .title
+                .chars()
+                .take(crate::config::MAX_NAME_CHARS)
+                .collect(),
+            rules: match placed.practice {
+                true => plan.practice_rules,
+                false => plan.rules,
+            },
+            policy: plan.policy.clone(),
+            fills,
+            display_names: display_names.collect(),
+            recorded: BTreeMap::new(),
+            wizards: std::collections::BTreeSet::new(),
+            start: GameStart::default(),
+            game_seed: placed.seed_index.map(|index| seeds[index]),
+            physical: false,
+            request: None,
+            charged: self.handle.charged,
+            seating: Some(Seating {
+                part_of: PartOf::Study(Arc::new(StudyGame {
+                    study: self.handle.id(),
+                    name: self.handle.plan.name.clone(),
+                    condition: condition.id.clone(),
+                    levels: condition.levels.clone(),
+                    number,
+                    participant: participant.pseudonym.clone(),
+                    session: participant.session,
+                    step: small(placed.step),
+                    practice: placed.practice,
+                    seed_index: placed.seed_index.map(small),
+                    seat: Seat::new(seat),
+                    attempt: placed.attempt,
+                    labels: plan.labels,
+                })),
+                owner: self.handle.room_owner(room),
+                game_id: Id(placed.game),
+                participants: BTreeMap::from([(seat, seated)]),
+                server_seed: None,
+            }),
+        })
+    }
+}
+
+fn retry() -> Instant {
+    Instant::now() + TOURNAMENT_RETRY
+}

@@ -1,0 +1,36 @@
+//! Messages to the task of a study.
+
+use chefshat_study::{Change, Refusal, Study};
+use tokio::sync::oneshot;
+
+/// What a researcher or participant asks for: decides on the state that includes pending changes,
+/// at a time in milliseconds since the Unix epoch, and returns the changes that follow and a number
+/// for the caller.
+pub(super) type Command =
+    Box<dyn FnOnce(&Study, u64) -> Result<(Vec<Change>, u32), Refusal> + Send + Sync>;
+
+/// A message to the task of a study.
+pub(super) enum Message {
+    /// Executes a command; answers once its changes are committed.
+    Command(Command, oneshot::Sender<Result<u32, Refusal>>),
+    /// A stream shows the study to a participant.
+    Present {
+        /// The participant.
+        number: u32,
+        /// Its session.
+        session: u32,
+        /// Number of the stream.
+        stream: u64,
+    },
+    /// A stream has ended.
+    Gone {
+        /// The participant.
+        number: u32,
+        /// Number of the stream.
+        stream: u64,
+    },
+}
+
+/// The server ends, and the study with it.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopped;

@@ -1,0 +1,687 @@
+//! A study over real sockets: two conditions, eight scripted participants and one who is replaced.
+//! One withdraws, one changes the device, the server is restarted in the middle of games. All that
+//! participants receive is recorded, and searched for what would name a condition.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use chefshat_client::{Client, RandomAgent};
+use chefshat_proto::v1::participation_service_client::ParticipationServiceClient;
+use chefshat_proto::v1::record_service_client::RecordServiceClient;
+use chefshat_proto::v1::room_service_client::RoomServiceClient;
+use chefshat_proto::v1::study_service_client::StudyServiceClient;
+use chefshat_proto::v1::{
+    self, record_line::Line, seat_config::FilledBy, study_item_answer::Value,
+    study_shown_item::Kind, study_stage::Stage, study_view::Content,
+};
+use chefshat_record::replay::replay;
+use chefshat_room::ids::Id;
+use chefshat_server::access::SECRET_HEADER;
+use chefshat_server::config::ServerConfig;
+use chefshat_server::host::Host;
+use chefshat_server::store::{SqliteStore, Store as _};
+use chefshat_tests::{one_shift, patiently};
+use futures::future::join_all;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream};
+use tonic::transport::Channel;
+use tonic::{Code, Request, Status};
+use tonic_types::StatusExt as _;
+
+/// What no participant may receive: all that names the study for researchers, a factor, a level, a
+/// condition, an agent or a robot's behaviour.
+const SECRETS: [&str; 12] = [
+    "warmth-study-2031",
+    "temperament",
+    "level-warm",
+    "level-cold",
+    "condition-warm",
+    "condition-cold",
+    "Robot Carla",
+    "Robot Dora",
+    "greedy",
+    "trained",
+    "behaves-warmly",
+    "behaves-coldly",
+];
+const PARTICIPANTS: u32 = 8;
+/// Games of a participant, without practice.
+const GAMES: usize = 2;
+/// Steps: consent, questionnaire, practice, games, text.
+const STEPS: u32 = 5;
+
+/// A connection of participants to the server, whose address may change, that records what they
+/// receive.
+struct Tap {
+    address: SocketAddr,
+    target: Arc<Mutex<SocketAddr>>,
+    /// The bytes of each connection.
+    received: Received,
+}
+
+type Received = Arc<Mutex<Vec<Vec<u8>>>>;
+
+impl Tap {
+    async fn new(target: SocketAddr) -> Self {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
+        let listener = listener.expect("a free port");
+        let address = listener.local_addr().expect("bound");
+        let (target, received) = (Arc::new(Mutex::new(target)), Arc::default());
+        let (to, into) = (Arc::clone(&target), Arc::clone(&received));
+        tokio::spawn(async move {
+            while let Ok((client, _)) = listener.accept().await {
+                let address = *to.lock().expect("not poisoned");
+                tokio::spawn(forward(client, address, Arc::clone(&into)));
+            }
+        });
+        Self {
+            address,
+            target,
+            received,
+        }
+    }
+
+    fn url(&self) -> String {
+        format!("http://{}", self.address)
+    }
+}
+
+/// Forwards a connection, and records what its client receives.
+async fn forward(client: TcpStream, address: SocketAddr, received: Received) {
+    let Ok(server) = TcpStream::connect(address).await else {
+        return;
+    };
+    let (mut from_client, mut to_client) = client.into_split();
+    let (mut from_server, mut to_server) = server.into_split();
+    let up = async {
+        let _ = tokio::io::copy(&mut from_client, &mut to_server).await;
+        let _ = to_server.shutdown().await;
+    };
+    let down = async {
+        let connection = {
+            let mut all = received.lock().expect("not poisoned");
+            all.push(Vec::new());
+            all.len() - 1
+        };
+        let mut buffer = vec![0; 64 * 1024];
+        while let Ok(count @ 1..) = from_server.read(&mut buffer).await {
+            received.lock().expect("not poisoned")[connection].extend(&buffer[..count]);
+            if to_client.write_all(&buffer[..count]).await.is_err() {
+                break;
+            }
+        }
+        let _ = to_client.shutdown().await;
+    };
+    tokio::join!(up, down);
+}
+
+async fn host(folder: &Path) -> Host {
+    let store = SqliteStore::open(folder).await.expect("a store");
+    let config = ServerConfig {
+        data_dir: Some(PathBuf::from(folder)),
+        grace: std::time::Duration::ZERO,
+        ..ServerConfig::default()
+    };
+    let host = Host::start(config, Arc::new(store)).await;
+    host.expect("a free port")
+}
+
+fn address(host: &Host) -> SocketAddr {
+    let url = host.url();
+    let address = url.trim_start_matches("http://").parse();
+    address.expect("an address")
+}
+
+fn stage(stage: Stage) -> v1::StudyStage {
+    v1::StudyStage { stage: Some(stage) }
+}
+
+fn condition(temperament: &str, robot: &str, agent: &str, behaviour: &str) -> v1::StudyCondition {
+    let level = format!("level-{temperament}");
+    let seat = v1::SeatConfig {
+        filled_by: Some(FilledBy::BuiltInAgent(agent.to_owned())),
+        name: robot.to_owned(),
+    };
+    v1::StudyCondition {
+        id: format!("condition-{temperament}"),
+        levels: [("temperament".to_owned(), level)].into(),
+        rules: Some(one_shift()),
+        policy: Some(v1::RoomPolicy {
+            pace_ms: Some(0),
+            substitute: agent.to_owned(),
+            ..v1::RoomPolicy::default()
+        }),
+        seats: vec![seat; 3],
+        robot_behaviour: behaviour.to_owned(),
+        labels: v1::StudyLabels::Players.into(),
+        ..v1::StudyCondition::default()
+    }
+}
+
+fn settings() -> v1::StudySettings {
+    v1::StudySettings {
+        name: "warmth-study-2031".to_owned(),
+        title: "A game of cards".to_owned(),
+        participants: PARTICIPANTS,
+        factors: vec![v1::StudyFactor {
+            name: "temperament".to_owned(),
+            levels: vec!["level-warm".to_owned(), "level-cold".to_owned()],
+        }],
+        conditions: vec![
+            condition("warm", "Robot Carla", "greedy", "behaves-warmly"),
+            condition("cold", "Robot Dora", "trained", "behaves-coldly"),
+        ],
+        stages: vec![
+            stage(Stage::Consent(v1::StudyConsent {
+                text: "I take part.".to_owned(),
+                version: "1".to_owned(),
+            })),
+            stage(Stage::Questionnaire(v1::StudyQuestionnaire {
+                template: "nasa_tlx".to_owned(),
+                ..v1::StudyQuestionnaire::default()
+            })),
+            stage(Stage::Practice(v1::StudyPractice { in_data: false })),
+            stage(Stage::Games(v1::StudyGames {
+                count: u32::try_from(GAMES).expect("few"),
+            })),
+            stage(Stage::Text(v1::StudyText {
+                title: "Thank you".to_owned(),
+                text: "That is all.".to_owned(),
+            })),
+        ],
+        traces: true,
+        ..v1::StudySettings::default()
+    }
+}
+
+/// A participant with a device of its own.
+struct Person {
+    service: ParticipationServiceClient<Channel>,
+    client: Client,
+    link: String,
+    session: String,
+}
+
+impl Person {
+    async fn new(tap: &Tap, link: &str) -> (Self, v1::StudyView) {
+        let url = tap.url();
+        let endpoint = Channel::from_shared(url.clone()).expect("a URL");
+        let mut person = Self {
+            service: ParticipationServiceClient::new(
+                endpoint.connect().await.expect("the server listens"),
+            ),
+            client: Client::connect(url).await.expect("the server listens"),
+            link: link.to_owned(),
+            session: String::new(),
+        };
+        let view = person.open().await.expect("the link is valid");
+        (person, view)
+    }
+
+    async fn open(&mut self) -> Result<v1::StudyView, Status> {
+        let link = self.link.clone();
+        let opened = self
+            .service
+            .open_study(v1::OpenStudyRequest { link })
+            .await?;
+        let opened = opened.into_inner();
+        self.session = opened.session;
+        Ok(opened.view.expect("a view"))
+    }
+
+    /// What is shown, once it is what is wanted.
+    async fn until(&mut self, wanted: impl Fn(&Content) -> bool) -> v1::StudyView {
+        let session = self.session.clone();
+        let request = v1::FollowParticipationRequest { session };
+        let following = async {
+            let followed = self.service.follow_participation(request).await;
+            let mut views = followed.expect("the session is open").into_inner();
+            while let Some(message) = views.message().await.expect("the stream lasts") {
+                if let Some(view) = message.view
+                    && wanted(view.content.as_ref().expect("content"))
+                {
+                    return view;
+                }
+            }
+            panic!("the stream ended");
+        };
+        patiently("the next view", following).await
+    }
+
+    /// Does what a view shows. Returns what follows, and the seat's ticket if it was a game.
+    async fn act(&mut self, view: v1::StudyView) -> (v1::StudyView, Option<String>) {
+        let (session, step) = (self.session.clone(), view.step);
+        match view.content.expect("content") {
+            Content::Consent(_) => {
+                let request = v1::GiveConsentRequest { session, step };
+                let given = self.service.give_consent(request).await.expect("its step");
+                (given.into_inner().view.expect("a view"), None)
+            }
+            Content::Questionnaire(shown) => {
+                let answers = shown.items.iter().map(answer).collect();
+                let request = v1::AnswerQuestionnaireRequest {
+                    session,
+                    step,
+                    answers,
+                };
+                let answered = self.service.answer_questionnaire(request).await;
+                let answered = answered.expect("the answers are valid").into_inner();
+                (answered.view.expect("a view"), None)
+            }
+            Content::Game(_) => {
+                let view = self.until(|content| playable(content).is_some()).await;
+                let game = view.content.as_ref().and_then(playable).expect("a game");
+                let ticket = game.ticket.clone();
+                if !game.ended {
+                    self.trace(&game.game_id).await;
+                    let playing = self.client.play(ticket.clone(), RandomAgent::new(7));
+                    patiently("the game to end", playing)
+                        .await
+                        .expect("it ends");
+                }
+                let over = |content: &Content| playable(content).is_some_and(|it| it.ended);
+                self.until(over).await;
+                (self.proceed(view.step).await, Some(ticket))
+            }
+            Content::Text(_) => (self.proceed(step).await, None),
+            other => panic!("unexpected: {other:?}"),
+        }
+    }
+
+    async fn proceed(&mut self, step: u32) -> v1::StudyView {
+        let session = self.session.clone();
+        let request = v1::ContinueStudyRequest { session, step };
+        let continued = self.service.continue_study(request).await;
+        continued
+            .expect("its step")
+            .into_inner()
+            .view
+            .expect("a view")
+    }
+
+    async fn trace(&mut self, game_id: &str) {
+        let request = v1::RecordTracesRequest {
+            session: self.session.clone(),
+            game_id: game_id.to_owned(),
+            traces: vec![v1::StudyTrace {
+                kind: v1::StudyTraceKind::CardPicked.into(),
+                at_ms: 1200,
+                decision_id: 1,
+                target: "card:7".to_owned(),
+                duration_ms: 0,
+            }],
+        };
+        self.service.record_traces(request).await.expect("its game");
+    }
+
+    /// Does everything until a step is reached. Returns the view and the tickets of its games.
+    async fn go_on(
+        &mut self,
+        mut view: v1::StudyView,
+        until_step: u32,
+    ) -> (v1::StudyView, Vec<String>) {
+        let mut tickets = Vec::new();
+        while view.step < until_step {
+            let (next, ticket) = self.act(view).await;
+            tickets.extend(ticket);
+            view = next;
+        }
+        (view, tickets)
+    }
+}
+
+/// The game of a view, if it has a room.
+fn playable(content: &Content) -> Option<&v1::StudyShownGame> {
+    match content {
+        Content::Game(game) if !game.ticket.is_empty() => Some(game),
+        _ => None,
+    }
+}
+
+fn answer(item: &v1::StudyShownItem) -> v1::StudyItemAnswer {
+    let Some(Kind::Slider(slider)) = &item.kind else {
+        panic!("the items of NASA-TLX are sliders");
+    };
+    v1::StudyItemAnswer {
+        item: item.item,
+        value: Some(Value::Number(slider.max)),
+        answered_after_ms: Some(900),
+    }
+}
+
+fn reason(status: &Status) -> String {
+    let info = status.get_details_error_info();
+    info.map_or_else(String::new, |info| info.reason)
+}
+
+/// The researcher.
+struct Lab {
+    service: StudyServiceClient<Channel>,
+    records: RecordServiceClient<Channel>,
+    study_id: String,
+    owner_token: String,
+}
+
+impl Lab {
+    async fn connect(host: &Host, (study_id, owner_token): (String, String)) -> Self {
+        let channel = Channel::from_shared(host.url().to_owned()).expect("a URL");
+        let channel = channel.connect().await.expect("the server listens");
+        Self {
+            service: StudyServiceClient::new(channel.clone()),
+            records: RecordServiceClient::new(channel),
+            study_id,
+            owner_token,
+        }
+    }
+
+    async fn links(&mut self, pseudonyms: Vec<String>) -> Vec<String> {
+        let request = v1::AddStudyParticipantsRequest {
+            study_id: self.study_id.clone(),
+            owner_token: self.owner_token.clone(),
+            pseudonyms,
+            count: 0,
+        };
+        let added = self.service.add_study_participants(request).await;
+        let links = added.expect("the study is open").into_inner().links;
+        links.into_iter().map(|link| link.link).collect()
+    }
+
+    async fn participants(&mut self) -> Vec<v1::StudyParticipant> {
+        let request = v1::GetStudyRequest {
+            study_id: self.study_id.clone(),
+            owner_token: self.owner_token.clone(),
+        };
+        let shown = self.service.get_study(request).await;
+        shown.expect("the study exists").into_inner().participants
+    }
+
+    async fn export(&mut self) -> BTreeMap<String, Vec<u8>> {
+        let request = v1::ExportStudyRequest {
+            study_id: self.study_id.clone(),
+            owner_token: self.owner_token.clone(),
+        };
+        let exported = self.service.export_study(request).await;
+        let mut parts = exported.expect("the study exists").into_inner();
+        let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+        while let Some(part) = parts.message().await.expect("the export ends well") {
+            files.entry(part.file).or_default().extend(part.data);
+        }
+        files
+    }
+
+    /// Why the record of a game is refused to a caller who shows this secret; `None` if it is not.
+    async fn record_refused(&mut self, game: &str, secret: &str) -> Option<Code> {
+        let mut request = Request::new(v1::GetRecordRequest {
+            game_id: game.to_owned(),
+        });
+        let value = secret.parse().expect("ASCII");
+        request.metadata_mut().insert(SECRET_HEADER, value);
+        match self.records.get_record(request).await {
+            Ok(lines) => {
+                let first = lines.into_inner().message().await.expect("a record");
+                assert!(first.is_some());
+                None
+            }
+            Err(status) => Some(status.code()),
+        }
+    }
+}
+
+/// Rows of a table without its header.
+fn rows(file: &[u8]) -> Vec<String> {
+    let text = std::str::from_utf8(file).expect("UTF-8");
+    text.lines().skip(1).map(str::to_owned).collect()
+}
+
+fn contains(bytes: &[u8], word: &str) -> bool {
+    bytes
+        .windows(word.len())
+        .any(|window| window == word.as_bytes())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_study_from_its_links_to_its_data() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first_host = host(folder.path()).await;
+    let tap = Tap::new(address(&first_host)).await;
+    let channel = Channel::from_shared(first_host.url().to_owned()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let request = v1::CreateStudyRequest {
+        settings: Some(settings()),
+        request_id: vec![7; 32],
+    };
+    let mut service = StudyServiceClient::new(channel);
+    let created = service.create_study(request.clone()).await.expect("valid");
+    let created = created.into_inner();
+    let repeated = service.create_study(request).await.expect("the same");
+    assert_eq!(repeated.into_inner(), created);
+    let study = created.study.expect("a study");
+    assert_eq!(
+        (study.steps, study.games, study.practice_games),
+        (STEPS, 2, 1)
+    );
+    let owner = (study.study_id, created.owner_token);
+    let mut lab = Lab::connect(&first_host, owner.clone()).await;
+    let name = |number| format!("Pseudonym-{number}-of-all");
+    let links = lab.links((1..=PARTICIPANTS).map(name).collect()).await;
+
+    // All get to the games, some with practice behind them. The third withdraws after its answers
+    // and has its data deleted; the fifth is removed and replaced.
+    let mut people = Vec::new();
+    for link in &links {
+        people.push(Person::new(&tap, link).await);
+    }
+    let going = people.into_iter().map(async |(mut person, view)| {
+        let (view, tickets) = person.go_on(view, 3).await;
+        (person, view, tickets)
+    });
+    let mut people = join_all(going).await;
+
+    let third = &mut people[2].0;
+    let request = v1::WithdrawFromStudyRequest {
+        link: third.link.clone(),
+        delete_data: true,
+    };
+    let withdrawn = third.service.withdraw_from_study(request).await;
+    let view = withdrawn.expect("always possible").into_inner().view;
+    let Some(Content::End(end)) = view.expect("a view").content else {
+        panic!("it is the end");
+    };
+    assert_eq!(end.reason(), v1::StudyEndReason::DataDeleted);
+    let request = v1::RemoveStudyParticipantRequest {
+        study_id: owner.0.clone(),
+        owner_token: owner.1.clone(),
+        number: 5,
+        replace: true,
+    };
+    let removed = lab.service.remove_study_participant(request).await;
+    let replacement = removed.expect("it is active").into_inner().replacement;
+    let replacement = replacement.expect("requested").link;
+    let second_replacement = lab.links(vec![name(10)]).await.remove(0);
+
+    // The fourth opens its link on another device: the first one can do nothing more.
+    let (mut other_device, other_view) = Person::new(&tap, &links[3]).await;
+    assert_eq!(other_view.step, 3);
+    let old = &mut people[3].0;
+    let session = old.session.clone();
+    let refused = (old.service)
+        .continue_study(v1::ContinueStudyRequest { session, step: 3 })
+        .await
+        .expect_err("superseded");
+    assert_eq!(reason(&refused), "SESSION_SUPERSEDED");
+    let forged = old.service.open_study(v1::OpenStudyRequest {
+        link: "A".repeat(30),
+    });
+    assert_eq!(reason(&forged.await.expect_err("forged")), "LINK_UNKNOWN");
+
+    // The first has a room when the server is restarted.
+    let game_before = {
+        let first = &mut people[0].0;
+        let view = first.until(|content| playable(content).is_some()).await;
+        let game = view.content.as_ref().and_then(playable).expect("a game");
+        let mut rooms = RoomServiceClient::new(
+            Channel::from_shared(tap.url())
+                .expect("a URL")
+                .connect()
+                .await
+                .expect("it listens"),
+        );
+        let mut request = Request::new(v1::GetRoomRequest {
+            room_id: game.room_id.clone(),
+            join_code: String::new(),
+        });
+        let value = game.ticket.parse().expect("ASCII");
+        request.metadata_mut().insert(SECRET_HEADER, value);
+        let room = rooms.get_room(request).await.expect("its own room");
+        let room = room.into_inner().room.expect("a room");
+        let names: BTreeSet<String> = room.seats.into_iter().map(|seat| seat.name).collect();
+        let others = ["Player 2", "Player 3", "Player 4"].map(str::to_owned);
+        let expected: BTreeSet<String> = others.into_iter().chain([name(1)]).collect();
+        assert_eq!(names, expected);
+        game.clone()
+    };
+    let stopping = patiently("the server to stop", first_host.stop());
+    stopping.await.expect("a clean end");
+    let second_host = host(folder.path()).await;
+    *tap.target.lock().expect("not poisoned") = address(&second_host);
+    let mut lab = Lab::connect(&second_host, owner.clone()).await;
+
+    let mut people: Vec<Person> = people.into_iter().map(|(person, ..)| person).collect();
+    std::mem::swap(&mut people[3], &mut other_device);
+    let gone = [people.remove(4), people.remove(2)];
+    let mut everybody = Vec::new();
+    for mut person in people {
+        let view = patiently("the study to be back", async {
+            loop {
+                match person.open().await {
+                    Ok(view) => return view,
+                    Err(status) if status.code() == Code::Unavailable => {
+                        tokio::task::yield_now().await;
+                    }
+                    Err(status) => panic!("{status}"),
+                }
+            }
+        });
+        let view = view.await;
+        everybody.push((person, view));
+    }
+    let shown = everybody[0].1.content.as_ref().and_then(playable);
+    assert_eq!(shown, Some(&game_before));
+    for link in [&replacement, &second_replacement] {
+        everybody.push(Person::new(&tap, link).await);
+    }
+    let finishing = everybody.into_iter().map(async |(mut person, view)| {
+        let (view, tickets) = person.go_on(view, STEPS).await;
+        let Some(Content::End(end)) = view.content else {
+            panic!("it is the end");
+        };
+        assert_eq!(end.reason(), v1::StudyEndReason::Completed);
+        tickets
+    });
+    let tickets: Vec<String> = join_all(finishing).await.concat();
+
+    // The assignment is balanced, and the record of a game is for the lab alone.
+    let participants = lab.participants().await;
+    let completed = |it: &&v1::StudyParticipant| it.state() == v1::StudyParticipantState::Completed;
+    let done: Vec<_> = participants.iter().filter(completed).collect();
+    assert_eq!(done.len(), PARTICIPANTS as usize);
+    let mut by_condition: BTreeMap<&str, u32> = BTreeMap::new();
+    for participant in &done {
+        *by_condition.entry(&participant.conditions[0]).or_default() += 1;
+        assert!(participant.consent.is_some());
+    }
+    assert_eq!(
+        by_condition,
+        [("condition-warm", 4), ("condition-cold", 4)].into()
+    );
+    let game = &done[0].games.last().expect("it has played").game_id;
+    assert_eq!(lab.record_refused(game, &owner.1).await, None);
+    for ticket in &tickets {
+        assert_eq!(lab.record_refused(game, ticket).await, Some(Code::NotFound));
+    }
+
+    // The export has everything but practice and what was deleted.
+    let files = lab.export().await;
+    let table = |name: &str| rows(&files[name]);
+    assert_eq!(table("participants.csv").len(), PARTICIPANTS as usize + 2);
+    let games = table("games.csv");
+    let finished = games.iter().filter(|row| row.contains(",finished,"));
+    assert_eq!(
+        finished.count(),
+        GAMES * PARTICIPANTS as usize,
+        "{games:#?}"
+    );
+    // The one who was removed has answered, too.
+    assert_eq!(table("answers.csv").len(), 6 * (PARTICIPANTS as usize + 1));
+    assert!(!table("traces.csv").is_empty());
+    let mut records = 0;
+    for (file, bytes) in &files {
+        assert!(!contains(bytes, &name(3)), "{file}");
+        if !file.starts_with("records/") {
+            continue;
+        }
+        records += 1;
+        let lines = std::str::from_utf8(bytes).expect("UTF-8").lines();
+        let lines: Vec<v1::RecordLine> = lines
+            .map(|line| serde_json::from_str(line).expect("a line of a record"))
+            .collect();
+        replay(&lines).expect("the record is right");
+        let Some(Line::Header(header)) = &lines[0].line else {
+            panic!("a header comes first");
+        };
+        let of_study = header.study.as_ref().expect("it says where it belongs");
+        let participant = &participants[of_study.number as usize - 1];
+        assert_eq!(of_study.participant, participant.pseudonym);
+        assert_eq!(of_study.condition, participant.conditions[0]);
+        let agent = match of_study.condition.as_str() {
+            "condition-warm" => "greedy",
+            _ => "trained",
+        };
+        let others = header
+            .seats
+            .iter()
+            .filter(|seat| seat.seat != of_study.seat);
+        assert!(others.into_iter().all(|seat| seat.built_in_agent == agent));
+    }
+    assert_eq!(records, GAMES * PARTICIPANTS as usize);
+
+    // Deletion while the server runs.
+    let request = v1::DeleteStudyParticipantRequest {
+        study_id: owner.0.clone(),
+        owner_token: owner.1.clone(),
+        number: 1,
+    };
+    let deleted = lab.service.delete_study_participant(request).await;
+    assert_eq!(deleted.expect("it exists").into_inner().games, 3);
+    for (file, bytes) in lab.export().await {
+        assert!(!contains(&bytes, &name(1)), "{file}");
+    }
+    drop((lab, gone));
+    let stopping = patiently("the server to stop", second_host.stop());
+    stopping.await.expect("a clean end");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    let id = Id::parse(&owner.0).expect("an id");
+    let stored = store.study(id).await.expect("readable").expect("it exists");
+    let stored = format!("{:?}", stored.changes);
+    let traces = store.traces(id).await.expect("readable");
+    for number in [1, 3] {
+        assert!(!stored.contains(&name(number)));
+        assert!(traces.iter().all(|traces| traces.number != number));
+        for game in &participants[number as usize - 1].games {
+            let game = Id::parse(&game.game_id).expect("an id");
+            assert!(store.finished(game).await.expect("readable").is_none());
+        }
+    }
+    assert!(stored.contains(&name(2)));
+    store.close().await;
+
+    // Nothing that names a condition has reached a participant.
+    let received = tap.received.lock().expect("not poisoned");
+    let any = |word: &str| received.iter().any(|bytes| contains(bytes, word));
+    assert!(any("A game of cards") && any("Player 2"));
+    for secret in SECRETS {
+        assert!(!any(secret), "participants received {secret:?}");
+    }
+}
