@@ -36,7 +36,7 @@ PICK = Pick((CardMove("9", None, Pose(1.0, 2.0)),))
 
 
 class Log:
-    """What the robot was told to do, as (method, arguments)."""
+    """What the robot was asked to do, as (method, arguments)."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
@@ -206,6 +206,7 @@ def test_the_robot_can_fail_hang_and_leave() -> None:
             assert isinstance(await waiting, Failed)
             pepper.speech.stopped.set()
             await closing
+            await until(lambda: not driver.connected)
             outcome = await attempt(driver, Say("anyone?"), FAR_S)
             assert isinstance(outcome, Failed)
             assert f"no NAOqi at {pepper.url}" in outcome.reason

@@ -36,6 +36,7 @@ from tests.robots import game_started, numbered, shift_started
 zenoh = pytest.importorskip("zenoh")
 FAR_S = 3600.0
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+GREETING = "hello?"
 
 
 def free_port() -> int:
@@ -48,8 +49,9 @@ class RosRobot:
     """A robot's action server, topics and service client.
 
     Attributes:
-        goals: the goals received.
-        cancelled: goal ids that were cancelled.
+        greeted: whether a greeting has reached it, which it refuses.
+        goals: the other goals received.
+        cancelled: ids of those that were cancelled.
         heard: what it received on the topics, as (type, message).
     """
 
@@ -63,6 +65,7 @@ class RosRobot:
         self.cancelled: list[list[int]] = []
         self.heard: list[tuple[str, dict[str, Any]]] = []
         self.accepts = True
+        self.greeted = False
         self._results: list[tuple[Any, dict[str, Any]]] = []
         self._lock = threading.Lock()
         # Declared in this order: when the first act arrives, the driver knows the subscribers, too.
@@ -77,8 +80,14 @@ class RosRobot:
         self.heard.append((kind, self.cdr.decode(kind, bytes(sample.payload))))
 
     def _goal(self, query: Any) -> None:
-        self.goals.append(self.cdr.decode("PlayTurn_SendGoal_Request", bytes(query.payload)))
-        reply = {"accepted": self.accepts, "stamp": {"sec": 1, "nanosec": 2}}
+        goal = self.cdr.decode("PlayTurn_SendGoal_Request", bytes(query.payload))
+        # However late a greeting arrives, it is not one of the goals.
+        greets = goal["goal"]["acts"][0]["text"] == GREETING
+        if greets:
+            self.greeted = True
+        else:
+            self.goals.append(goal)
+        reply = {"accepted": self.accepts and not greets, "stamp": {"sec": 1, "nanosec": 2}}
         query.reply(query.key_expr, self.cdr.encode("PlayTurn_SendGoal_Response", reply))
         query.drop()
 
@@ -88,7 +97,9 @@ class RosRobot:
 
     def _cancel(self, query: Any) -> None:
         request = self.cdr.decode("CancelGoal_Request", bytes(query.payload))
-        self.cancelled.append(request["goal_info"]["goal_id"]["uuid"])
+        cancelled = request["goal_info"]["goal_id"]["uuid"]
+        if any(goal["goal_id"]["uuid"] == cancelled for goal in self.goals):
+            self.cancelled.append(cancelled)
         query.reply(query.key_expr, self.cdr.encode("CancelGoal_Response", {"return_code": 0, "goals_canceling": []}))
         query.drop()
 
@@ -124,11 +135,9 @@ async def pair() -> AsyncIterator[tuple[Ros2Driver, RosRobot]]:
         robot = await asyncio.to_thread(RosRobot, port)
         try:
             # Declarations travel; the robot is there when a first act reaches it.
-            while isinstance(await attempt(driver, Say("hello?"), 0.05), Failed) and not robot.goals:
+            while not robot.greeted:
+                await attempt(driver, Say(GREETING), 0.05)
                 await asyncio.sleep(0.005)
-            robot.forget_waits()
-            robot.goals.clear()
-            robot.cancelled.clear()
             yield driver, robot
         finally:
             await asyncio.to_thread(robot.close)
