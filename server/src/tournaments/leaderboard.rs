@@ -123,10 +123,12 @@ fn restored(mut games: Vec<RatedGame>) -> Ratings<Identity> {
 /// The places in a rated game; `None` if it is not rated.
 fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
     let replayed = |seat: &v1::Participant| seat.built_in_agent == BuiltInAgent::REPLAY;
+    let wizard = |seat: &v1::Participant| seat.shown_kind() != v1::ParticipantKind::Unspecified;
     // What is not listed elsewhere does not show here either.
     let is_public = summary.visibility() == v1::Visibility::Unspecified;
     let helped = summary.substituted || summary.hinted;
-    if !is_public || helped || summary.seats.iter().any(replayed) {
+    let unrated = |seat| replayed(seat) || wizard(seat);
+    if !is_public || helped || summary.seats.iter().any(unrated) {
         return None;
     }
     let places: BTreeMap<u32, u32> = (summary.standings.iter())

@@ -128,6 +128,8 @@ async fn a_person_who_plays_as_a_robot_is_one_until_the_record() {
     assert_eq!(sources, [ExpressionSource::Wizard; 2]);
     let outcome = outcome::outcome(&record).expect("a finished game");
     assert_eq!(outcome.unrated, Some(outcome::Unrated::Wizard));
+    let rated = client.leaderboard(v1::GetLeaderboardRequest::default());
+    assert_eq!(rated.await.expect("a leaderboard").games, 0);
 
     // Its file verifies, and is exported.
     let data = server.stop().await;
