@@ -64,14 +64,14 @@ impl Cup {
         requests.iter().map(in_short).collect()
     }
 
-    /// What the agents were told, by game.
-    fn told(&self) -> Vec<(String, Vec<String>)> {
+    /// The logs of the agents since the last call, by game.
+    fn new_lines(&self) -> Vec<(String, Vec<String>)> {
         let logs = self.logs.lock().unwrap();
-        let told = logs.iter().map(|(game, log)| {
+        let lines = logs.iter().map(|(game, log)| {
             let lines = std::mem::take(&mut *log.lock().unwrap());
             (game.clone(), lines)
         });
-        told.filter(|(_, lines)| !lines.is_empty()).collect()
+        lines.filter(|(_, lines)| !lines.is_empty()).collect()
     }
 }
 
@@ -138,11 +138,11 @@ fn every_game_has_its_own_agent() {
         sent,
         [format!("{}:5=20 {FIRST_HANDLE}:4=10", FIRST_HANDLE + 1)]
     );
-    let told = cup.told();
-    assert_eq!(told[0].0, "a");
-    assert_eq!(told[0].1, ["attached 0", "event 1", "decide 4 None"]);
-    assert_eq!(told[1].0, "b");
-    assert_eq!(told[1].1, ["attached 1", "decide 5 None"]);
+    let lines = cup.new_lines();
+    assert_eq!(lines[0].0, "a");
+    assert_eq!(lines[0].1, ["attached 0", "event 1", "decide 4 None"]);
+    assert_eq!(lines[1].0, "b");
+    assert_eq!(lines[1].1, ["attached 1", "decide 5 None"]);
     let end = |seat| {
         let end = (seat, events(&[(2, ended())]));
         vec![end, (seat, detached(v1::DetachReason::GameOver))]
@@ -167,7 +167,7 @@ fn a_new_stream_continues_with_the_same_agents() {
         (FIRST_HANDLE, events(&[(1, None), (2, None)])),
         (FIRST_HANDLE, decision(4)),
     ]);
-    cup.told();
+    cup.new_lines();
     cup.session.disconnected();
     let attached = cup.attach();
     assert_eq!(
@@ -185,14 +185,18 @@ fn a_new_stream_continues_with_the_same_agents() {
         (FIRST_HANDLE, decision(2)),
     ]);
     assert_eq!(sent, [format!("0:4=10 1:1=20 {FIRST_HANDLE}:2=30")]);
-    let told: Vec<_> = cup.told().into_iter().map(|(_, lines)| lines).collect();
+    let lines: Vec<_> = cup
+        .new_lines()
+        .into_iter()
+        .map(|(_, lines)| lines)
+        .collect();
     assert_eq!(
-        told[0],
+        lines[0],
         ["attached 0", "event 3"],
-        "asked for nothing, told nothing twice"
+        "asked for nothing, no event received twice"
     );
-    assert_eq!(told[1], ["attached 1", "decide 1 None"]);
-    assert_eq!(told[2], ["attached 1", "decide 2 None"]);
+    assert_eq!(lines[1], ["attached 1", "decide 1 None"]);
+    assert_eq!(lines[2], ["attached 1", "decide 2 None"]);
 }
 
 /// A server attaches a seat again that the client has attached already: the newest attachment wins.
@@ -208,8 +212,8 @@ fn a_seat_attached_twice_is_one_seat() {
         (FIRST_HANDLE + 1, decision(4)),
     ]);
     assert_eq!(sent, [format!("{}:4=10", FIRST_HANDLE + 1)]);
-    let told = cup.told();
-    assert_eq!(told.len(), 1);
+    let lines = cup.new_lines();
+    assert_eq!(lines.len(), 1);
     let lines = [
         "attached 0",
         "event 1",
@@ -217,7 +221,7 @@ fn a_seat_attached_twice_is_one_seat() {
         "event 2",
         "decide 4 None",
     ];
-    assert_eq!(told[0].1, lines);
+    assert_eq!(lines[0].1, lines);
 }
 
 #[test]
@@ -228,7 +232,7 @@ fn a_game_that_ended_on_a_lost_connection_is_not_played_again() {
         (FIRST_HANDLE, events(&[(1, ended())])),
     ]);
     cup.session.disconnected();
-    cup.told();
+    cup.new_lines();
     assert_eq!(cup.attach(), ["cup from 0"]);
     let sent = cup.receive(vec![
         (0, entered()),
@@ -239,7 +243,7 @@ fn a_game_that_ended_on_a_lost_connection_is_not_played_again() {
     ]);
     let other = FIRST_HANDLE + 1;
     assert_eq!(sent, [format!("{FIRST_HANDLE}:detach {other}:2=20")]);
-    assert_eq!(cup.told().len(), 1, "only the new game has an agent");
+    assert_eq!(cup.new_lines().len(), 1, "only the new game has an agent");
     cup.receive(vec![
         (FIRST_HANDLE, detached(v1::DetachReason::Requested)),
         (other, events(&[(1, ended())])),
@@ -302,7 +306,7 @@ fn each_participant_has_its_own_reason_to_leave() {
     for (update, reason) in harness {
         let mut cup = Cup::entered();
         cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1)), (0, update)]);
-        assert!(!cup.session.is_over(), "its game may go on");
+        assert!(!cup.session.is_over(), "its game may continue");
         cup.receive(vec![(FIRST_HANDLE, detached(v1::DetachReason::Superseded))]);
         assert_eq!(played(cup), Err(reason.to_owned()));
     }

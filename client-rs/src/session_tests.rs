@@ -302,7 +302,7 @@ fn after_a_lost_connection_the_same_decision_gets_the_same_answer() {
     assert_eq!(
         harness.log(0),
         ["event 3"],
-        "asked for nothing, told nothing twice"
+        "asked for nothing, no event received twice"
     );
     // The answer was invalid: the agent is asked again.
     let invalid = result(1, 5, v1::AnswerStatus::Invalid, Some(1));

@@ -233,7 +233,7 @@ impl Outbox {
         self.reader.wake();
     }
 
-    /// Whether the reader of the stream's requests must stop: it was told to, or the client has
+    /// Whether the reader of the stream's requests must stop: it was asked to, or the client has
     /// gone. If not, its task is woken when it must. Takes no lock, because it is called for every
     /// message.
     pub fn poll_reading_stopped(&self, context: &Context<'_>) -> bool {

@@ -182,7 +182,7 @@ impl Process {
         self.send("-STOP").await;
     }
 
-    /// Lets a frozen process go on.
+    /// Lets a frozen process continue.
     pub async fn thaw(&self) {
         self.send("-CONT").await;
     }

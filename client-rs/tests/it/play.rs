@@ -114,11 +114,11 @@ async fn a_stream_lost_during_a_decision_resumes_with_the_same_answer() {
     let outcome = tokio::spawn(playing).await.unwrap().unwrap();
     assert_eq!(outcome.answers, 2, "repeating an answer is not deciding");
     assert_eq!(outcome.standing().map(|line| line.points), Some(15));
-    let told: Vec<String> = noted.iter().collect();
+    let lines: Vec<String> = noted.iter().collect();
     let expected = [
         "event 1", "event 2", "event 3", "decide 1", "event 4", "event 5", "decide 2", "event 6",
     ];
-    assert_eq!(told, expected);
+    assert_eq!(lines, expected);
     assert!(fake.is_done());
 }
 

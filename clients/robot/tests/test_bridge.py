@@ -33,7 +33,7 @@ FRAME = Frame(0, 0.0, np.zeros((4, 4, 3), dtype=np.uint8))
 
 
 class Table:
-    """Accepts what it is told, unless a test says otherwise.
+    """Accepts every report, unless a test says otherwise.
 
     Attributes:
         reports: what was reported.

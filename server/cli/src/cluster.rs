@@ -226,7 +226,7 @@ pub(super) struct NodeSettings {
     #[arg(long, env = "CHEFSHAT_PEER_ENDPOINT", value_name = "HOST:PORT", value_parser = listen::host_and_port)]
     peer_endpoint: Option<String>,
     /// Where clients reach this node without the balancer, such as https://node1.example.org:50051:
-    /// told to clients that ask for it.
+    /// sent to clients that ask for it.
     #[arg(long, env = "CHEFSHAT_CLIENT_ENDPOINT", value_name = "URL")]
     client_endpoint: Option<String>,
     /// Certificate of the node for connections between nodes, PEM; its name is chefshat-node.

@@ -1,5 +1,5 @@
 //! What the costs that were measured on one machine say about a cluster of many nodes: CPU, the time
-//! until a decision is acknowledged, and the time until games go on after the loss of a node.
+//! until a decision is acknowledged, and the time until games continue after the loss of a node.
 //! `docs/cluster.md` states what is assumed.
 //!
 //! `cargo run --release -p chefshat-cluster --example scale -- --help`

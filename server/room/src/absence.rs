@@ -28,7 +28,7 @@ pub struct Awaited {
 }
 
 impl Awaited {
-    /// What a subscriber must be told when it changes. In between, clocks count.
+    /// The parts that are sent to subscribers when they change. In between, clocks count.
     pub fn key(&self) -> (Seat, u64, bool, bool) {
         (self.seat, self.decision, self.away, self.absence_counts)
     }

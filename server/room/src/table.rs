@@ -144,7 +144,7 @@ impl PhysicalTable {
         self.paused_since
     }
 
-    /// Pauses the game, or lets it go on: then what it waits for counts from now.
+    /// Pauses the game, or continues it: then what it waits for counts from now.
     pub(super) fn set_paused(&mut self, at: Duration, paused: bool) {
         self.paused_since = paused.then_some(at);
         if !paused {

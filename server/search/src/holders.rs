@@ -2,7 +2,7 @@
 //! it may have been dealt, given what it played, gave and received (`docs/search.md`).
 //!
 //! Kinds of cards are numbered: faces 1..=F are 0..F, jokers are F. The Golden card is the last of
-//! kind F-1 and told apart from the others of its face.
+//! kind F-1 and distinguished from the others of its face.
 
 use chefshat_engine::{Cards, Seat};
 
@@ -28,7 +28,7 @@ impl Dealt {
     }
 }
 
-/// Cards with the Golden one told apart.
+/// Cards, with the Golden one distinguished.
 #[derive(Copy, Clone, Default, Debug)]
 pub(crate) struct Known {
     pub(crate) counts: Counts,

@@ -71,7 +71,7 @@ pub(crate) fn rollout(
                 place,
             };
         }
-        let decision = game.decision().expect("the Shift goes on");
+        let decision = game.decision().expect("the Shift is not over");
         let legal = game.legal_actions();
         let observation = game.observe(Viewer::Seat(decision.seat));
         action = match legal.len() {

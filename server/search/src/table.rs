@@ -96,7 +96,7 @@ impl Table {
     }
 
     /// The number of ways to deal the hidden cards and to choose the hidden gifts, physical cards
-    /// told apart.
+    /// distinguished.
     pub(crate) fn ways(&self) -> f64 {
         if !self.is_feasible() {
             return 0.0;

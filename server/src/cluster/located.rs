@@ -21,7 +21,7 @@ use chefshat_room::ids::Id;
 /// Most rooms and tournaments of other nodes that are remembered, by whatever they were found.
 const MAX_REMEMBERED: usize = 20_000;
 /// Most rooms and tournaments that are looked for in the database at a time, for callers in turns:
-/// whoever makes ids up leaves connections for everything else.
+/// a caller that makes ids up leaves connections for everything else.
 const LOOKED_FOR_AT_ONCE: usize = 2;
 /// How long a look takes at most, with the wait for its turn: many for one caller would otherwise wait
 /// for a database that hangs one after another.

@@ -71,7 +71,7 @@ mod tests {
         drop(first);
         assert_eq!(second.comes().now_or_never(), Some(()));
         turns.forget_ended();
-        assert!(turns.0.keys().eq([&unit]), "the second goes on");
+        assert!(turns.0.keys().eq([&unit]), "the second remains");
         drop(second);
         assert!(turns.is_idle(unit));
         turns.forget_ended();

@@ -354,7 +354,7 @@ fn executes_in_place(request: &VectorRequest, setup: &VectorSetup) -> bool {
 async fn next(
     requests: &mut Streaming<v1::RunRequest>,
 ) -> Result<Option<Option<RequestKind>>, End> {
-    // The client is told about a message that is too large or malformed; a broken connection has no
+    // A message that is too large or malformed is reported to the client; a broken connection has no
     // reader.
     let message = requests.message().await.map_err(End::Failed)?;
     Ok(message.map(|message| message.request))

@@ -389,7 +389,7 @@ impl Subscriber {
         !self.ended && !self.outbox_is_abandoned_by_spectator()
     }
 
-    /// Whom the game waits for, if the subscriber is told: not its own seat.
+    /// Whom the game waits for, if the subscriber is sent this: not its own seat.
     fn awaited_of(&self, news: &Publication<'_>) -> Option<Awaited> {
         let policy = &news.core.header().policy;
         let own = match &self.role {
@@ -487,7 +487,7 @@ impl<'a> Publication<'a> {
         }
     }
 
-    /// Whom the game waits for, found once for all subscribers who are told.
+    /// Whom the game waits for, found once for all subscribers who are sent this.
     fn awaited(&self) -> Option<Awaited> {
         *(self.awaited.get_or_init(|| self.core.awaited_in_public()))
     }

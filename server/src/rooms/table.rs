@@ -52,7 +52,7 @@ pub(super) struct Entry {
     /// The game has ended.
     pub(super) over: bool,
     /// The room has ended but its game resumes when the server is restarted. It stays in the table,
-    /// so that clients are told to try again rather than that the room is unknown.
+    /// so that clients are asked to try again: the room is not unknown.
     pub(super) suspended: bool,
     /// Whether lists show it.
     pub(super) listed: bool,

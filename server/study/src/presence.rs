@@ -25,7 +25,7 @@ impl Presence {
         self.connected.contains(&number)
     }
 
-    /// One of the active participants who has been away for `limit_ms`. Whoever is away and was not
+    /// One of the active participants who has been away for `limit_ms`. One who is away and was not
     /// before, as after a restart, is away from now.
     pub(crate) fn drop_out(
         &mut self,

@@ -95,7 +95,7 @@ impl Tournament {
         self.state.paused
     }
 
-    /// The change by which a participant leaves; `None` if it has left. Whoever left by itself can
+    /// The change by which a participant leaves; `None` if it has left. One that left by itself can
     /// still be removed.
     ///
     /// # Errors

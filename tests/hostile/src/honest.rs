@@ -29,7 +29,7 @@ pub(crate) const LONG: u32 = 1_000;
 const CALL_LIMIT: Duration = Duration::from_secs(5);
 /// Pause after a call that was not served.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
-/// Longest latency that is told apart, microseconds.
+/// Longest latency that is distinguished, microseconds.
 const LONGEST_US: u64 = 600_000_000;
 
 /// What the honest room noticed in one phase.

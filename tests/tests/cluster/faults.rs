@@ -18,7 +18,7 @@ pub(crate) enum Fault {
     Kill,
     /// A node is killed, and started again at once.
     KillAndRestart,
-    /// A node is frozen until others have its rooms, and goes on as if nothing had happened.
+    /// A node is frozen until others have its rooms, and continues as if it had not been.
     Freeze,
     /// The database ends all connections of a node.
     Terminate,

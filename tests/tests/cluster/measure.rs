@@ -120,7 +120,7 @@ async fn from_a_kill_to_the_next_decision_of_each_game() {
                 });
             }
         };
-        patiently("every game to go on", all_again).await;
+        patiently("every game to continue", all_again).await;
         show("from the kill to the next decision", "s", seconds.clone());
         all.extend(seconds);
         cluster.restart(node).await;

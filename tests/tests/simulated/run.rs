@@ -312,7 +312,7 @@ pub(crate) fn simulate(seed: u64) -> Run {
 }
 
 /// What must hold in the end: one finished game, whose record verifies, contains what was
-/// acknowledged, and agrees with what every client was told.
+/// acknowledged, and agrees with what every client received.
 fn check_end(disk: &Disk, ledger: &Ledger, outcomes: &[Outcome], trace: &Trace, run: &mut Run) {
     ledger.assert_nothing_unexpected();
     let finished = disk.finished();

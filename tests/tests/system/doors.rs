@@ -207,10 +207,10 @@ async fn a_seat_can_be_freed_until_the_game_starts() {
             Some("TICKET_UNKNOWN")
         );
     }
-    let Update::Detached(told) = attached.next().await else {
+    let Update::Detached(detached) = attached.next().await else {
         panic!("the stream still has the seat");
     };
-    assert_eq!(told.reason(), v1::DetachReason::Requested);
+    assert_eq!(detached.reason(), v1::DetachReason::Requested);
     for seat in [1, 2] {
         let again = client.join(join(&created.join_code)).await;
         let again = again.expect("the seat is free again");

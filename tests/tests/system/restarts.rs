@@ -293,7 +293,7 @@ async fn waiting_agents_return_after_a_stop_and_are_not_refused_during_it() {
                     break seat.next_or_end().await;
                 }
                 Ok(Some(Update::Decision(_))) => {}
-                other => panic!("not told that the server stops, but {other:?}"),
+                other => panic!("not informed that the server stops, but {other:?}"),
             }
         };
         // The code after which SDKs connect again.

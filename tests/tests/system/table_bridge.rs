@@ -184,7 +184,7 @@ impl Bridge {
         };
         let seat = Seat::new(decided.seat as usize);
         let cards = decided.cards.clone().unwrap_or_default().cards;
-        let open = self.real.truth.decision().expect("the game goes on");
+        let open = self.real.truth.decision().expect("the game is not over");
         let seen = Some(v1::SeenCards {
             cards: cards.clone(),
             golden: decided.cards.as_ref().and_then(|cards| cards.golden),

@@ -186,12 +186,12 @@ async fn a_physical_table_takes_part_in_a_tournament() {
         }
         if played.is_empty() {
             let number = game.game.to_string();
-            let told = organiser.command("table", &[&number]).await;
+            let shown = organiser.command("table", &[&number]).await;
             let link = format!(
                 "{}/rooms/{}/table#ticket={}",
                 organiser.server, table.room_id, table.table_ticket
             );
-            assert_eq!(told["attendant_link"], link);
+            assert_eq!(shown["attendant_link"], link);
             let waiting = games
                 .iter()
                 .find(|game| game.physical && game.state() == TournamentGameState::Due);
@@ -202,7 +202,7 @@ async fn a_physical_table_takes_part_in_a_tournament() {
             bridge.until(|it| it.reports > 20).await;
             server = restarted(&mut launch, server).await;
             bridge.next_state().await;
-            assert_eq!(organiser.command("table", &[&number]).await, told);
+            assert_eq!(organiser.command("table", &[&number]).await, shown);
         }
         bridge.until(|_| false).await;
         played.insert(game.game, bridge);

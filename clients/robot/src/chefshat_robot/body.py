@@ -246,7 +246,7 @@ class Body:
         return self._need(self._gift_job([piece], receiver, stand))
 
     def say(self, text: str, language: str | None = None) -> None:
-        """Says a line, before anything less urgent; in the robot's language unless told otherwise."""
+        """Says a line, before anything less urgent; in the robot's language unless another is given."""
         self._need(_Job((Say(text, language or self.words.language),)))
 
     def express(self, label: str, valence: float = 0.0, arousal: float = 0.0) -> None:
@@ -356,8 +356,8 @@ class Body:
         state, words = self.state, self.words
         moves = stand.take(pieces, [layout.gift_place(receiver, state.players)] * len(pieces))
         name, count = state.name(receiver), words.some_cards(len(moves))
-        told = Say(words.say("give", count=count, name=name), words.language)
-        return _Job((told, Pick(moves)), words.say("please_give", count=count, name=name))
+        spoken = Say(words.say("give", count=count, name=name), words.language)
+        return _Job((spoken, Pick(moves)), words.say("please_give", count=count, name=name))
 
     def _need_turn(self, turn: Turn, state: TableState) -> asyncio.Event:
         """Queues what the robot does for a turn in a state."""

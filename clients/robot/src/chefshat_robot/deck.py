@@ -1,7 +1,7 @@
 """The printed deck: what each physical card is, and the codes printed on it.
 
-Every piece has an AprilTag of the family 36h11 (587 tags). Each deck uses `TAGS_PER_DECK` of them, so that seven decks are told
-apart on one table; the tags after the last deck mark the playing field. A card also has a small QR code for phones:
+Every piece has an AprilTag of the family 36h11 (587 tags). Each deck uses `TAGS_PER_DECK` of them, so that seven decks can be
+distinguished on one table; the tags after the last deck mark the playing field. A card also has a small QR code for phones:
 `CHEFSHAT/1/DECK/PIECE`, for instance `CHEFSHAT/1/0/C17`, where 1 is the version of the codes. Nothing here depends on how pieces
 are printed or seen.
 """

@@ -262,7 +262,7 @@ mod tests {
             ("long entropy", |game| {
                 game.reveal.seat_entropy[2] = vec![4; 33]
             }),
-            ("entropy told", |game| game.outcomes[0].entropy[0] ^= 1),
+            ("entropy reported", |game| game.outcomes[0].entropy[0] ^= 1),
             ("hands", |game| game.hands.swap(0, 1)),
         ];
         for (what, change) in changes {

@@ -67,7 +67,7 @@ pub(super) struct Create {
     /// Milliseconds to wait for all seats to be taken. Default: 3600000.
     #[arg(long, value_name = "MS", help_heading = "Times and limits")]
     waiting_time_ms: Option<u32>,
-    /// Let each client take only one seat. Clients are told apart by their tokens, or else by their
+    /// Let each client take only one seat. Clients are distinguished by their tokens, or else by their
     /// addresses. By default one client may take several seats with the join code.
     #[arg(long, help_heading = "Times and limits")]
     one_seat_per_client: bool,

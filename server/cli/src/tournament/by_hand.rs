@@ -165,7 +165,7 @@ impl Withdraw {
             participant,
         };
         let tournament = client.withdraw_participant(request).await?;
-        told("withdrawn", self.asker.json, &tournament, None)
+        report("withdrawn", self.asker.json, &tournament, None)
     }
 }
 
@@ -177,7 +177,7 @@ impl Remove {
         let tournament = client
             .remove_participant(id.as_str(), token, participant)
             .await?;
-        told("removed", self.owned.json, &tournament, None)
+        report("removed", self.owned.json, &tournament, None)
     }
 }
 
@@ -206,7 +206,7 @@ impl Replace {
         let replaced = client.replace_participant(request).await?;
         let ticket = Some(replaced.ticket).filter(|ticket| !ticket.is_empty());
         let tournament = replaced.tournament.unwrap_or_default();
-        let code = told("replaced", self.owned.json, &tournament, ticket.as_deref())?;
+        let code = report("replaced", self.owned.json, &tournament, ticket.as_deref())?;
         // Last, so that the ticket is printed even if this fails.
         if let (Some(file), Some(ticket)) = (ticket_file, ticket) {
             file.write(&ticket)?;
@@ -232,7 +232,7 @@ impl Postpone {
         };
         let game = client.postpone_game(request).await?;
         let (id, json) = (&self.asker.tournament_id, self.asker.json);
-        told_game("postponed", json, &client, id, &game).await
+        report_game("postponed", json, &client, id, &game).await
     }
 }
 
@@ -241,7 +241,7 @@ impl CallAgain {
         let (id, token) = (&self.owned.tournament_id, self.owned.owner.token()?);
         let client = self.owned.server.connect().await?.with_secrets([&token])?;
         let game = client.call_game(id.as_str(), token, self.game).await?;
-        told_game("called", self.owned.json, &client, id, &game).await
+        report_game("called", self.owned.json, &client, id, &game).await
     }
 }
 
@@ -257,7 +257,7 @@ async fn number_of(client: &Client, id: &str, who: &str) -> Result<u32, CommandE
     number.ok_or_else(|| format!("no participant of this tournament is named {who}").into())
 }
 
-fn told(
+fn report(
     event: &str,
     json: bool,
     tournament: &v1::Tournament,
@@ -276,7 +276,7 @@ fn told(
     Ok(ExitCode::SUCCESS)
 }
 
-async fn told_game(
+async fn report_game(
     event: &str,
     json: bool,
     client: &Client,

@@ -16,10 +16,10 @@ fn the_state_agrees_with_the_engine() {
         for seed in 0..4 {
             let rules = RuleSetSpec::preset(preset).unwrap();
             for viewer in [Viewer::Seat(Seat::new(0)), Viewer::Everything] {
-                let (mut dealt, told) = Dealt::new(&rules, seed, viewer);
+                let (mut dealt, events) = Dealt::new(&rules, seed, viewer);
                 let mut table = GameView::default();
                 let mut agent = BuiltInAgent::new(AgentKind::Random, [seed; 32]);
-                told.iter().for_each(|event| table.apply(event));
+                events.iter().for_each(|event| table.apply(event));
                 while let Some(decision) = dealt.game.decision() {
                     agree(&table, &dealt, viewer);
                     decisions += 1;

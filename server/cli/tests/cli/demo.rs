@@ -86,14 +86,14 @@ fn a_game_is_narrated_to_its_end() {
         .map(|(seat, points)| (names[usize::try_from(seat).unwrap()].clone(), points))
         .collect();
     assert!(expected[0].1 >= 15, "the game is played to 15 points");
-    let told: Vec<(String, u64)> = section(&ended.stdout, "Standings")
+    let printed: Vec<(String, u64)> = section(&ended.stdout, "Standings")
         .iter()
         .map(|line| {
             let words: Vec<&str> = line.split_whitespace().collect();
             (words[1].to_owned(), words[3].parse().unwrap())
         })
         .collect();
-    assert_eq!(told, expected);
+    assert_eq!(printed, expected);
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn programs_read_every_line() {
         .iter()
         .filter(|event| event["game_event"].get("shiftStarted").is_some());
     assert_eq!(last["deals_checked"], shifts.count());
-    let told: Vec<(u64, u64)> = last["standings"]
+    let printed: Vec<(u64, u64)> = last["standings"]
         .as_array()
         .unwrap()
         .iter()
@@ -155,8 +155,8 @@ fn programs_read_every_line() {
             (seat, line["points"].as_u64().unwrap())
         })
         .collect();
-    assert_eq!(told.len(), 3);
-    assert_eq!(told, standings(&record));
+    assert_eq!(printed.len(), 3);
+    assert_eq!(printed, standings(&record));
 }
 
 #[test]

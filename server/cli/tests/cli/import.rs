@@ -42,12 +42,12 @@ fn a_transcript_becomes_a_record_that_verifies() {
     let flags = ["--data-dir", data_dir.to_str().unwrap()];
 
     let ended = import(&file, &[&flags[..], &["--json"]].concat()).clean();
-    let told = ended.json();
-    let game_id = told["game_id"].as_str().unwrap();
+    let printed = ended.json();
+    let game_id = printed["game_id"].as_str().unwrap();
     let path = data_dir.join("records").join(format!("{game_id}.jsonl"));
-    assert_eq!(told["file"], path.to_str().unwrap());
+    assert_eq!(printed["file"], path.to_str().unwrap());
     assert_eq!(
-        (&told["origin"], &told["state"], &told["decisions"]),
+        (&printed["origin"], &printed["state"], &printed["decisions"]),
         (
             &"GAME_ORIGIN_IMPORTED".into(),
             &"finished".into(),

@@ -160,12 +160,16 @@ fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
 
     let out = folder.path().join("out.jsonl");
     let export = ["export", NAME, "--out", out.to_str().unwrap(), "--json"];
-    let told = participant(&export, &data_dir).well().json();
+    let printed = participant(&export, &data_dir).well().json();
     assert_eq!(
-        (&told["games"], &told["tournaments"], &told["expressions"]),
+        (
+            &printed["games"],
+            &printed["tournaments"],
+            &printed["expressions"]
+        ),
         (&json!(2), &json!(1), &json!(2))
     );
-    check_export(&std::fs::read_to_string(&out).unwrap(), &game_id, &told);
+    check_export(&std::fs::read_to_string(&out).unwrap(), &game_id, &printed);
     participant(&export, &data_dir).assert_refused("exists already");
 
     participant(&["delete", NAME], &data_dir).assert_refused("confirm with --yes");
@@ -190,7 +194,7 @@ fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
 }
 
 /// The export has all data of the participant and none of the other.
-fn check_export(text: &str, game_id: &str, told: &Value) {
+fn check_export(text: &str, game_id: &str, printed: &Value) {
     let lines = json_lines(text);
     assert_eq!(lines[0]["participant"]["name"], NAME);
     let of =
@@ -198,7 +202,7 @@ fn check_export(text: &str, game_id: &str, told: &Value) {
     assert_eq!(of("game").len(), 2);
     assert_eq!(of("tournament")[0]["tournament"]["name"], "friday");
     assert_eq!(of("expression").len(), 2);
-    assert_eq!(json!(of("decision").len()), told["decisions"]);
+    assert_eq!(json!(of("decision").len()), printed["decisions"]);
     let of_game: Vec<&Value> = (of("decision").into_iter())
         .filter(|line| line["game_id"] == game_id)
         .collect();
@@ -296,9 +300,9 @@ fn real_table(data_dir: &Path) -> (String, String) {
     let transcript = folder.path().join("table.csv");
     std::fs::write(&transcript, TRANSCRIPT).unwrap();
     let import = ["import", transcript.to_str().unwrap(), "--json"];
-    let told = chefshat(&[&import[..], &["--data-dir", data_dir.to_str().unwrap()]].concat());
-    let told = told.well().json();
-    let text = |key: &str| told[key].as_str().unwrap().to_owned();
+    let printed = chefshat(&[&import[..], &["--data-dir", data_dir.to_str().unwrap()]].concat());
+    let printed = printed.well().json();
+    let text = |key: &str| printed[key].as_str().unwrap().to_owned();
     (text("file"), text("game_id"))
 }
 

@@ -43,16 +43,19 @@ fn a_leaderboard_is_recomputed_from_the_records() {
     }
     let copies = copies.to_str().unwrap();
 
-    let told = chefshat(&["ratings", "--json", records, fixtures, copies])
+    let printed = chefshat(&["ratings", "--json", records, fixtures, copies])
         .well()
         .json();
-    assert_eq!(told["records"], 14);
-    assert_eq!(told["rated_games"], 12);
-    assert_eq!(told["not_rated"], json!({"substituted": 1, "not_dealt": 1}));
+    assert_eq!(printed["records"], 14);
+    assert_eq!(printed["rated_games"], 12);
+    assert_eq!(
+        printed["not_rated"],
+        json!({"substituted": 1, "not_dealt": 1})
+    );
     // The numbers equal the server's.
-    assert_eq!(board["rated_games"], told["rated_games"]);
-    assert_eq!(board["leaderboard"], told["leaderboard"]);
-    let lines = told["leaderboard"].as_array().unwrap();
+    assert_eq!(board["rated_games"], printed["rated_games"]);
+    assert_eq!(board["leaderboard"], printed["leaderboard"]);
+    let lines = printed["leaderboard"].as_array().unwrap();
     let mut names: Vec<&str> = lines
         .iter()
         .map(|line| line["name"].as_str().unwrap())
@@ -97,10 +100,17 @@ fn damaged_records_are_reported_and_skipped_on_request() {
     let refused = chefshat(&["ratings", damaged, fixtures]);
     refused.assert_refused("damaged.jsonl: ");
     refused.assert_refused("--skip-damaged");
-    let told = chefshat(&["ratings", "--json", "--skip-damaged", damaged, fixtures]).well();
-    assert!(told.stderr.contains("damaged.jsonl"), "{}", told.stderr);
-    let told = told.json();
-    assert_eq!((&told["records"], &told["damaged"]), (&json!(2), &json!(1)));
+    let printed = chefshat(&["ratings", "--json", "--skip-damaged", damaged, fixtures]).well();
+    assert!(
+        printed.stderr.contains("damaged.jsonl"),
+        "{}",
+        printed.stderr
+    );
+    let printed = printed.json();
+    assert_eq!(
+        (&printed["records"], &printed["damaged"]),
+        (&json!(2), &json!(1))
+    );
 }
 
 #[test]

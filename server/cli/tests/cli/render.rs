@@ -46,8 +46,8 @@ fn pictures_have_the_requested_size() {
         let ended = render(&out, flags).clean();
         let bytes = std::fs::read(&out).unwrap();
         assert_eq!(png_size(&bytes), (320, height), "{name}");
-        let told = format!("{}: 320 × {height}, {} bytes\n", out.display(), bytes.len());
-        assert_eq!(ended.stdout, told);
+        let printed = format!("{}: 320 × {height}, {} bytes\n", out.display(), bytes.len());
+        assert_eq!(ended.stdout, printed);
     }
 
     // Another perspective gives another picture; the same one gives the same.
@@ -146,15 +146,15 @@ fn the_length_of_a_film_is_that_of_its_decisions() {
         ("--real-time 4", 3.0 * 0.2 + 2.0 * 3.0),
     ] {
         let ended = render(&out, &format!("--from 94 --json {flags}")).clean();
-        let told = ended.json();
-        assert_eq!(told["frames"], 5);
+        let printed = ended.json();
+        assert_eq!(printed["frames"], 5);
         assert!(
-            (told["seconds"].as_f64().unwrap() - seconds).abs() < 1e-6,
-            "{told}"
+            (printed["seconds"].as_f64().unwrap() - seconds).abs() < 1e-6,
+            "{printed}"
         );
         let bytes = std::fs::read(&out).unwrap();
         assert!(bytes.starts_with(b"GIF89a") && bytes.ends_with(b";"));
-        assert_eq!(told["bytes"], bytes.len());
+        assert_eq!(printed["bytes"], bytes.len());
     }
     assert_eq!(files_in(&folder), ["film.gif"]);
 }

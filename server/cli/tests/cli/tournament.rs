@@ -77,11 +77,11 @@ fn check_results(url: &str, id: &str, folder: &Path) {
     let (standings, reference) = (path(folder, "standings.csv"), path(folder, "final.csv"));
     let results = format!("tournament results {id}");
     let files = format!("--csv {standings} --final-results {reference}");
-    let told = run(url, &format!("{results} {files}")).well();
-    told.assert_says(&["friday: finished", "Ada", "greedy 2", "Rating"]);
-    told.assert_says(&["round robin, 5 participants, 3 rounds, 3 of 3 games over"]);
-    told.assert_says(&["How sure is the order?"]);
-    told.assert_table_fits(5);
+    let printed = run(url, &format!("{results} {files}")).well();
+    printed.assert_says(&["friday: finished", "Ada", "greedy 2", "Rating"]);
+    printed.assert_says(&["round robin, 5 participants, 3 rounds, 3 of 3 games over"]);
+    printed.assert_says(&["How sure is the order?"]);
+    printed.assert_table_fits(5);
 
     let results = run(url, &format!("{results} --json")).json();
     let best = results["standings"][0]["participant"].as_u64().unwrap_or(0);
@@ -137,8 +137,8 @@ fn an_agent_that_ended_resumes_with_its_ticket() {
     let code = text(&made["join_code"]);
     let join = "tournament join --agent random";
     let mut first = Running::start(&url, &format!("{join} --code {code}"));
-    let told = BufReader::new(first.0.stderr.take().unwrap()).lines();
-    let mut tickets = told.filter_map(|line| {
+    let printed = BufReader::new(first.0.stderr.take().unwrap()).lines();
+    let mut tickets = printed.filter_map(|line| {
         let line = line.unwrap();
         let (_, ticket) = line.split_once("--ticket ")?;
         Some(ticket.to_owned())

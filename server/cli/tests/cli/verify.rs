@@ -74,10 +74,10 @@ fn a_damaged_record_is_reported() {
 
     let records = folder.path().join("records");
     let ended = chefshat(&["verify", "--json", records.to_str().unwrap()]).ended_with(1);
-    let told = ended.json_lines();
-    assert_eq!(told.len(), 2);
+    let printed = ended.json_lines();
+    assert_eq!(printed.len(), 2);
     assert_eq!(
-        told[0],
+        printed[0],
         json!({
             "file": records.join("a.jsonl"),
             "fits": true,
@@ -93,7 +93,7 @@ fn a_damaged_record_is_reported() {
         })
     );
     assert_eq!(
-        (&told[1]["fits"], &told[1]["line"]),
+        (&printed[1]["fits"], &printed[1]["line"]),
         (&json!(false), &json!(9))
     );
 }

@@ -105,7 +105,7 @@ impl Referee {
     }
 
     /// A report of what a remote seat decided; `None` if the report is not about a remote seat. A pass
-    /// without a seat is one of whoever is to act.
+    /// without a seat is one of the player who is to act.
     fn confirm_turn(&mut self, seat: Option<Seat>, action: Action) -> Option<Judged> {
         if seat.is_none() && action == Action::Pass {
             return None;

@@ -1,5 +1,5 @@
 //! A physical table as the tests know it: a game whose cards are all known (the truth), reported to
-//! a referee that knows only what it is told.
+//! a referee that knows only what is reported to it.
 
 use chefshat_engine::{
     Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, PassScope, RuleSet, RuleSetSpec,

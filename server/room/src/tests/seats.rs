@@ -204,10 +204,10 @@ fn delayed_spectators_see_events_after_a_number_of_decisions() {
     );
     table.fill();
     // The deal itself is withheld until three decisions have been taken: it may show all hands.
-    let told = table.core.visible_to_spectators();
+    let shown = table.core.visible_to_spectators();
     let event = |position| table.core.log().get(position).map(|entry| &entry.event);
-    assert!(matches!(event(told - 1), Some(RoomEvent::GameStarted)));
-    assert!(matches!(event(told), Some(RoomEvent::Game(_))));
+    assert!(matches!(event(shown - 1), Some(RoomEvent::GameStarted)));
+    assert!(matches!(event(shown), Some(RoomEvent::Game(_))));
     let mut lengths = vec![table.core.log().len()];
     while table.core.state() == State::Playing {
         table.play_one();
@@ -216,7 +216,7 @@ fn delayed_spectators_see_events_after_a_number_of_decisions() {
             let visible = lengths
                 .len()
                 .checked_sub(4)
-                .map_or(told, |index| lengths[index]);
+                .map_or(shown, |index| lengths[index]);
             assert_eq!(table.core.visible_to_spectators(), visible);
         }
     }

@@ -384,13 +384,13 @@ async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node
     // Within the time that is left to the other nodes.
     sleep(Duration::from_secs(3)).await;
     second.store.cut_off.send_replace(false);
-    soon(join(&room, "Ada")).await.expect("it goes on");
+    soon(join(&room, "Ada")).await.expect("it continues");
     soon(second.node.may_publish().wait_for(|it| *it))
         .await
         .expect("it runs");
-    soon(join(&room, "Bo")).await.expect("it goes on");
+    soon(join(&room, "Bo")).await.expect("it continues");
 
-    // The other node goes on, so it removes the room.
+    // The other node continues, so it removes the room.
     second.store.cut_off.send_replace(true);
     sleep(Duration::from_secs(300)).await;
     second.store.cut_off.send_replace(false);

@@ -307,7 +307,7 @@ async fn one_caller_takes_no_more_memory_than_its_share() {
     drop(left);
     let other = Key::Token(TokenId([1; 4]));
     assert!(fanout.limits.keep_history(other).is_some());
-    // The last one is not kept, and goes on.
+    // The last one is not kept, and continues.
     let (sender, body) = streams.last_mut().expect("many");
     let from = share as u64 - 1;
     let (_second, response) = answer();

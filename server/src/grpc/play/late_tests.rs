@@ -246,7 +246,7 @@ async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_anoth
     next.read(Input::StillOpen(3)).await;
     // An agent gives up a seat that is refused, and its game would wait for it.
     let end = next.updates.next().now_or_never().flatten();
-    assert_eq!(end.expect("it is told").err(), Some(StreamEnd::RoomGone));
+    assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));
 }
 
 #[tokio::test]
@@ -283,5 +283,5 @@ async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_
     server.tournaments.stop_one(ticket.room).await;
     next.read(Input::StillOpen(3)).await;
     let end = next.updates.next().now_or_never().flatten();
-    assert_eq!(end.expect("it is told").err(), Some(StreamEnd::RoomGone));
+    assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));
 }

@@ -1,6 +1,6 @@
 //! Attachments of a stream to what is not in the memory of a node of a cluster: another node has it,
 //! or nobody for the moment, because it is being taken over. They are parked and looked for beside
-//! the reader, which goes on reading: the other seats of the stream are not delayed, and keep their
+//! the reader, which continues to read: the other seats of the stream are not delayed, and keep their
 //! stream however long the search takes.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -30,7 +30,7 @@ use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{Change, Entry, Fill, GameStart, ParticipantKind, SeatedParticipant};
 use chefshat_room::policy::Policy;
 
-/// Says the same about everything that this node does not have, until it is told otherwise.
+/// Says the same about everything that this node does not have, until the test changes it.
 struct Says {
     now: Mutex<Location>,
     after_forgetting: Location,

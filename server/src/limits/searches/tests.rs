@@ -147,7 +147,7 @@ async fn a_search_that_nobody_waits_for_stops() {
     drop(running);
     assert_eq!(searches.turns.taken(), 1, "until it ends");
     held_up.go_on.send(()).expect("it waits");
-    assert!(held_up.stopping.await.expect("it goes on"));
+    assert!(held_up.stopping.await.expect("it continues"));
 }
 
 #[tokio::test(start_paused = true)]
@@ -158,7 +158,7 @@ async fn a_thread_that_does_not_get_on_is_not_waited_for() {
     assert_eq!(running.await, Err(SearchOutcome::Busy));
     assert_eq!(searches.turns.taken(), 1, "until it ends");
     held_up.go_on.send(()).expect("it waits");
-    assert!(held_up.stopping.await.expect("it goes on"));
+    assert!(held_up.stopping.await.expect("it continues"));
 }
 
 #[tokio::test]

@@ -24,7 +24,7 @@ use crate::store::StoreError;
 const QUEUE: usize = 1_024;
 /// How long a transaction may take; then the connection is dropped.
 const COMMIT_LIMIT: Duration = Duration::from_secs(5);
-/// How often a batch is sent before it goes on in halves.
+/// How often a batch is sent before it is sent in halves.
 const ATTEMPTS_TOGETHER: u32 = 2;
 /// Pauses before a transaction is tried again.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
@@ -161,7 +161,7 @@ impl Writer {
         }
     }
 
-    /// Commits work and answers its senders. What gets no answer twice goes on in halves, so that
+    /// Commits work and answers its senders. What gets no answer twice is sent in halves, so that
     /// one piece that cannot proceed does not hold up the others for long.
     async fn commit<W: Work>(&mut self, pieces: Vec<Pending<W>>) {
         let mut pause = FIRST_PAUSE;

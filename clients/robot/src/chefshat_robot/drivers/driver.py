@@ -297,7 +297,7 @@ async def attempt(driver: Driver, act: Act, timeout_s: float) -> Outcome:
     Args:
         driver: the robot; connected anew if its connection was lost.
         act: what to do.
-        timeout_s: seconds for connecting and acting, after which the robot is told to stop.
+        timeout_s: seconds for connecting and acting, after which the robot is asked to stop.
     """
     try:
         async with asyncio.timeout(timeout_s):

@@ -109,7 +109,7 @@ class RosbridgeDriver(Driver):
             return
         if ros.is_connected:
             await asyncio.to_thread(ros.close)
-        # Without a connection there is nothing to close, but attempts to open one go on until told otherwise.
+        # Without a connection there is nothing to close, but attempts to open one continue until they are stopped.
         ros.factory._stop = True
 
     def _declare(self) -> None:

@@ -126,9 +126,9 @@ fn the_lobby_shows_what_comes_next() {
         (report(Swiss, Closed, vec![]), "closed before its end"),
         (report(Swiss, Finished, vec![]), "The tournament is over"),
     ];
-    for (told, words) in table {
+    for (report, words) in table {
         let mut session = TournamentSession::new();
-        session.report(told);
+        session.report(report);
         let screen = session.screen();
         assert!(screen.contains(words), "{words}: {screen}");
     }
@@ -146,10 +146,10 @@ fn leaving_asks_while_games_remain() {
         (report(Knockout, Playing, vec![]), false),
         (report(Swiss, Finished, vec![]), false),
     ];
-    for (told, asks) in table {
-        let words = format!("{:?} {:?}", told.format(), told.tournament.state());
+    for (report, asks) in table {
+        let words = format!("{:?} {:?}", report.format(), report.tournament.state());
         let mut session = TournamentSession::new();
-        session.report(told);
+        session.report(report);
         session.press(KeyCode::Char('q'));
         assert_eq!(session.part.over.is_some(), asks, "{words}");
         assert_eq!(session.part.left, !asks, "{words}");

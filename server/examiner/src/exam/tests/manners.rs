@@ -21,7 +21,7 @@ fn before_the_game() {
         ("joining twice", vec![Join, Join], "JOINED_AGAIN"),
         (
             "another ticket",
-            vec![Join, attach, Told(Update::Refused(unattached))],
+            vec![Join, attach, Receives(Update::Refused(unattached))],
             "ATTACH_REFUSED",
         ),
     ];
@@ -230,7 +230,7 @@ fn tournament(seats: u32, rest: &[Step]) -> Course {
         course.receives_on(handle, Update::Attached(attached));
         for step in [request(1), answer(1, 1), accepted(1)] {
             match step {
-                Told(update) => course.receives_on(handle, update),
+                Receives(update) => course.receives_on(handle, update),
                 Says(_, command) => course.sends(stream, handle, command),
                 _ => {}
             }

@@ -31,7 +31,7 @@ enum Step {
     /// It sends a command on its newest stream.
     Says(u32, Command),
     /// The server sends an update.
-    Told(Update),
+    Receives(Update),
     /// This number of seconds pass.
     Wait(u64),
     /// The agent leaves its newest stream.
@@ -39,7 +39,7 @@ enum Step {
     /// Its process exits with this status.
     Exit(i32),
 }
-use Step::{Attach, Exit, Join, Leave, Says, Told, Wait};
+use Step::{Attach, Exit, Join, Leave, Receives, Says, Wait};
 
 fn answer(decision_id: u64, action: u32) -> Step {
     let answer = v1::Answer {
@@ -51,7 +51,7 @@ fn answer(decision_id: u64, action: u32) -> Step {
 }
 
 fn request(decision_id: u64) -> Step {
-    Told(Update::Decision(v1::DecisionRequest {
+    Receives(Update::Decision(v1::DecisionRequest {
         decision_id,
         kind: v1::DecisionKind::Turn.into(),
         action_mask: MASK.to_vec(),
@@ -60,7 +60,7 @@ fn request(decision_id: u64) -> Step {
 }
 
 fn result(decision_id: u64, action: u32, status: AnswerStatus) -> Step {
-    Told(Update::Result(v1::AnswerResult {
+    Receives(Update::Result(v1::AnswerResult {
         decision_id,
         action,
         status: status.into(),
@@ -78,7 +78,7 @@ fn event(sequence: u64, kind: Kind) -> Step {
         kind: Some(kind),
         ..v1::GameEvent::default()
     };
-    Told(Update::Events(v1::EventBatch {
+    Receives(Update::Events(v1::EventBatch {
         events: vec![event],
     }))
 }
@@ -88,7 +88,7 @@ fn substituted(sequence: u64) -> Step {
 }
 
 fn detached(reason: v1::DetachReason) -> Step {
-    Told(Update::Detached(v1::Detached {
+    Receives(Update::Detached(v1::Detached {
         reason: reason.into(),
     }))
 }
@@ -167,7 +167,7 @@ impl Course {
                 self.step(event(1, Kind::GameStarted(Box::new(started))));
             }
             Says(handle, command) => self.sends(newest, handle, command),
-            Told(update) => self.received(newest, update),
+            Receives(update) => self.received(newest, update),
             Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
                 self.exam.tick(self.now);

@@ -109,7 +109,7 @@ impl Late {
         Self { holder, append }
     }
 
-    /// Lets the append go on.
+    /// Lets the append continue.
     async fn arrive(self) -> Result<(), StoreError> {
         drop(self.holder);
         self.append.await.expect("no panic")

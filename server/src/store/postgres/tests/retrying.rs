@@ -73,8 +73,8 @@ async fn carry(mut node: TcpStream, mut database: TcpStream, mut faults: watch::
     pending::<()>().await;
 }
 
-/// Loses the connection of some work whose commit waits in the database, and lets it go on there when the
-/// next attempt waits for it.
+/// Loses the connection of some work whose commit waits in the database, and lets it continue there
+/// when the next attempt waits for it.
 async fn overtake(line: &Line, holder: &mut PgConnection) {
     waiting(holder, "advisory").await;
     line.fail(Fault::Cut);

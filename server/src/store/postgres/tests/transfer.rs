@@ -110,7 +110,7 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     for tournament in &resumed_tournaments {
         restored(tournament).unwrap_or_else(|problem| panic!("{problem}"));
     }
-    assert!(!resumed_tournaments.is_empty(), "one goes on");
+    assert!(!resumed_tournaments.is_empty(), "one continues");
 
     // What comes next is numbered after what was moved.
     let last = store.list(&filter, Part::FROM_NEWEST, 1).await;

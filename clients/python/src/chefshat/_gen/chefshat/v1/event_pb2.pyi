@@ -851,7 +851,7 @@ class SeedReveal(_message.Message):
 
     So nobody who committed or contributed before knowing all other parts chose the deals. The server
     learns the seats' bytes before the game starts, but is bound by its commitment. What is not
-    excluded: a server in league with the seat that attaches last. That seat can be told the server
+    excluded: a server in league with the seat that attaches last. That seat can learn the server
     seed and the others' bytes, and try bytes until it likes the deal.
     """
 

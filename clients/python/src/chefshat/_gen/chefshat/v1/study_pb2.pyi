@@ -98,7 +98,7 @@ class _StudyLabelsEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyLabe
     """Names and kinds."""
     STUDY_LABELS_KINDS: _StudyLabels.ValueType  # 2
     """Kinds: seats are named "Agent 1", "Robot 2" and so on, by number of the seat from 1. Built-in
-    agents are not told apart from others.
+    agents are shown as any other agent.
     """
     STUDY_LABELS_PLAYERS: _StudyLabels.ValueType  # 3
     """Neither: seats are named "Player 1" and so on, and their kind is UNSPECIFIED."""
@@ -114,7 +114,7 @@ STUDY_LABELS_AS_THEY_ARE: StudyLabels.ValueType  # 1
 """Names and kinds."""
 STUDY_LABELS_KINDS: StudyLabels.ValueType  # 2
 """Kinds: seats are named "Agent 1", "Robot 2" and so on, by number of the seat from 1. Built-in
-agents are not told apart from others.
+agents are shown as any other agent.
 """
 STUDY_LABELS_PLAYERS: StudyLabels.ValueType  # 3
 """Neither: seats are named "Player 1" and so on, and their kind is UNSPECIFIED."""

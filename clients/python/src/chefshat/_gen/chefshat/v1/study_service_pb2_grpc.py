@@ -119,7 +119,7 @@ class StudyServiceServicer(object):
 
     def AddStudyParticipants(self, request, context):
         """Adds participants and returns their links. More than `participants` of the settings may be
-        added: whoever opens a link when all slots are taken is told so. NOT_FOUND (STUDY_UNKNOWN);
+        added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         """

@@ -47,7 +47,7 @@ class StudyServiceStub:
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]
     """Adds participants and returns their links. More than `participants` of the settings may be
-    added: whoever opens a link when all slots are taken is told so. NOT_FOUND (STUDY_UNKNOWN);
+    added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
     FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
     COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -103,7 +103,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _aio.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]  # type: ignore[assignment]
     """Adds participants and returns their links. More than `participants` of the settings may be
-    added: whoever opens a link when all slots are taken is told so. NOT_FOUND (STUDY_UNKNOWN);
+    added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
     FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
     COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -180,7 +180,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.AddStudyParticipantsResponse, _abc.Awaitable[_study_service_pb2.AddStudyParticipantsResponse]]:
         """Adds participants and returns their links. More than `participants` of the settings may be
-        added: whoever opens a link when all slots are taken is told so. NOT_FOUND (STUDY_UNKNOWN);
+        added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         """
