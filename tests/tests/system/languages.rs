@@ -122,6 +122,13 @@ async fn rust_python_javascript_and_cpp_play_a_game_to_fifteen_points() {
     );
 }
 
+fn built_in_seat() -> v1::SeatConfig {
+    v1::SeatConfig {
+        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".to_owned())),
+        ..v1::SeatConfig::default()
+    }
+}
+
 /// The error that an agent printed before it exited with status 1.
 fn error_of(output: &Output) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -136,10 +143,7 @@ fn error_of(output: &Output) -> String {
 async fn an_agent_in_cpp_that_is_killed_or_stopped_resumes_with_its_ticket_file() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let built_in = v1::SeatConfig {
-        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".to_owned())),
-        ..v1::SeatConfig::default()
-    };
+    let built_in = built_in_seat();
     let open = v1::SeatConfig::default();
     let created = client
         .create_room(v1::CreateRoomRequest {
@@ -168,7 +172,11 @@ async fn an_agent_in_cpp_that_is_killed_or_stopped_resumes_with_its_ticket_file(
         agent_in_cpp(&url, &["--code", code, "--ticket-file", file])
     };
 
-    let mut first = agent().kill_on_drop(true).spawn().expect("it starts");
+    let mut first = agent()
+        .stderr(Stdio::null())
+        .kill_on_drop(true)
+        .spawn()
+        .expect("it starts");
     // The game has begun and waits for the other seat.
     let mut open = other.decision().await;
     for _ in 0..2 {
@@ -248,10 +256,7 @@ async fn an_agent_in_cpp_shows_its_token_over_tls() {
     };
     let client = Client::connect_with(&url, &options).await;
     let client = client.expect("the server listens");
-    let built_in = v1::SeatConfig {
-        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".to_owned())),
-        ..v1::SeatConfig::default()
-    };
+    let built_in = built_in_seat();
     let created = client
         .create_room(v1::CreateRoomRequest {
             rules: Some(one_shift()),
