@@ -20,6 +20,7 @@ pub mod record_writer;
 pub mod retention;
 pub mod room;
 pub mod rooms;
+mod samples;
 pub mod scrape;
 pub mod serve;
 pub mod signing;

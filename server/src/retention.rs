@@ -3,11 +3,12 @@
 //! nothing behind that the next run does not delete.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_record::jsonl;
+use chefshat_engine::MAX_SEATS;
+use chefshat_record::{jsonl, samples};
 use chefshat_room::ids::Id;
 use tracing::{error, info};
 
@@ -122,8 +123,11 @@ impl Retention {
             }
             if let Some(data_dir) = self.rooms.record_writer().data_dir() {
                 let paths: Vec<_> = (games.iter())
-                    .map(|(_, game)| jsonl::path_of(data_dir, &game.to_string()))
+                    .flat_map(|(_, game)| files_of(data_dir, *game))
                     .collect();
+                for (_, game) in &games {
+                    self.rooms.samples().forget(*game);
+                }
                 // Before the games: after a crash in between, the next run deletes them.
                 let deleting = move || paths.iter().try_for_each(|path| remove(path));
                 (tokio::task::spawn_blocking(deleting).await)
@@ -158,6 +162,14 @@ impl Retention {
             }
         }
     }
+}
+
+/// The files that a game may have: its record and the samples of its seats.
+fn files_of(data_dir: &Path, game: Id) -> impl Iterator<Item = PathBuf> {
+    let id = game.to_string();
+    let samples = (0..MAX_SEATS).map(|seat| samples::path_of(data_dir, &id, seat));
+    let record = jsonl::path_of(data_dir, &id);
+    samples.chain([record]).collect::<Vec<_>>().into_iter()
 }
 
 /// Bytes and number of the files of a folder.

@@ -52,6 +52,7 @@ class FakeServer(
         self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
         self.broke_markers = False
+        self.samples: list[pb.SampleChunk] = []
         self.questions = QUESTIONS
         self.fault: Callable[[FakeGame, FakeSeat, pb.Answer], str] = lambda game, seat, answer: ""
         self.guard = Guard(token)
@@ -196,6 +197,14 @@ class FakeServer(
                 context.abort(grpc.StatusCode.UNAVAILABLE, "the stream was broken on purpose")
             if over and sent == len(game.markers):
                 return
+
+    def AddSamples(self, request: pb.AddSamplesRequest, context: Context) -> pb.AddSamplesResponse:
+        """Keeps the chunks of a seat."""
+        found = self.find(request.ticket)
+        if found is None:
+            refuse(context, grpc.StatusCode.UNAUTHENTICATED, "TICKET_UNKNOWN", "no seat has this ticket")
+        self.samples.append(request.chunk)
+        return pb.AddSamplesResponse(recorded=len(request.chunk.elapsed_us))
 
     def _owned(self, room_id: str, owner_token: str, context: Context) -> FakeGame:
         if owner_token != "owner":

@@ -28,7 +28,7 @@ from chefshat.local_server import BINARY
 pytestmark = pytest.mark.server
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "datasets.md"
-TABLES = ["decisions", "expressions", "markers"]
+TABLES = ["decisions", "expressions", "markers", "samples"]
 # Simulated games, and their agents.
 GAMES = 6
 AGENTS = ["greedy", "random_unmasked", "random", "random"]
@@ -93,7 +93,7 @@ def run(binary: Path, *arguments: object) -> Any:
 
 
 class Talkative(RandomAgent):
-    """Plays at random, sends expressions, and asks for one hint."""
+    """Plays at random, sends expressions and samples, and asks for one hint."""
 
     def __init__(self, client: chefshat.Client, ticket: str) -> None:
         super().__init__(1)
@@ -102,6 +102,10 @@ class Talkative(RandomAgent):
 
     def decide(self, request: Decision) -> int:
         if request.decision_id % 5 == 2:
+            chunk = pb.SampleChunk(
+                stream="affect", channels=["valence", "arousal"], elapsed_us=[1, 2], values=[0.5, -0.5, 0.25, np.nan]
+            )
+            self.client.add_samples(self.ticket, chunk)
             public = pb.Expression(label="joy", valence=0.5, source=pb.EXPRESSION_SOURCE_SELF_REPORT)
             self.client.express(self.ticket, public)
         if request.decision_id % 7 == 3:
@@ -144,7 +148,7 @@ def export(binary: Path, records: Path, folder: Path) -> None:
     assert run(binary, "export", records, "--out", folder / "gym", "--layout", "chefshatgym")["games"] == exported["games"]
     for name in ["dataset", "gym"]:
         sums = (folder / name / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-        assert len(sums) > exported["games"] if name == "gym" else len(sums) == 10
+        assert len(sums) > exported["games"] if name == "gym" else len(sums) == 13
         for line in sums:
             digest, path = line.split("  ")
             assert hashlib.sha256((folder / name / path).read_bytes()).hexdigest() == digest
@@ -194,7 +198,7 @@ def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset
 @pytest.mark.parametrize("table", TABLES)
 def test_every_column_has_its_documented_type(hosted: Dataset, table: str) -> None:
     columns = documented_columns(table)
-    assert len(columns) == {"decisions": 63, "expressions": 20, "markers": 6}[table]
+    assert len(columns) == {"decisions": 63, "expressions": 20, "markers": 6, "samples": 8}[table]
     schema = pyarrow.parquet.read_schema(hosted.parquet(table))
     in_polars = polars.read_parquet(hosted.parquet(table))
     in_pandas = pandas.read_parquet(hosted.parquet(table), dtype_backend="pyarrow")

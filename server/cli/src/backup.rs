@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use chefshat_record::atomic_file::sync_folder_of;
 use chefshat_record::jsonl::folder_of;
+use chefshat_record::samples;
 use chefshat_server::store::{DATABASE_FILE, DatabaseCopy, LOCK_FILE, check_copy, copy_database};
 use clap::Args;
 use serde_json::json;
@@ -75,6 +76,7 @@ impl Backup {
         let others = names(&source)?;
         copy_files(&source, part.path(), &others)?;
         let records = copy_files(&folder_of(&source), &folder_of(part.path()), &records)?;
+        copy_samples(&source, part.path())?;
         // One call for any number of files.
         rustix::fs::sync();
         fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
@@ -117,6 +119,7 @@ impl Restore {
         copy_files(&source, &target, &names(&source)?)?;
         let records = names(&folder_of(&source))?;
         let records = copy_files(&folder_of(&source), &folder_of(&target), &records)?;
+        copy_samples(&source, &target)?;
         // Last, under its name only when complete: a directory without a database is refused by
         // another attempt, and used by no server.
         let part = target.join(format!("{DATABASE_FILE}.{PART}"));
@@ -192,6 +195,17 @@ fn names(folder: &Path) -> Result<BTreeSet<OsString>, CommandError> {
         }
     }
     Ok(names)
+}
+
+/// Copies the samples of a data directory, if it has any. The last chunk of a file that is being
+/// written may be incomplete, and is ignored.
+fn copy_samples(from: &Path, to: &Path) -> Result<(), CommandError> {
+    let (from, to) = (samples::folder_of(from), samples::folder_of(to));
+    let files = names(&from)?;
+    match files.is_empty() {
+        true => Ok(()),
+        false => copy_files(&from, &to, &files).map(drop),
+    }
 }
 
 /// Copies files into a folder, which is created. Skips those that have been deleted meanwhile.

@@ -14,7 +14,7 @@ use super::numbers::counted;
 use super::{CommandError, progress};
 
 const HELP: &str = "\
-The directory contains the tables `decisions`, `expressions` and `markers` in every requested format, a dataset card (README.md) and SHA256SUMS. \
+The directory contains the tables `decisions`, `expressions`, `markers` and `samples` in every requested format, a dataset card (README.md) and SHA256SUMS. \
 It is written atomically. Every record is replayed first; a damaged one fails the export unless --skip-damaged is given.
 
 Examples:
@@ -172,6 +172,7 @@ impl Export {
             "decisions": exported.decisions,
             "expressions": exported.expressions,
             "markers": exported.markers,
+            "samples": exported.samples,
             "filtered": exported.filtered,
             "left_out": left_out,
             "files": files,

@@ -6,7 +6,7 @@ use super::column::markdown;
 use super::export::{Export, Exported, Layout};
 use super::formats::{Format, file_name};
 use super::sheet;
-use super::{TABLES_VERSION, decisions, expressions, markers};
+use super::{TABLES_VERSION, decisions, expressions, markers, samples};
 use chefshat_record::jsonl::FORMAT_VERSION;
 
 /// Name of the file.
@@ -81,6 +81,7 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
                 (decisions::TABLE, exported.decisions),
                 (expressions::TABLE, exported.expressions),
                 (markers::TABLE, exported.markers),
+                (samples::TABLE, exported.samples),
             ] {
                 let default = table == decisions::TABLE;
                 // Hubs cannot infer types without rows.
@@ -151,6 +152,7 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
     if export.layout == Layout::Tables {
         let _ = writeln!(text, "| expressions | {} |", exported.expressions);
         let _ = writeln!(text, "| markers | {} |", exported.markers);
+        let _ = writeln!(text, "| values of samples | {} |", exported.samples);
         let _ = writeln!(text, "| columns version | {TABLES_VERSION} |");
     }
     let _ = write!(
@@ -171,6 +173,7 @@ fn columns(text: &mut String) {
         "\n## Table `{}`\n\nOne row per decision, in order of games and decisions.\n\n{}\
          \n## Table `{}`\n\nOne row per expression of a player, in the same order.\n\n{}\
          \n## Table `{}`\n\nOne row per marker of an instrument or the researcher, in the same order.\n\n{}\
+         \n## Table `{}`\n\nOne row per value of a channel of the streams of a seat, in order of games, seats and times of receiving.\n\n{}\
          \nThe types are Arrow's. F is the number of faces (11 in the standard game). In CSV, lists and structs are JSON and\n\
          null is an empty cell; in CSV and JSON Lines, binary is hexadecimal and times are RFC 3339.\n",
         decisions::TABLE,
@@ -178,7 +181,9 @@ fn columns(text: &mut String) {
         expressions::TABLE,
         markdown(&expressions::columns()),
         markers::TABLE,
-        markdown(&markers::columns())
+        markdown(&markers::columns()),
+        samples::TABLE,
+        markdown(&samples::columns())
     );
 }
 

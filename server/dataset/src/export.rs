@@ -70,6 +70,8 @@ pub struct Exported {
     pub expressions: u64,
     /// Markers (counted only for tables).
     pub markers: u64,
+    /// Values of samples (counted only for tables).
+    pub samples: u64,
     /// Games excluded by the filter.
     pub filtered: u64,
     /// Damaged records and duplicate games.

@@ -1,4 +1,4 @@
-//! Datasets from records: typed tables of decisions, expressions and markers as Parquet, CSV and JSON Lines
+//! Datasets from records: typed tables of decisions, expressions, markers and samples as Parquet, CSV and JSON Lines
 //! with a dataset card, or the columns of the reference implementation.
 
 mod card;
@@ -17,6 +17,7 @@ mod parquet;
 mod python;
 mod row;
 mod run;
+mod samples;
 mod sheet;
 
 pub use column::{ColumnInfo, Type, markdown};
@@ -43,4 +44,9 @@ pub fn expression_columns() -> Vec<ColumnInfo> {
 /// The columns of the table of markers.
 pub fn marker_columns() -> Vec<ColumnInfo> {
     markers::columns()
+}
+
+/// The columns of the table of samples.
+pub fn sample_columns() -> Vec<ColumnInfo> {
+    samples::columns()
 }

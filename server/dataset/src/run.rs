@@ -16,6 +16,7 @@ use super::formats::Table;
 use super::game::{GameInfo, checked_info};
 use super::gather::{GameRows, gather};
 use super::markers::{self, MarkerRow};
+use super::samples::{self, SampleRow};
 use super::sheet::{self, Sheet};
 use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
@@ -101,6 +102,7 @@ impl Export {
                     None => {
                         games.insert(game.info().game_id.clone(), path.clone());
                         sink.add(&game).map_err(write)?;
+                        exported.samples += sink.add_samples(path, &game).map_err(write)?;
                         exported.count(&game);
                         None
                     }
@@ -199,6 +201,7 @@ enum Sink<'a> {
         decisions: Table<DecisionRow>,
         expressions: Table<ExpressionRow>,
         markers: Table<MarkerRow>,
+        samples: Table<SampleRow>,
     },
     Sheets {
         folder: &'a Path,
@@ -223,6 +226,7 @@ impl<'a> Sink<'a> {
                     &export.formats,
                 )?,
                 markers: Table::create(folder, markers::TABLE, markers::COLUMNS, &export.formats)?,
+                samples: Table::create(folder, samples::TABLE, samples::COLUMNS, &export.formats)?,
             },
             Layout::ChefsHatGym => Sink::Sheets {
                 folder,
@@ -238,6 +242,7 @@ impl<'a> Sink<'a> {
                     decisions,
                     expressions,
                     markers,
+                    ..
                 },
                 Game::Rows(rows),
             ) => {
@@ -254,16 +259,31 @@ impl<'a> Sink<'a> {
         }
     }
 
+    /// Adds the samples beside a record. Returns the number of values.
+    fn add_samples(&mut self, record: &Path, game: &Game) -> io::Result<u64> {
+        let (Self::Tables { samples: table, .. }, Game::Rows(rows)) = (self, game) else {
+            return Ok(0);
+        };
+        let mut count = 0;
+        samples::of_game(record, &rows.game, |rows| {
+            count += rows.len() as u64;
+            table.write(rows)
+        })?;
+        Ok(count)
+    }
+
     fn finish(self) -> io::Result<Vec<FileSummary>> {
         match self {
             Sink::Tables {
                 decisions,
                 expressions,
                 markers,
+                samples,
             } => {
                 let mut files = decisions.finish()?;
                 files.extend(expressions.finish()?);
                 files.extend(markers.finish()?);
+                files.extend(samples.finish()?);
                 Ok(files)
             }
             Sink::Sheets { files, .. } => Ok(files),

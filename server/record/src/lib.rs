@@ -12,6 +12,7 @@ pub mod outcome;
 pub mod players;
 pub mod pseudonym;
 pub mod replay;
+pub mod samples;
 pub mod signature;
 pub mod summary;
 #[cfg(feature = "testing")]

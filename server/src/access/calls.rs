@@ -96,6 +96,12 @@ pub const CALLS: &[Call] = &[
     )
     .streaming()
     .forwarded(),
+    call(
+        "/chefshat.v1.InstrumentService/AddSamples",
+        Player,
+        Compared,
+    )
+    .forwarded(),
     call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared).forwarded(),
     call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
     call("/chefshat.v1.RoomService/JoinRoom", Player, Compared).forwarded(),

@@ -1,6 +1,7 @@
 //! `InstrumentService`: what instruments and the researcher add to the recording of a room.
 
 use std::pin::Pin;
+use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
@@ -13,9 +14,13 @@ use tokio::time::Instant;
 use tonic::{Code, Request, Response, Status};
 
 use super::reach::Reach;
-use super::status::{Refusal, field, owner_token_wrong, room_gone, status};
+use super::status::{
+    Refusal, disk_nearly_full, field, internal, owner_token_wrong, room_gone, status,
+    ticket_unknown,
+};
 use crate::access::Caller;
 use crate::room::{Handle, MarkRequest, MarkerFollower};
+use crate::samples::SampleError;
 
 /// Why a marker is refused, if a field is.
 const REFUSED: &str = "MARKER_REFUSED";
@@ -78,6 +83,37 @@ impl InstrumentService for Instruments {
         }))
     }
 
+    async fn add_samples(
+        &self,
+        request: Request<v1::AddSamplesRequest>,
+    ) -> Result<Response<v1::AddSamplesResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let ticket = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
+        let finding = (self.reach).room_of_ticket(&caller, ticket.room, ticket_unknown);
+        let room = finding.await?;
+        let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
+        let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;
+        let rooms = self.reach.rooms();
+        let header = rooms.header(room.id()).ok_or_else(ticket_unknown)?;
+        if !has_started {
+            return Err(status(
+                Code::FailedPrecondition,
+                "GAME_NOT_STARTED",
+                "the game has not started: until then the seat may change hands",
+                [],
+            ));
+        }
+        if !rooms.store().has_space() {
+            return Err(disk_nearly_full("the disk of the server is nearly full"));
+        }
+        let chunk = request.chunk.unwrap_or_default();
+        let now = room.clock().now();
+        let adding = Arc::clone(rooms.samples()).add(header.game_id, seat, chunk, now);
+        let recorded = adding.await.map_err(samples_refused)?;
+        Ok(Response::new(v1::AddSamplesResponse { recorded }))
+    }
+
     async fn follow_markers(
         &self,
         request: Request<v1::FollowMarkersRequest>,
@@ -112,6 +148,22 @@ fn followed(
             Err(_) => Some((Err(room_gone()), None)),
         }
     })
+}
+
+/// The status for refused samples.
+fn samples_refused(error: SampleError) -> Status {
+    let message = error.to_string();
+    match error {
+        SampleError::Malformed(problem) => field("SAMPLES_REFUSED", &problem),
+        SampleError::Off => status(Code::FailedPrecondition, "SAMPLES_OFF", message, []),
+        SampleError::TooManyStreams | SampleError::TooMany => {
+            status(Code::ResourceExhausted, "TOO_MANY_SAMPLES", message, [])
+        }
+        SampleError::Io(error) => {
+            tracing::error!(%error, "samples cannot be written");
+            internal()
+        }
+    }
 }
 
 /// The status for a refused marker.

@@ -231,6 +231,15 @@ impl Handle {
         self.ask(|reply| Message::HasTicket(secrets, reply)).await
     }
 
+    /// The seat of a ticket, and whether the game has started; `None` if the room has no such
+    /// ticket.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn seat_of(&self, secret: [u8; 32]) -> Result<Option<(Seat, bool)>, RoomGone> {
+        self.ask(|reply| Message::SeatOf(secret, reply)).await
+    }
+
     /// Frees a seat; `None` if the room has no such ticket.
     ///
     /// # Errors

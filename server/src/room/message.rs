@@ -216,6 +216,8 @@ pub(super) enum Message {
     ),
     Describe(oneshot::Sender<v1::Room>),
     HasTicket(Vec<[u8; 32]>, oneshot::Sender<bool>),
+    /// The seat of a ticket, and whether the game has started.
+    SeatOf([u8; 32], oneshot::Sender<Option<(Seat, bool)>>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
     Leave(
         [u8; 32],

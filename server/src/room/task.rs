@@ -514,6 +514,11 @@ impl Room {
                 let seated = |secret: &[u8; 32]| self.core.seat_of_ticket(secret).is_some();
                 answer(reply, secrets.iter().any(seated));
             }
+            Message::SeatOf(secret, reply) => {
+                let has_started = self.core.game().is_some();
+                let seat = self.core.seat_of_ticket(&secret);
+                answer(reply, seat.map(|seat| (seat, has_started)));
+            }
             Message::Close(secret, reply) => {
                 if self.core.header().owner.matches(&secret) {
                     self.core.abort(self.now, AbortReason::Closed);

@@ -28,6 +28,7 @@ use crate::limits::{Background, Held, Key, Places, Refused, Searches, Shares};
 use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
+use crate::samples::Samples;
 use crate::signing::Signer;
 use crate::store::{Store, StoreError};
 use crate::webhooks::Webhooks;
@@ -146,6 +147,7 @@ pub struct Rooms {
     max_rooms: usize,
     places: Arc<Places>,
     shares: Shares,
+    samples: Arc<Samples>,
 }
 
 impl Rooms {
@@ -175,6 +177,7 @@ impl Rooms {
     ) -> Result<Arc<Self>, ThreadPoolBuildError> {
         // The database of a cluster has all records.
         let record_dir = config.data_dir.clone().filter(|_| lease.is_none());
+        let samples = Arc::new(Samples::new(record_dir.clone()));
         let metrics = Arc::new(Metrics::default());
         if let Some(store) = store.metrics() {
             metrics.add_store(store);
@@ -216,7 +219,13 @@ impl Rooms {
             max_rooms: config.max_rooms,
             places: Places::new(config.max_rooms, config.shares),
             shares: config.shares,
+            samples,
         }))
+    }
+
+    /// The samples of seats.
+    pub fn samples(&self) -> &Arc<Samples> {
+        &self.samples
     }
 
     /// What announces rooms, games and tournaments.

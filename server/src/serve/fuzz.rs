@@ -271,6 +271,18 @@ fn calls(
             }],
         ),
         call(
+            "InstrumentService/AddSamples",
+            [&v1::AddSamplesRequest {
+                ticket: ticket.into(),
+                chunk: Some(v1::SampleChunk {
+                    stream: "affect".into(),
+                    channels: vec!["valence".into()],
+                    elapsed_us: vec![1, 2],
+                    values: vec![0.5, 0.25],
+                }),
+            }],
+        ),
+        call(
             "InstrumentService/FollowMarkers",
             [&v1::FollowMarkersRequest {
                 room_id: room_id.clone(),

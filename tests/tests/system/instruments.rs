@@ -11,13 +11,13 @@ use chefshat_proto::v1::{
     self, expression::About, game_event::Kind, record_line::Line,
     record_service_client::RecordServiceClient,
 };
-use chefshat_record::replay;
+use chefshat_record::{replay, samples};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
 use chefshat_server::store::{MemoryStore, SqliteStore};
 use chefshat_server::webhooks::WebhookSettings;
 use chefshat_tests::{
-    TestNodes, TestServer, one_shift, patiently, play_out, random_agents, room_of_four,
+    TestNodes, TestServer, attach_all, one_shift, patiently, play_out, random_agents, room_of_four,
 };
 use http_body_util::BodyExt as _;
 use hyper_util::rt::TokioIo;
@@ -25,6 +25,8 @@ use serde_json::Value;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tonic::Streaming;
+
+use crate::records::reason;
 
 /// A join of a room, between two instants.
 struct Join {
@@ -389,6 +391,51 @@ async fn expressions_are_about_seats_and_points_of_gaze() {
     }
     let problem = replay::replay(&forged).expect_err("no such seat");
     assert!(problem.to_string().contains("about_seat"), "{problem}");
+}
+
+#[tokio::test]
+async fn samples_of_a_seat_are_in_a_file_beside_the_records() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (room, _, tickets) = owned_room(&client).await;
+    let mut service = InstrumentServiceClient::new(client.channel());
+    let chunk = |from: u64| v1::SampleChunk {
+        stream: "affect".into(),
+        channels: vec!["valence".into(), "arousal".into()],
+        elapsed_us: vec![from, from + 1],
+        values: vec![0.5, -0.5, f32::NAN, 0.25],
+    };
+    let mut add = async |ticket: &str, chunk| {
+        let request = v1::AddSamplesRequest {
+            ticket: ticket.to_owned(),
+            chunk: Some(chunk),
+        };
+        let added = service.add_samples(request).await;
+        added
+            .map(|added| added.into_inner().recorded)
+            .map_err(|status| reason(&status))
+    };
+    let early = add(&tickets[1], chunk(1)).await;
+    assert_eq!(early, Err("GAME_NOT_STARTED".to_owned()));
+    let mut seats = attach_all(&server, &tickets).await;
+    for seat in &mut seats {
+        // The game has started when a seat has heard of it.
+        patiently("an update", seat.next()).await;
+    }
+    assert_eq!(add(&tickets[1], chunk(1)).await, Ok(2));
+    assert_eq!(add(&tickets[1], chunk(2)).await, Ok(1), "one is known");
+    let wrong = add(&tickets[1], v1::SampleChunk::default()).await;
+    assert_eq!(wrong, Err("SAMPLES_REFUSED".to_owned()));
+    let future = add(&tickets[1], chunk(u64::MAX - 1)).await;
+    assert_eq!(future, Err("SAMPLES_REFUSED".to_owned()));
+    let stranger = add(&"ab".repeat(48), chunk(1)).await;
+    assert_eq!(stranger, Err("TICKET_UNKNOWN".to_owned()));
+    let path = samples::path_of(server.data_dir(), &room.game_id, 1);
+    let mut times = Vec::new();
+    samples::read(&path, |chunk| times.extend(chunk.elapsed_us)).expect("chunks");
+    assert_eq!(times, [1, 2, 3]);
+    let none = samples::path_of(server.data_dir(), &room.game_id, 0);
+    assert!(!none.exists());
 }
 
 /// Receives webhooks. Returns its port and the events.

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_record::jsonl;
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
+use chefshat_record::{jsonl, samples};
 use clap::Args;
 use serde_json::json;
 
@@ -165,6 +165,11 @@ async fn rewrite(
             who.pseudonym.clone_from(&held);
             files.earlier = Some(held);
         }
+        // Before the name is gone from the record, so that running it again completes it.
+        if let Err(error) = remove_samples(data_dir, &lines, &who.name) {
+            files.skipped.fail(error.to_string());
+            continue;
+        }
         let redactions = who.redact(&mut lines);
         if redactions == Redactions::default() {
             continue;
@@ -177,6 +182,23 @@ async fn rewrite(
         files.redactions += redactions;
     }
     Ok(files)
+}
+
+/// Removes the samples of a participant's seats in a game.
+fn remove_samples(data_dir: &Path, lines: &[v1::RecordLine], name: &str) -> io::Result<()> {
+    let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
+        return Ok(());
+    };
+    let mut seats = header.seats.iter().zip(0..);
+    seats.try_for_each(|(seat, number)| {
+        if seat.name != name || !seat.built_in_agent.is_empty() {
+            return Ok(());
+        }
+        match std::fs::remove_file(samples::path_of(data_dir, &header.game_id, number)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        }
+    })
 }
 
 /// The pseudonym the database has for a name in a record, so that file and database agree.

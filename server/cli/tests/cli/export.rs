@@ -105,6 +105,7 @@ fn a_dataset_is_exported_from_the_data_folder() {
         "decisions.parquet",
         "expressions.parquet",
         "markers.parquet",
+        "samples.parquet",
     ];
     assert_eq!(stage.out(), standard);
     let ended = stage
@@ -113,7 +114,7 @@ fn a_dataset_is_exported_from_the_data_folder() {
     let said = ended.json();
     assert_eq!(said["games"], 2);
     assert_eq!(said["finished"], 2);
-    assert_eq!(said["files"].as_array().unwrap().len(), 7);
+    assert_eq!(said["files"].as_array().unwrap().len(), 9);
     let files = [
         "README.md",
         "SHA256SUMS",
@@ -123,6 +124,8 @@ fn a_dataset_is_exported_from_the_data_folder() {
         "expressions.jsonl",
         "markers.csv",
         "markers.jsonl",
+        "samples.csv",
+        "samples.jsonl",
     ];
     assert_eq!(stage.out(), files);
     let rows = std::fs::read_to_string(stage.path("out/decisions.jsonl")).unwrap();

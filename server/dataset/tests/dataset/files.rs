@@ -2,6 +2,7 @@
 
 use chefshat_dataset::{
     ColumnInfo, Export, Format, decision_columns, expression_columns, markdown, marker_columns,
+    sample_columns,
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -61,6 +62,9 @@ fn every_format_has_every_row_and_exports_are_deterministic() {
             "markers.parquet",
             "markers.jsonl",
             "markers.csv",
+            "samples.parquet",
+            "samples.jsonl",
+            "samples.csv",
             "README.md"
         ]
     );
@@ -115,6 +119,7 @@ fn the_card_is_readable_by_hubs_and_people() {
         markdown(&decision_columns()),
         markdown(&expression_columns()),
         markdown(&marker_columns()),
+        markdown(&sample_columns()),
     ] {
         assert!(card.contains(&table));
         assert!(

@@ -269,6 +269,15 @@ class AsyncCalls(ABC):
             finally:
                 call.cancel()
 
+    async def add_samples(self, ticket: str, chunk: pb.SampleChunk) -> int:
+        """Records samples of the seat of a ticket beside its game. See `chefshat.samples.SampleStream`.
+
+        Returns:
+            How many were new. Samples that are not later than the last one of their stream are ignored.
+        """
+        request = pb.AddSamplesRequest(ticket=ticket, chunk=chunk)
+        return (await awaited(self._instruments.AddSamples, request)).recorded
+
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
         """Reports something that happened at a physical table.
 

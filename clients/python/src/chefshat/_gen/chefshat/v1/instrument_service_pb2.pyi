@@ -134,3 +134,101 @@ class FollowMarkersResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___FollowMarkersResponse: _TypeAlias = FollowMarkersResponse  # noqa: Y015
+
+@_typing.final
+class AddSamplesRequest(_message.Message):
+    """Adds samples of a seat."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TICKET_FIELD_NUMBER: _builtins.int
+    CHUNK_FIELD_NUMBER: _builtins.int
+    ticket: _builtins.str
+    """The ticket of the seat."""
+    @_builtins.property
+    def chunk(self) -> Global___SampleChunk:
+        """The samples."""
+
+    def __init__(
+        self,
+        *,
+        ticket: _builtins.str = ...,
+        chunk: Global___SampleChunk | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk", "ticket", b"ticket"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___AddSamplesRequest: _TypeAlias = AddSamplesRequest  # noqa: Y015
+
+@_typing.final
+class AddSamplesResponse(_message.Message):
+    """The samples were recorded."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    RECORDED_FIELD_NUMBER: _builtins.int
+    recorded: _builtins.int
+    """How many were new. Samples that are not later than the last one of their stream are ignored, so
+    a chunk can be sent again.
+    """
+    def __init__(
+        self,
+        *,
+        recorded: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["recorded", b"recorded"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___AddSamplesResponse: _TypeAlias = AddSamplesResponse  # noqa: Y015
+
+@_typing.final
+class SampleChunk(_message.Message):
+    """Consecutive samples of a stream."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STREAM_FIELD_NUMBER: _builtins.int
+    CHANNELS_FIELD_NUMBER: _builtins.int
+    ELAPSED_US_FIELD_NUMBER: _builtins.int
+    VALUES_FIELD_NUMBER: _builtins.int
+    stream: _builtins.str
+    """Name of the stream, for instance "affect"; 1..=32 ASCII letters, digits, `_`, `-` or `.`."""
+    @_builtins.property
+    def channels(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
+        """Names of the 1..=16 channels, for instance "valence"; as the name of the stream. All chunks of
+        a stream have the same.
+        """
+
+    @_builtins.property
+    def elapsed_us(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """The times of 1..=512 samples by the room's clock (`GetClock`), microseconds since the room was
+        created, ascending; at most a second from now.
+        """
+
+    @_builtins.property
+    def values(self) -> _containers.RepeatedScalarFieldContainer[_builtins.float]:
+        """One value of each channel for the first sample, then for the second, and so on; NaN where there
+        is none.
+        """
+
+    def __init__(
+        self,
+        *,
+        stream: _builtins.str = ...,
+        channels: _abc.Iterable[_builtins.str] | None = ...,
+        elapsed_us: _abc.Iterable[_builtins.int] | None = ...,
+        values: _abc.Iterable[_builtins.float] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["channels", b"channels", "elapsed_us", b"elapsed_us", "stream", b"stream", "values", b"values"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SampleChunk: _TypeAlias = SampleChunk  # noqa: Y015

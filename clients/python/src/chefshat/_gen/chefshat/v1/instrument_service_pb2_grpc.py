@@ -26,7 +26,7 @@ if _version_not_supported:
 
 
 class InstrumentServiceStub(object):
-    """The recording of a room, for its owner.
+    """The recording of a room: markers of its owner, and streams of samples of its seats.
     """
 
     def __init__(self, channel):
@@ -45,17 +45,22 @@ class InstrumentServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersResponse.FromString,
                 _registered_method=True)
+        self.AddSamples = channel.unary_unary(
+                '/chefshat.v1.InstrumentService/AddSamples',
+                request_serializer=chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesResponse.FromString,
+                _registered_method=True)
 
 
 class InstrumentServiceServicer(object):
-    """The recording of a room, for its owner.
+    """The recording of a room: markers of its owner, and streams of samples of its seats.
     """
 
     def AddMarker(self, request, context):
         """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
-        (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN);
-        FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in a game, or 50 a
-        second and 200 at once; metadata `limit` says which).
+        (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+        (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
+        a game, or 50 a second and 200 at once; metadata `limit` says which).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -63,8 +68,22 @@ class InstrumentServiceServicer(object):
 
     def FollowMarkers(self, request, context):
         """Streams the markers of the room, those it has and then each that is added, until the game is
-        over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+        over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+        NOT_FOUND (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def AddSamples(self, request, context):
+        """Records samples of a seat, for instance thirty a second of affect, beside the game: they are in
+        no event and not in the record, and reach nobody. `chefshat export` exports them from the
+        server's data directory. Sent from the start of the game until the room is no longer listed.
+        What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
+        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+        (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
+        other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
+        DISK_NEARLY_FULL).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -83,6 +102,11 @@ def add_InstrumentServiceServicer_to_server(servicer, server):
                     request_deserializer=chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersResponse.SerializeToString,
             ),
+            'AddSamples': grpc.unary_unary_rpc_method_handler(
+                    servicer.AddSamples,
+                    request_deserializer=chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesResponse.SerializeToString,
+            ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
             'chefshat.v1.InstrumentService', rpc_method_handlers)
@@ -92,7 +116,7 @@ def add_InstrumentServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class InstrumentService(object):
-    """The recording of a room, for its owner.
+    """The recording of a room: markers of its owner, and streams of samples of its seats.
     """
 
     @staticmethod
@@ -139,6 +163,33 @@ class InstrumentService(object):
             '/chefshat.v1.InstrumentService/FollowMarkers',
             chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersRequest.SerializeToString,
             chefshat_dot_v1_dot_instrument__service__pb2.FollowMarkersResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def AddSamples(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.InstrumentService/AddSamples',
+            chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesRequest.SerializeToString,
+            chefshat_dot_v1_dot_instrument__service__pb2.AddSamplesResponse.FromString,
             options,
             channel_credentials,
             insecure,

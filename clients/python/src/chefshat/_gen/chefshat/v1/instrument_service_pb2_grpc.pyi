@@ -27,7 +27,7 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class InstrumentServiceStub:
-    """The recording of a room, for its owner."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats."""
 
     @_typing.overload
     def __new__(cls, channel: _grpc.Channel) -> _Self: ...
@@ -35,35 +35,55 @@ class InstrumentServiceStub:
     def __new__(cls, channel: _aio.Channel) -> InstrumentServiceAsyncStub: ...
     AddMarker: _grpc.UnaryUnaryMultiCallable[_instrument_service_pb2.AddMarkerRequest, _instrument_service_pb2.AddMarkerResponse]
     """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
-    (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN);
-    FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in a game, or 50 a
-    second and 200 at once; metadata `limit` says which).
+    (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+    (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
+    a game, or 50 a second and 200 at once; metadata `limit` says which).
     """
     FollowMarkers: _grpc.UnaryStreamMultiCallable[_instrument_service_pb2.FollowMarkersRequest, _instrument_service_pb2.FollowMarkersResponse]
     """Streams the markers of the room, those it has and then each that is added, until the game is
-    over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+    over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+    NOT_FOUND (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+    """
+    AddSamples: _grpc.UnaryUnaryMultiCallable[_instrument_service_pb2.AddSamplesRequest, _instrument_service_pb2.AddSamplesResponse]
+    """Records samples of a seat, for instance thirty a second of affect, beside the game: they are in
+    no event and not in the record, and reach nobody. `chefshat export` exports them from the
+    server's data directory. Sent from the start of the game until the room is no longer listed.
+    What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
+    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+    (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
+    other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
+    DISK_NEARLY_FULL).
     """
 
 @_typing.type_check_only
 class InstrumentServiceAsyncStub(InstrumentServiceStub):
-    """The recording of a room, for its owner."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats."""
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     AddMarker: _aio.UnaryUnaryMultiCallable[_instrument_service_pb2.AddMarkerRequest, _instrument_service_pb2.AddMarkerResponse]  # type: ignore[assignment]
     """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
-    (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN);
-    FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in a game, or 50 a
-    second and 200 at once; metadata `limit` says which).
+    (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+    (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
+    a game, or 50 a second and 200 at once; metadata `limit` says which).
     """
     FollowMarkers: _aio.UnaryStreamMultiCallable[_instrument_service_pb2.FollowMarkersRequest, _instrument_service_pb2.FollowMarkersResponse]  # type: ignore[assignment]
     """Streams the markers of the room, those it has and then each that is added, until the game is
-    over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+    over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+    NOT_FOUND (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+    """
+    AddSamples: _aio.UnaryUnaryMultiCallable[_instrument_service_pb2.AddSamplesRequest, _instrument_service_pb2.AddSamplesResponse]  # type: ignore[assignment]
+    """Records samples of a seat, for instance thirty a second of affect, beside the game: they are in
+    no event and not in the record, and reach nobody. `chefshat export` exports them from the
+    server's data directory. Sent from the start of the game until the room is no longer listed.
+    What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
+    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+    (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
+    other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
+    DISK_NEARLY_FULL).
     """
 
 class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
-    """The recording of a room, for its owner."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats."""
 
     @_abc_1.abstractmethod
     def AddMarker(
@@ -72,9 +92,9 @@ class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_instrument_service_pb2.AddMarkerResponse, _abc.Awaitable[_instrument_service_pb2.AddMarkerResponse]]:
         """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
-        (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN);
-        FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in a game, or 50 a
-        second and 200 at once; metadata `limit` says which).
+        (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+        (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
+        a game, or 50 a second and 200 at once; metadata `limit` says which).
         """
 
     @_abc_1.abstractmethod
@@ -84,8 +104,24 @@ class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_instrument_service_pb2.FollowMarkersResponse], _abc.AsyncIterator[_instrument_service_pb2.FollowMarkersResponse]]:
         """Streams the markers of the room, those it has and then each that is added, until the game is
-        over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+        over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
+        NOT_FOUND (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
+        """
+
+    @_abc_1.abstractmethod
+    def AddSamples(
+        self,
+        request: _instrument_service_pb2.AddSamplesRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_instrument_service_pb2.AddSamplesResponse, _abc.Awaitable[_instrument_service_pb2.AddSamplesResponse]]:
+        """Records samples of a seat, for instance thirty a second of affect, beside the game: they are in
+        no event and not in the record, and reach nobody. `chefshat export` exports them from the
+        server's data directory. Sent from the start of the game until the room is no longer listed.
+        What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
+        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+        (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
+        other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
+        DISK_NEARLY_FULL).
         """
 
 def add_InstrumentServiceServicer_to_server(servicer: InstrumentServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
