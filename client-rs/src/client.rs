@@ -266,6 +266,25 @@ impl Client {
         response.marker.ok_or_else(|| Error::incomplete("marker"))
     }
 
+    /// Records samples of a seat, such as thirty a second of affect, beside the game. Returns how many
+    /// were new: a chunk can be sent again.
+    ///
+    /// # Errors
+    /// `TICKET_UNKNOWN`, `SAMPLES_REFUSED`, `GAME_NOT_STARTED`, `SAMPLES_OFF`, `TOO_MANY_SAMPLES`,
+    /// `DISK_NEARLY_FULL`.
+    pub async fn add_samples(
+        &self,
+        ticket: impl Into<String>,
+        chunk: v1::SampleChunk,
+    ) -> Result<u32, Error> {
+        let mut service = InstrumentServiceClient::new(self.channel());
+        let request = v1::AddSamplesRequest {
+            ticket: ticket.into(),
+            chunk: Some(chunk),
+        };
+        Ok(service.add_samples(request).await?.into_inner().recorded)
+    }
+
     /// Sends an expression of affect for a seat, at any time.
     ///
     /// # Errors

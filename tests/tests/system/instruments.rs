@@ -26,8 +26,6 @@ use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tonic::Streaming;
 
-use crate::records::reason;
-
 /// A join of a room, between two instants.
 struct Join {
     name: String,
@@ -398,25 +396,19 @@ async fn samples_of_a_seat_are_in_a_file_beside_the_records() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (room, _, tickets) = owned_room(&client).await;
-    let mut service = InstrumentServiceClient::new(client.channel());
     let chunk = |from: u64| v1::SampleChunk {
         stream: "affect".into(),
         channels: vec!["valence".into(), "arousal".into()],
         elapsed_us: vec![from, from + 1],
         values: vec![0.5, -0.5, f32::NAN, 0.25],
     };
-    let mut add = async |ticket: &str, chunk| {
-        let request = v1::AddSamplesRequest {
-            ticket: ticket.to_owned(),
-            chunk: Some(chunk),
-        };
-        let added = service.add_samples(request).await;
-        added
-            .map(|added| added.into_inner().recorded)
-            .map_err(|status| reason(&status))
+    let add = async |ticket: &str, chunk| {
+        let added = client.add_samples(ticket, chunk).await;
+        added.map_err(|error| error.reason().map(str::to_owned))
     };
+    let refused = |reason: &str| Err(Some(reason.to_owned()));
     let early = add(&tickets[1], chunk(1)).await;
-    assert_eq!(early, Err("GAME_NOT_STARTED".to_owned()));
+    assert_eq!(early, refused("GAME_NOT_STARTED"));
     let mut seats = attach_all(&server, &tickets).await;
     for seat in &mut seats {
         // The game has started when a seat has heard of it.
@@ -425,11 +417,11 @@ async fn samples_of_a_seat_are_in_a_file_beside_the_records() {
     assert_eq!(add(&tickets[1], chunk(1)).await, Ok(2));
     assert_eq!(add(&tickets[1], chunk(2)).await, Ok(1), "one is known");
     let wrong = add(&tickets[1], v1::SampleChunk::default()).await;
-    assert_eq!(wrong, Err("SAMPLES_REFUSED".to_owned()));
+    assert_eq!(wrong, refused("SAMPLES_REFUSED"));
     let future = add(&tickets[1], chunk(u64::MAX - 1)).await;
-    assert_eq!(future, Err("SAMPLES_REFUSED".to_owned()));
+    assert_eq!(future, refused("SAMPLES_REFUSED"));
     let stranger = add(&"ab".repeat(48), chunk(1)).await;
-    assert_eq!(stranger, Err("TICKET_UNKNOWN".to_owned()));
+    assert_eq!(stranger, refused("TICKET_UNKNOWN"));
     let path = samples::path_of(server.data_dir(), &room.game_id, 1);
     let mut times = Vec::new();
     samples::read(&path, |chunk| times.extend(chunk.elapsed_us)).expect("chunks");

@@ -406,6 +406,13 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
             from_number: 0,
         })
     );
+    ask!(
+        "AddSamples",
+        instruments.add_samples(v1::AddSamplesRequest {
+            ticket: wrong(room_id),
+            chunk: Some(v1::SampleChunk::default()),
+        })
+    );
     let mut spectators = SpectatorServiceClient::new(client.channel());
     ask!(
         "Watch",
