@@ -4,14 +4,14 @@
 self.addEventListener("install", () => self.skipWaiting());
 self.addEventListener("activate", (event) => event.waitUntil(self.clients.claim()));
 
-// A click on the notification of a turn returns to the page.
+// A click on the notification of a turn returns to the page that called.
 self.addEventListener("notificationclick", (event) => {
   event.notification.close();
-  event.waitUntil(returnToPage());
+  event.waitUntil(returnTo(event.notification.data.path));
 });
 
-async function returnToPage() {
+async function returnTo(path) {
   const pages = await self.clients.matchAll({ type: "window", includeUncontrolled: true });
-  const table = pages.find(({ url }) => /\/(rooms|tournaments)\//.test(new URL(url).pathname)) ?? pages[0];
-  return table ? table.focus() : self.clients.openWindow("/");
+  const page = pages.find(({ url }) => new URL(url).pathname === path);
+  return page ? page.focus() : self.clients.openWindow(path);
 }

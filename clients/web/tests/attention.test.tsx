@@ -1,6 +1,7 @@
 // What calls a person back on their turn, and keeps the screen on: each way only if it is switched on
 // and allowed, and never asked for by itself.
 
+import { readFileSync } from "node:fs";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
@@ -19,8 +20,16 @@ function Page({ decision, playing }: { decision: OpenDecision | undefined; playi
   return <AtTable decision={decision} playing={playing} />;
 }
 
-function AtTable({ decision, playing }: { decision: OpenDecision | undefined; playing: boolean }) {
-  useAttention(decision, playing);
+function AtTable({
+  decision,
+  playing,
+  room = "00ff",
+}: {
+  decision: OpenDecision | undefined;
+  playing: boolean;
+  room?: string;
+}) {
+  useAttention(room, decision, playing);
   return null;
 }
 
@@ -103,6 +112,92 @@ test("a notification comes only if it is switched on and the page is not seen", 
   focused = false;
   await show({ ...TURN, id: 8n });
   await vi.waitFor(() => expect(notified.mock.calls).toEqual([["Your turn"]]));
+});
+
+/** A service worker, with the open notifications by tag; the first registration waits for `registered`. */
+function fakeWorker(registered = Promise.resolve()) {
+  const open = new Map<string, { title: string; path: unknown; close(): void }>();
+  const worker = {
+    showNotification: async (title: string, { tag, data }: { tag: string; data: { path: string } }) => {
+      open.set(tag, { title, path: data.path, close: () => open.delete(tag) });
+    },
+    getNotifications: async ({ tag }: { tag: string }) => [open.get(tag)].filter((one) => one !== undefined),
+  };
+  const getRegistration = () => registered.then(() => worker);
+  Object.defineProperties(navigator, { serviceWorker: { value: { getRegistration }, configurable: true } });
+  return open;
+}
+
+test("each table has a notification of its own, which closes with its decision", async () => {
+  setPreference("notification", true);
+  const open = fakeWorker();
+  const two = (first: OpenDecision | undefined) => (
+    <>
+      <AtTable room="01" decision={first} playing />
+      <AtTable room="02" decision={TURN} playing />
+    </>
+  );
+  await act(() => render(two(TURN), root));
+  await vi.waitFor(() => expect(open.size).toBe(2));
+  const [first, second] = open.values();
+  expect([first?.title, first?.path]).toEqual(["Your turn", location.pathname]);
+  await act(() => render(two(undefined), root));
+  await vi.waitFor(() => expect([...open.values()]).toEqual([second]));
+});
+
+test("a decision that is over before its notification is shown has none", async () => {
+  setPreference("notification", true);
+  let register = () => {};
+  const shown = fakeWorker(
+    new Promise((resolve) => {
+      register = resolve;
+    }),
+  );
+  const set = vi.spyOn(shown, "set");
+  await show(TURN);
+  await show(undefined);
+  register();
+  await show({ ...TURN, id: 8n });
+  await vi.waitFor(() => expect(shown.size).toBe(1));
+  expect(set).toHaveBeenCalledTimes(1);
+});
+
+test("a browser that refuses notifications of a page is left in peace", async () => {
+  setPreference("notification", true);
+  notified.mockImplementationOnce(() => {
+    throw new TypeError("Illegal constructor");
+  });
+  await show(TURN);
+  await vi.waitFor(() => expect(notified).toHaveBeenCalledTimes(1));
+  await show(undefined);
+});
+
+test.each([
+  ["that page, if it is open", "/rooms/02", "focused /rooms/02"],
+  ["its address, if it is not", "/rooms/03", "opened /rooms/03"],
+])("a click on a notification shows %s", async (_, path, expected) => {
+  const listeners: Partial<Record<string, (event: object) => void>> = {};
+  const done: string[] = [];
+  const page = (path: string) => ({ url: `http://127.0.0.1${path}`, focus: () => done.push(`focused ${path}`) });
+  const worker = {
+    addEventListener: (name: string, listener: (event: object) => void) => {
+      listeners[name] = listener;
+    },
+    clients: {
+      matchAll: async () => [page("/rooms/01"), page("/rooms/02")],
+      openWindow: (path: string) => done.push(`opened ${path}`),
+    },
+  };
+  new Function("self", readFileSync("public/sw.js", "utf8"))(worker);
+  let returned: Promise<unknown> | undefined;
+  listeners.notificationclick?.({
+    notification: { data: { path }, close: () => done.push("closed") },
+    waitUntil: (promise: Promise<unknown>) => {
+      returned = promise;
+    },
+  });
+  await returned;
+  expect(done).toEqual(["closed", expected]);
 });
 
 test.each([

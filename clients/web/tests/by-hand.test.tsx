@@ -61,7 +61,7 @@ test("the question names the participant, who is removed", async () => {
   expect(remove.mock.calls.map(([{ participant }]) => participant)).toEqual([0]);
 });
 
-test("whoever takes the number while the question is open is not removed", async () => {
+test("a participant who takes the number while the question is open is not removed", async () => {
   const remove = removing();
   await show("Ada", "Bo");
   await press("Remove…");

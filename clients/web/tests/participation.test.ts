@@ -14,10 +14,13 @@ import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { startParticipation } from "../src/tournaments/participation";
 
 const SEATED = 2 ** 31;
-type Told = MessageInitShape<typeof SeatUpdateSchema>;
-const entered: Told = { handle: 0, update: { case: "entered", value: {} } };
-const superseded: Told = { handle: 0, update: { case: "detached", value: { reason: DetachReason.SUPERSEDED } } };
-const seated: Told = { handle: SEATED, update: { case: "attached", value: { roomId: "room1", ticket: "t", seat: 0 } } };
+type Update = MessageInitShape<typeof SeatUpdateSchema>;
+const entered: Update = { handle: 0, update: { case: "entered", value: {} } };
+const superseded: Update = { handle: 0, update: { case: "detached", value: { reason: DetachReason.SUPERSEDED } } };
+const seated: Update = {
+  handle: SEATED,
+  update: { case: "attached", value: { roomId: "room1", ticket: "t", seat: 0 } },
+};
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -28,7 +31,7 @@ afterEach(() => {
 });
 
 /** A stream that sends messages at these times, in milliseconds from its start, and stays open. */
-function streaming(said: readonly (readonly [atMs: number, update: Told])[]) {
+function streaming(said: readonly (readonly [atMs: number, update: Update])[]) {
   return vi.spyOn(playApi, "watch").mockImplementation(async function* () {
     let nowMs = 0;
     for (const [atMs, update] of said) {

@@ -123,6 +123,25 @@ test.each([
   expect(answers).toEqual([]);
 });
 
+test.each([
+  ["stay picked in the same pizza", {}, true],
+  ["do not stay picked when the next pizza is opened", { pizza: 2, board: [] }, false],
+  ["do not stay picked in the next Shift", { shift: 2, board: [] }, false],
+])("cards that were picked before the turn %s", async (_, changed, played) => {
+  await show(table());
+  await pick(8);
+  await show(table({ ...changed, next: OWN }), turn(EIGHTS, PASS));
+  await press("Enter");
+  expect(answers).toEqual(played ? [[action(EIGHTS), undefined]] : []);
+});
+
+test("cards that were picked before the turn do not stay picked while others open the next pizza", async () => {
+  await show(table());
+  await pick(8);
+  await show(table({ pizza: 2, board: [] }));
+  expect(root.querySelectorAll('[data-part~="hand-card"][aria-pressed="true"]')).toHaveLength(0);
+});
+
 test("a pass is planned too, and cards that do not beat the board are refused", async () => {
   await show(table());
   await pick(9);

@@ -96,7 +96,7 @@ test.each([
   expect(certificates.map(({ name }) => name)).toEqual(["Ada", "Bo & Çem", "Zoë", "Łucja 你好"]);
   expect(certificates[0]).toMatchObject({ achieved: first, tournament: "Spring cup" });
   expect(certificates[0]?.lines.join()).toContain(wins);
-  // Whoever left has no place.
+  // A participant who has left has no place.
   expect(certificates[2]?.achieved).toBe(part);
   await setLanguage("en");
 });

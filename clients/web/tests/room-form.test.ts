@@ -68,8 +68,13 @@ test("clocks are sent in milliseconds, and custom ones accept a decimal comma", 
   expect(asked({ spectators: false, spectatorDelay: "soon" }).policy?.spectatorDelayDecisions).toBe(0);
   const relaxed = asked({ clock: "relaxed", decisionSeconds: "nonsense" }).policy;
   expect([relaxed?.decisionTimeMs, relaxed?.bankMs]).toEqual([60_000, 300_000]);
-  expect(relaxed?.absenceTimeMs).toBe(20_000);
+});
+
+test("the absence time is left to the server, whose default depends on who plays, unless it is entered", () => {
+  expect(asked().policy?.absenceTimeMs).toBeUndefined();
+  expect(asked({ absenceSeconds: " " }).policy?.absenceTimeMs).toBeUndefined();
   expect(asked({ absenceSeconds: "2,5" }).policy?.absenceTimeMs).toBe(2500);
+  expect(asked({ absenceSeconds: "0" }).policy?.absenceTimeMs).toBe(0);
 });
 
 test("points are parsed from a list, and left to the rules if it is empty", () => {
@@ -120,6 +125,7 @@ test.each<[Partial<RoomForm>, object]>([
   [{ faces: "99" }, { faces: { bounds: [4, 15] } }],
   [{ clock: "own", decisionSeconds: "" }, { decisionSeconds: "notANumber" }],
   [{ clock: "own", bankSeconds: "-1" }, { bankSeconds: { bounds: [0, 86_400] } }],
+  [{ absenceSeconds: " " }, {}],
   [{ absenceSeconds: "-1" }, { absenceSeconds: { bounds: [0, 86_400] } }],
   [{ clock: "relaxed", decisionSeconds: "" }, {}],
   [{ points: "5, 3, -1, 0" }, { points: "notPoints" }],

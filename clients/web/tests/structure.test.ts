@@ -11,7 +11,7 @@ import {
 } from "../src/gen/chefshat/v1/tournament_pb";
 import { bracket, gradeOf, mergedGames, playedRounds } from "../src/tournaments/structure";
 
-interface Told {
+interface Described {
   game: number;
   round: number;
   table: number;
@@ -22,7 +22,7 @@ interface Told {
 
 const SCORES = [5, 3, 1, 0];
 
-function game({ game, round, table, order, counted = true }: Told): TournamentGame {
+function game({ game, round, table, order, counted = true }: Described): TournamentGame {
   return create(TournamentGameSchema, {
     game,
     round,
@@ -57,7 +57,12 @@ function knockout(games: TournamentGame[], state = TournamentState.PLAYING) {
 test.each([
   ["nothing drawn", [], TournamentState.OPEN, []],
   ["the first round", first, TournamentState.PLAYING, [["3 1 0 2", "4 7 6 5"], [""]]],
-  ["the final goes on", [...first, running], TournamentState.PLAYING, [["3+ 1+ 0 2", "4+ 7+ 6 5"], ["1 3 4 7"]]],
+  [
+    "the final is still played",
+    [...first, running],
+    TournamentState.PLAYING,
+    [["3+ 1+ 0 2", "4+ 7+ 6 5"], ["1 3 4 7"]],
+  ],
   ["over", [...first, final], TournamentState.FINISHED, [["3+ 1+ 0 2", "4+ 7+ 6 5"], ["7+ 3 1 4"]]],
 ])("a bracket: %s", (_, games, state, expected) => {
   expect(knockout(games, state)).toEqual(expected);

@@ -8,6 +8,7 @@ import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { type StudyShownItem, StudyShownItemSchema, StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
+import { ContinueStudyResponseSchema } from "../src/gen/chefshat/v1/study_service_pb";
 import { setLanguage } from "../src/i18n";
 import { remembered } from "../src/store";
 import { answersOf, dropDraft, keepDraft, keptDraft, missingItems } from "../src/studies/answers";
@@ -230,6 +231,26 @@ test("a game is prepared, and its room is asked for with the ticket alone", asyn
   await settled();
   expect(ask.mock.calls[0]?.[1]?.headers).toEqual({ "chefshat-secret": game.ticket });
   expect([...remembered().values()].join()).not.toContain(game.ticket);
+});
+
+test("a response that is older than what the stream has sent meanwhile is not shown", async () => {
+  const stages = (ended: boolean) => [TEXT, { case: "game" as const, value: { game: 1, games: 1, ended } }];
+  const { streams } = fakeStudy(stages(false));
+  await show();
+  let respond = () => {};
+  vi.spyOn(participationApi, "continueStudy").mockImplementation(async () => {
+    await new Promise<void>((resolve) => {
+      respond = resolve;
+    });
+    return create(ContinueStudyResponseSchema, { view: viewOf(stages(false), 1) });
+  });
+  await press("Continue");
+  streams[0]?.push(viewOf(stages(true), 1));
+  await settled();
+  expect(root.textContent).toContain("The game is over.");
+  await act(() => respond());
+  await settled();
+  expect(root.textContent).toContain("The game is over.");
 });
 
 test("answers are checked, sent in the order of the items, and survive a reload at the same step", () => {

@@ -24,13 +24,13 @@ import { recorded, seenBy } from "./record";
 
 type Init = NonNullable<MessageInitShape<typeof SeatUpdateSchema>["update"]>;
 const update = (init: Init): SeatUpdate => create(SeatUpdateSchema, { update: init });
-const told = (live: LiveState, ...updates: Init[]) => {
+const updated = (live: LiveState, ...updates: Init[]) => {
   return updates.reduce((state, init) => applyUpdate(state, update(init), 1000), live);
 };
 
 const PASS = 199;
 const OWN = 0;
-const start = () => told(startLive(firstTable("Rosa")), { case: "attached", value: { seat: OWN } });
+const start = () => updated(startLive(firstTable("Rosa")), { case: "attached", value: { seat: OWN } });
 interface Asked {
   kind?: DecisionKind;
   playRequirement?: MessageInitShape<typeof PlayRequirementSchema>;
@@ -69,7 +69,7 @@ const result = (id: bigint, status: AnswerStatus): Init => {
 };
 
 describe("an open decision", () => {
-  const open = told(start(), decision(7n));
+  const open = updated(start(), decision(7n));
 
   test("has the legal actions, the hand and the time", () => {
     expect(open.decision).toMatchObject({ id: 7n, legal: [0, PASS], timeLeftMs: 9000, receivedAtMs: 1000 });
@@ -96,37 +96,37 @@ describe("an open decision", () => {
     ["a new connection", { case: "attached", value: { seat: OWN } }, true],
   ];
   test.each(closing)("after %s", (_, next, closed) => {
-    expect(told(open, next).decision === undefined).toBe(closed);
+    expect(updated(open, next).decision === undefined).toBe(closed);
   });
 
   test("keeps count of invalid attempts", () => {
-    expect(told(open, result(7n, AnswerStatus.INVALID)).decision?.attemptsLeft).toBe(9);
+    expect(updated(open, result(7n, AnswerStatus.INVALID)).decision?.attemptsLeft).toBe(9);
   });
 
   test("in an exchange, leaves the table's hand to the events", () => {
-    const giving = told(start(), decision(8n, { kind: DecisionKind.EXCHANGE }));
+    const giving = updated(start(), decision(8n, { kind: DecisionKind.EXCHANGE }));
     expect(giving.decision?.hand).toHaveLength(4);
     expect(giving.table.seats[OWN]?.hand).toHaveLength(9);
   });
 
   test("has the server's requirements for a play or a gift", () => {
     const playRequirement = { lowestFace: 1, highestFace: 4, fewestCards: 2, goldenCard: false, loneJoker: false };
-    const turn = told(start(), decision(7n, { playRequirement }));
+    const turn = updated(start(), decision(7n, { playRequirement }));
     expect(turn.decision?.requirement).toMatchObject(playRequirement);
     expect(turn.decision?.gift).toBeUndefined();
     const giftRequirement = { number: 2, total: 2, receiver: 3 };
-    const gift = told(start(), decision(8n, { kind: DecisionKind.EXCHANGE, giftRequirement }));
+    const gift = updated(start(), decision(8n, { kind: DecisionKind.EXCHANGE, giftRequirement }));
     expect(gift.decision?.gift).toMatchObject(giftRequirement);
     expect(gift.decision?.requirement).toBeUndefined();
     const specialAction = SpecialAction.FOOD_FIGHT;
-    const special = told(start(), decision(9n, { kind: DecisionKind.SPECIAL_ACTION, specialAction }));
+    const special = updated(start(), decision(9n, { kind: DecisionKind.SPECIAL_ACTION, specialAction }));
     expect(special.decision?.special).toBe(specialAction);
   });
 });
 
 describe("whom the game waits for", () => {
   const awaited = (value: Extract<Init, { case: "awaited" }>["value"]): Init => ({ case: "awaited", value });
-  const away = told(start(), awaited({ seat: 2, away: true, waitedMs: 8000, leftMs: 12_400 })).awaited;
+  const away = updated(start(), awaited({ seat: 2, away: true, waitedMs: 8000, leftMs: 12_400 })).awaited;
 
   test("counts down for a seat that is away", () => {
     if (!away) throw new Error("nobody is awaited");
@@ -135,51 +135,51 @@ describe("whom the game waits for", () => {
   });
 
   test("does not count down for a seat that is away where nobody may know how long", () => {
-    const unknown = told(start(), awaited({ seat: 2, away: true, waitedMs: 8000 })).awaited;
+    const unknown = updated(start(), awaited({ seat: 2, away: true, waitedMs: 8000 })).awaited;
     if (!unknown) throw new Error("nobody is awaited");
     expect(awaitedSeconds(unknown, 2000)).toBeUndefined();
     expect(en.table.now.awaitedAway("Ada", undefined)).toBe("Waiting for Ada (away)");
   });
 
   test("counts up for a seat that is connected, once that is worth saying", () => {
-    const here = told(start(), awaited({ seat: 2, away: false, waitedMs: 1000, leftMs: 60_000 })).awaited;
+    const here = updated(start(), awaited({ seat: 2, away: false, waitedMs: 1000, leftMs: 60_000 })).awaited;
     if (!here) throw new Error("nobody is awaited");
     expect([1000, 4999, 5000, 9500].map((nowMs) => awaitedSeconds(here, nowMs))).toEqual([undefined, undefined, 5, 9]);
   });
 
   test("is nobody after a message without a seat, and on a new connection", () => {
-    const waiting = told(start(), awaited({ seat: 0, away: true, waitedMs: 0, leftMs: 1 }));
+    const waiting = updated(start(), awaited({ seat: 0, away: true, waitedMs: 0, leftMs: 1 }));
     expect(waiting.awaited?.seat).toBe(0);
-    expect(told(waiting, awaited({})).awaited).toBeUndefined();
-    expect(told(waiting, { case: "attached", value: { seat: OWN } }).awaited).toBeUndefined();
+    expect(updated(waiting, awaited({})).awaited).toBeUndefined();
+    expect(updated(waiting, { case: "attached", value: { seat: OWN } }).awaited).toBeUndefined();
   });
 });
 
 test("the seat's attachment and substitution are known", () => {
   expect(start().attachment).toEqual({ kind: "attached" });
-  const other = told(start(), { case: "detached", value: { reason: DetachReason.SUPERSEDED } });
+  const other = updated(start(), { case: "detached", value: { reason: DetachReason.SUPERSEDED } });
   expect(other.attachment).toEqual({ kind: "superseded" });
-  const over = told(start(), { case: "detached", value: { reason: DetachReason.GAME_OVER } });
+  const over = updated(start(), { case: "detached", value: { reason: DetachReason.GAME_OVER } });
   expect(over.attachment).toEqual({ kind: "over" });
-  const left = told(start(), { case: "detached", value: { reason: DetachReason.REQUESTED } });
+  const left = updated(start(), { case: "detached", value: { reason: DetachReason.REQUESTED } });
   expect(left.attachment).toEqual({ kind: "left" });
-  const refused = told(start(), { case: "refused", value: { reason: "TICKET_UNKNOWN", message: "no" } });
+  const refused = updated(start(), { case: "refused", value: { reason: "TICKET_UNKNOWN", message: "no" } });
   expect(refused.attachment).toEqual({ kind: "refused", reason: "TICKET_UNKNOWN", message: "no" });
-  const replaced = told(start(), events({ sequence: 1n, kind: { case: "substituted", value: { seat: OWN } } }));
+  const replaced = updated(start(), events({ sequence: 1n, kind: { case: "substituted", value: { seat: OWN } } }));
   expect(replaced.substituted).toBe(true);
-  expect(told(replaced, events({ sequence: 2n, kind: { case: "returned", value: { seat: OWN } } })).substituted).toBe(
-    false,
-  );
+  expect(
+    updated(replaced, events({ sequence: 2n, kind: { case: "returned", value: { seat: OWN } } })).substituted,
+  ).toBe(false);
 });
 
 test("reconnecting in the middle of a game leads to the same table", () => {
   const all = recorded("fixed").flatMap(({ line }) => (line.case === "event" ? [seenBy(line.value, 1)] : []));
   const gameId = "389c0885c0fb41a76b7ff2acb2626d27";
   const attached: Init = { case: "attached", value: { seat: 1, gameId } };
-  const whole = told(startLive(emptyTable()), attached, { case: "events", value: { events: all } });
+  const whole = updated(startLive(emptyTable()), attached, { case: "events", value: { events: all } });
   // The second connection repeats some events.
-  const half = told(startLive(emptyTable()), attached, { case: "events", value: { events: all.slice(0, 60) } });
-  const resumed = told(half, attached, { case: "events", value: { events: all.slice(55) } });
+  const half = updated(startLive(emptyTable()), attached, { case: "events", value: { events: all.slice(0, 60) } });
+  const resumed = updated(half, attached, { case: "events", value: { events: all.slice(55) } });
   expect(resumed.table).toEqual(whole.table);
   expect(whole.table.phase).toBe("gameOver");
 });
@@ -204,7 +204,7 @@ test("a snapshot stands for the events so far", () => {
     { seat: 1, name: "Greta", kind: ParticipantKind.AGENT },
   ];
   const snapshot = { gameStarted: { gameId: "1", rules: { faces: 11, jokers: 2 }, seats }, observation };
-  const live = told(
+  const live = updated(
     startLive(emptyTable(), 0),
     { case: "attached", value: { seat: 0 } },
     { case: "snapshot", value: { ...snapshot, nextSequence: 90n } },

@@ -67,13 +67,13 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
   });
 
   test("knows whose turn it is", () => {
-    let told = 0;
+    let turns = 0;
     follow(name, undefined, ({ seat, kind }, table) => {
       if (kind !== DecisionKind.TURN || table.turn === 1) return;
       expect(table.next).toBe(seat);
-      told += 1;
+      turns += 1;
     });
-    expect(told).toBeGreaterThan(50);
+    expect(turns).toBeGreaterThan(50);
   });
 
   test("shows a spectator no card of a hand", () => {

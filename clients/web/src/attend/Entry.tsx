@@ -167,7 +167,7 @@ export function TurnFields({
   const deck = deckOf(table.rules);
   const cards = cardsOfDraft(draft.play, deck);
   const name = seat === undefined ? undefined : distinctName(table, seat);
-  // The opening is by whoever holds the Golden card; the referee asks if nobody says who it was.
+  // The seat with the Golden card opens; the referee asks if nobody says which one it was.
   const open = state.stage === TableStage.OPENING;
   const ready = cards.length > 0 && (name !== undefined || open);
   const of = seat === undefined ? {} : { seat };

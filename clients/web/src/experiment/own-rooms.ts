@@ -61,21 +61,21 @@ export async function makeOwnRooms(
 ): Promise<void> {
   const { roomId } = room;
   if (jobs.peek().get(roomId)?.busy) return;
-  const tell = (busy: boolean, fault?: unknown) => {
+  const report = (busy: boolean, fault?: unknown) => {
     jobs.value = new Map(jobs.peek()).set(roomId, { participants, busy, fault });
   };
-  tell(true);
+  report(true);
   try {
     for (const name of participants) {
       // Read each time: another tab may be creating rooms too.
       if (ownRooms(roomId).some((one) => one.name === name)) continue;
       const { room: own, joinCode } = await createRoom(requestLike(room, ownName(room.name, name), waitingTimeMs));
       keep(roomId, [...ownRooms(roomId), { name, roomId: own.roomId, joinCode, search: searchFor(name) }]);
-      tell(true);
+      report(true);
     }
-    tell(false);
+    report(false);
   } catch (thrown) {
-    tell(false, thrown);
+    report(false, thrown);
   }
 }
 

@@ -45,6 +45,7 @@ export interface GameForm {
   paceSeconds: string;
   maxInvalidAttempts: string;
   maxTimeouts: string;
+  /** Empty for the default, which depends on who plays. */
   absenceSeconds: string;
   substitute: string;
   spectators: boolean;
@@ -79,7 +80,7 @@ export function newGame(): GameForm {
     paceSeconds: String(PACE_MS / 1000),
     maxInvalidAttempts: "10",
     maxTimeouts: "3",
-    absenceSeconds: "20",
+    absenceSeconds: "",
     substitute: "random",
     spectators: true,
     spectatorDelay: "0",
@@ -130,7 +131,7 @@ export function gameProblems(form: GameForm, players: number): Partial<Record<Ga
   const found: Partial<Record<GameField, NumberProblem | undefined>> = {
     points: pointsProblem(form.points, players),
     paceSeconds: secondsProblem(form.paceSeconds, PACE_SECONDS),
-    absenceSeconds: secondsProblem(form.absenceSeconds, ABSENCE_SECONDS),
+    absenceSeconds: isEmpty(form.absenceSeconds) ? undefined : secondsProblem(form.absenceSeconds, ABSENCE_SECONDS),
   };
   for (const [field, bounds] of Object.entries(WHOLE)) {
     found[field as GameField] = wholeProblem(String(form[field as GameField]), bounds);
@@ -183,7 +184,7 @@ export function policyOf(form: GameForm) {
     paceMs: milliseconds(form.paceSeconds),
     maxInvalidAttempts: Number(form.maxInvalidAttempts),
     maxTimeouts: Number(form.maxTimeouts),
-    absenceTimeMs: milliseconds(form.absenceSeconds),
+    ...(isEmpty(form.absenceSeconds) ? {} : { absenceTimeMs: milliseconds(form.absenceSeconds) }),
     substitute: form.substitute,
     spectators: form.spectators,
     spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
@@ -220,6 +221,10 @@ export const GAME_FIELDS: Record<string, GameField> = {
   spectators_see_hands: "spectatorsSeeHands",
   visibility: "visibility",
 };
+
+function isEmpty(typed: string): boolean {
+  return typed.trim() === "";
+}
 
 /** Converts typed seconds to milliseconds. */
 export function milliseconds(seconds: string): number {

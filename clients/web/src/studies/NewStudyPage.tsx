@@ -152,7 +152,7 @@ function FromForm() {
       <h3>{words.conditions}</h3>
       <p class="soft small">{words.conditionsHint}</p>
       {form.conditions.map((condition, index) => (
-        // Conditions are told apart by their place: their names are being typed.
+        // The key of a condition is its index, since its name is being typed.
         <div key={index} class={css.fields} data-part="condition">
           <TextField
             label={words.conditionId}

@@ -124,12 +124,16 @@ export function startParticipating(secret: string): Participating {
     });
   };
 
-  /** Does something at the step that is shown, and shows what comes next. */
+  /**
+   * Does something at the step that is shown, and shows what comes next: unless the stream was faster,
+   * whose view may be newer.
+   */
   const act = async (call: (at: { session: string; step: number }) => Promise<{ view?: StudyView | undefined }>) => {
     const at = view.peek();
     if (!at) return;
     try {
-      show((await call({ session, step: at.step })).view);
+      const next = (await call({ session, step: at.step })).view;
+      if (view.peek() === at) show(next);
     } catch (thrown) {
       const found = faultOf(thrown);
       if (found.reason === "SESSION_SUPERSEDED") return fail(found);

@@ -32,7 +32,7 @@ export function Seated({ acting, study, banner, tools, onward, below, onPick }: 
   const { table, own, decision, awaited } = acting.live.value;
   const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);
-  useAttention(decision, table.phase !== "gameOver" && table.phase !== "aborted");
+  useAttention(table.roomId, decision, table.phase !== "gameOver" && table.phase !== "aborted");
   const autoPassing = useAutoPass(acting, !study && !wizard && !table.physical && isOn("autoPass"));
   if (table.phase === "waiting") {
     return (

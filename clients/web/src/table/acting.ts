@@ -135,7 +135,7 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     }
   };
 
-  const tell = async (command: Parameters<typeof playApi.act>[0]["command"]) => {
+  const send = async (command: Parameters<typeof playApi.act>[0]["command"]) => {
     if (!command) return;
     try {
       await playApi.act({ ticket, command }, { timeoutMs: CALL_LIMIT_MS });
@@ -153,7 +153,7 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     apply,
     answer: (action, automatic) => void answer(action, automatic),
     askHint: () => void askHint(),
-    express: (gesture) => void tell({ case: "express", value: gesture }),
-    resume: () => void tell({ case: "resume", value: {} }),
+    express: (gesture) => void send({ case: "express", value: gesture }),
+    resume: () => void send({ case: "resume", value: {} }),
   };
 }

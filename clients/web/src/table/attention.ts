@@ -10,11 +10,9 @@ import type { OpenDecision } from "./model/live";
 
 /** Length of the vibration, milliseconds. */
 const VIBRATION_MS = 180;
-/** Notifications with the same tag replace one another. */
-const TAG = "chefshat-turn";
 
-/** Calls for each open decision; `playing` while the game lasts. */
-export function useAttention(decision: OpenDecision | undefined, playing: boolean): void {
+/** Calls for each open decision in a room; `playing` while the game lasts. */
+export function useAttention(roomId: string, decision: OpenDecision | undefined, playing: boolean): void {
   const words = t().table.now.yourTurn;
   const id = decision?.id;
   useTabMark(id !== undefined && isOn("tab") ? words : "");
@@ -22,13 +20,13 @@ export function useAttention(decision: OpenDecision | undefined, playing: boolea
     if (id === undefined) return;
     if (isOn("vibration") && navigator.userActivation?.hasBeenActive) navigator.vibrate?.(VIBRATION_MS);
     if (!isOn("notification") || !isUnseen()) return;
-    void notify(words);
+    const withdraw = notify(words, `turn ${roomId}`);
     window.addEventListener("focus", withdraw);
     return () => {
       window.removeEventListener("focus", withdraw);
       withdraw();
     };
-  }, [id]);
+  }, [roomId, id]);
   useAwake(playing && isOn("awake"));
 }
 
@@ -46,32 +44,40 @@ function isUnseen(): boolean {
   return document.hidden || !document.hasFocus();
 }
 
-/** The open notification, where it is not the service worker's. */
-let shown: Notification | undefined;
-
-/** Says no more than that: the name of a room may be confidential. */
-async function notify(words: string): Promise<void> {
-  if (!canNotify() || Notification.permission !== "granted") return;
-  const options = { tag: TAG, body: t().common.name, icon: "/icons/icon-192.png" };
-  const worker = await navigator.serviceWorker?.getRegistration();
-  // Phones show only those of a service worker.
-  if (worker) return worker.showNotification(words, options);
-  shown = new Notification(words, options);
-  shown.onclick = () => {
-    window.focus();
-    withdraw();
+/**
+ * Shows a notification until the returned function is called; those with the same tag replace one
+ * another. It has no name: that of a room may be confidential.
+ */
+function notify(words: string, tag: string): () => void {
+  if (!canNotify() || Notification.permission !== "granted") return () => {};
+  let ended = false;
+  const close = show(words, tag, () => ended).catch(() => {
+    // Phones refuse notifications of a page without a service worker.
+  });
+  return () => {
+    ended = true;
+    void close.then((close) => close?.());
   };
 }
 
-function withdraw(): void {
-  shown?.close();
-  shown = undefined;
-  void navigator.serviceWorker
-    ?.getRegistration()
-    .then((worker) => worker?.getNotifications({ tag: TAG }))
-    .then((open) => {
-      for (const one of open ?? []) one.close();
-    });
+/** Shows a notification, unless it is not wanted any more. Returns what closes it. */
+async function show(words: string, tag: string, isOver: () => boolean): Promise<(() => void) | undefined> {
+  // The path is for sw.js.
+  const options = { tag, body: t().common.name, icon: "/icons/icon-192.png", data: { path: location.pathname } };
+  const worker = await navigator.serviceWorker?.getRegistration();
+  if (isOver()) return undefined;
+  if (worker) {
+    await worker.showNotification(words, options);
+    return async () => {
+      for (const open of await worker.getNotifications({ tag })) open.close();
+    };
+  }
+  const shown = new Notification(words, options);
+  shown.onclick = () => {
+    window.focus();
+    shown.close();
+  };
+  return () => shown.close();
 }
 
 /** Keeps the screen on while `on`. The browser lets it go whenever the page is hidden. */

@@ -88,14 +88,14 @@ function quietMs(tournament: Tournament): number {
 function useChanges({ tournamentId, state, round, gamesOver, gamesPlaying }: Tournament): string {
   const now = `${tournamentId} ${state} ${round} ${gamesOver} ${gamesPlaying}`;
   const [throttled, setThrottled] = useState(now);
-  const toldAtMs = useRef(performance.now());
+  const changedAtMs = useRef(performance.now());
   useEffect(() => {
     if (now === throttled) return;
-    const tell = () => {
-      toldAtMs.current = performance.now();
+    const change = () => {
+      changedAtMs.current = performance.now();
       setThrottled(now);
     };
-    const timer = setTimeout(tell, toldAtMs.current + SOONEST_MS - performance.now());
+    const timer = setTimeout(change, changedAtMs.current + SOONEST_MS - performance.now());
     return () => clearTimeout(timer);
   }, [now, throttled]);
   return throttled;

@@ -43,7 +43,7 @@ export function inShort(tournament: Tournament): string {
   return [...parts, ...visibilityWords(tournament.settings?.policy)].join(" · ");
 }
 
-/** When it was created, which tells apart tournaments of the same name. */
+/** When it was created: tournaments may have the same name. */
 export function madeWords({ createdAtMs }: Tournament): string {
   return t().tournaments.made(moment(createdAtMs));
 }

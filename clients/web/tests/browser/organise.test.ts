@@ -103,7 +103,7 @@ test("invalid fields are marked, by the page and by the server", async () => {
   await page.getByText("Must be between 1 and 1000.").waitFor();
   expect(await page.getByLabel("Rounds", { exact: true }).getAttribute("aria-invalid")).toBe("true");
   await page.getByLabel("Rounds", { exact: true }).fill("3");
-  // Only the server can tell that six hands cannot be dealt from so few cards.
+  // Only the server finds that six hands cannot be dealt from so few cards.
   await page.getByLabel("Players per table").selectOption("6");
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");

@@ -196,7 +196,7 @@ function withPoints(table: TableState, seen: Observation): TableState {
 }
 
 /**
- * Applies the observation, but keeps what only events tell: the Golden card on the board, the cards
+ * Applies the observation, but keeps what only events contain: the Golden card on the board, the cards
  * just received.
  */
 function applyBoard(table: TableState, seen: Observation, own: number | undefined): TableState {

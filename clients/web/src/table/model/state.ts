@@ -150,7 +150,7 @@ export interface TableState {
    * The face of every card played on the pizza, F+1 for a joker. Kept until the next pizza starts.
    */
   readonly toppings: readonly number[];
-  /** The seat whose turn it is, if the viewer can tell. */
+  /** The seat whose turn it is, if the viewer knows it. */
   readonly next: number | undefined;
   /** Cards played in this Shift, F+1 counts. */
   readonly played: readonly number[];

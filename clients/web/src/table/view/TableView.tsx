@@ -40,7 +40,7 @@ interface TableViewProps {
   decision?: OpenDecision | undefined;
   /** Whom of the others the game waits for. */
   awaited?: AwaitedSeat | undefined;
-  /** The seat whose decision is open, where the table cannot tell: in a replay. */
+  /** The seat whose decision is open, where the table does not contain it: in a replay. */
   next?: number | undefined;
   /** The kind of that decision. */
   nextKind?: DecisionKind | undefined;

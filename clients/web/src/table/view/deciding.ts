@@ -84,15 +84,14 @@ interface Plan {
 const PLAN_MS = 900;
 const NOTHING: Picked = new Set();
 const PASS: Move = { kind: "pass" };
-/** In place of the id of a decision, for picks before the turn. */
-const BEFORE_TURN = "before";
 
 export function useDeciding(use: DecidingUse): Deciding {
   const { table, own, decision, sending } = use;
   const mine = own === undefined ? undefined : table.seats[own];
   const planning = use.plans && !decision && !sending && isBetweenTurns(table, own);
-  // Picks belong to one decision: the next one starts without picks.
-  const phase = decision?.id ?? (planning ? BEFORE_TURN : undefined);
+  // Picks belong to one decision, or before the turn to one pizza: the next starts without picks.
+  const pizza = `${table.shift}.${table.pizza}`;
+  const phase = decision?.id ?? (planning ? pizza : undefined);
   const [choice, setChoice] = useState<{ id: bigint | string | undefined; picked: Picked }>({
     id: undefined,
     picked: NOTHING,
@@ -127,12 +126,13 @@ export function useDeciding(use: DecidingUse): Deciding {
   const golden = requirement?.goldenCard ?? false;
   const special = decision?.kind === DecisionKind.SPECIAL_ACTION;
 
-  // Cards picked before the turn stay picked, if they can be played.
-  const wish = useRef<Move | undefined>(undefined);
-  if (planning) wish.current = plan?.move ?? move;
+  const holds = plan !== undefined && isPossible(plan, table, decision);
+  // Cards picked before the turn stay picked, if they can be played in the same pizza.
+  const wish = useRef<{ readonly move: Move | undefined; readonly pizza: string } | undefined>(undefined);
+  if (planning) wish.current = { move: holds ? plan.move : move, pizza };
   useEffect(() => {
     setRemark("");
-    const wanted = wish.current;
+    const wanted = wish.current?.pizza === pizza ? wish.current.move : undefined;
     wish.current = undefined;
     if (!decision) return;
     const legal = wanted && decision.legal.includes(actionOf(wanted, table.faces));
@@ -147,7 +147,6 @@ export function useDeciding(use: DecidingUse): Deciding {
     setChoice({ id: decision.id, picked: picksOf(decision.hand, suggested, golden) });
   }, [use.given?.hint]);
 
-  const holds = plan !== undefined && isPossible(plan, table, decision);
   useEffect(() => {
     if (!plan) return;
     if (!holds) {
