@@ -78,7 +78,6 @@ function FromFile() {
 }
 
 const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
-const LANGUAGES: readonly StudyForm["language"][] = ["en", "it"];
 
 function FromForm() {
   const words = t().studies.make;
@@ -142,7 +141,7 @@ function FromForm() {
         <SelectField
           label={words.language}
           value={form.language}
-          options={LANGUAGES.map((value) => ({ value, label: languages[value] }))}
+          options={languages}
           onPick={(chosen) => change({ language: chosen })}
         />
         {number("participants", words.participants)}

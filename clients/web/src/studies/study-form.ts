@@ -3,7 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { StudyLabels, StudyOrder, type StudySettingsSchema, type StudyStageSchema } from "../gen/chefshat/v1/study_pb";
-import { t } from "../i18n";
+import { type Language, t } from "../i18n";
 
 /** A condition in the form. */
 export interface ConditionForm {
@@ -17,7 +17,7 @@ export interface ConditionForm {
 export interface StudyForm {
   readonly name: string;
   readonly title: string;
-  readonly language: "en" | "it";
+  readonly language: Language;
   readonly participants: string;
   readonly within: boolean;
   readonly conditions: readonly ConditionForm[];
@@ -34,7 +34,7 @@ export interface StudyForm {
 }
 
 /** The form at first. */
-export function emptyForm(language: "en" | "it"): StudyForm {
+export function emptyForm(language: Language): StudyForm {
   return {
     name: "",
     title: "",
