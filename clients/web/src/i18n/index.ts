@@ -39,6 +39,11 @@ export function t(): Texts {
   return texts.value;
 }
 
+/** The texts of a language that need not be the current one. */
+export function textsIn(chosen: Language): Promise<Texts> {
+  return TABLE[chosen].load();
+}
+
 /** A number with a fixed count of digits after the decimal separator of the current language. */
 export function decimal(value: number, digits: number): string {
   const options = { minimumFractionDigits: digits, maximumFractionDigits: digits };
@@ -81,7 +86,7 @@ function isKnown(code: string): code is Language {
 }
 
 async function load(chosen: Language): Promise<void> {
-  texts.value = await TABLE[chosen].load();
+  texts.value = await textsIn(chosen);
   language.value = chosen;
   document.documentElement.lang = chosen;
 }

@@ -185,6 +185,7 @@ export const studies: Texts["studies"] = {
     version: "Version des Einwilligungstextes",
     godspeed: "Godspeed-Fragebogen nach den Partien",
     nasaTlx: "NASA-TLX nach den Partien",
+    templateLanguages: "Die Texte gibt es nur auf Englisch und Italienisch.",
     external: "Adresse eines Fragebogens nach den Partien",
     externalHint: "https://…; {participant} wird durch den Code ersetzt.",
     externalText: "Bitte fülle diesen Fragebogen aus.",

@@ -182,6 +182,7 @@ export const studies: Texts["studies"] = {
     version: "Versión del texto del consentimiento",
     godspeed: "Cuestionario Godspeed después de las partidas",
     nasaTlx: "NASA-TLX después de las partidas",
+    templateLanguages: "Sus textos solo existen en inglés y en italiano.",
     external: "Dirección de un cuestionario después de las partidas",
     externalHint: "https://…; {participant} se sustituye por el código.",
     externalText: "Rellena este cuestionario.",
