@@ -17,7 +17,7 @@ export const lobby: Texts["lobby"] = {
     start: "Jugar ya",
     again: "Jugar otra vez",
     againTogether: "Invitar a la revancha",
-    learn: "¿Es tu primera vez? Aprende en tres minutos",
+    learn: "Aprende a jugar en tres minutos",
   },
   join: {
     title: "Entrar con un código",
