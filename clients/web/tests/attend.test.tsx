@@ -263,12 +263,16 @@ describe("a question", () => {
   });
 
   test.each([
-    ["Did Ada pass?", "Ada: ha passato?"],
-    ["Did Ada, Bo and Cleo pass?", "Ada, Bo e Cleo: hanno passato?"],
-    ["Who opened the Shift?", "Chi ha aperto lo Shift?"],
-    ["7 or 9 at place 4?", "7 or 9 at place 4?"],
-  ])("of the referee, %s, has Italian words", async (text, words) => {
-    await setLanguage("it");
+    ["Did Ada pass?", "it", "Ada: ha passato?"],
+    ["Did Ada, Bo and Cleo pass?", "it", "Ada, Bo e Cleo: hanno passato?"],
+    ["Did Ada, Bo and Cleo pass?", "de", "Haben Ada, Bo und Cleo gepasst?"],
+    ["Did Ada pass?", "es", "¿Ha pasado Ada?"],
+    ["Did Ada and Inés pass?", "es", "¿Han pasado Ada e Inés?"],
+    ["Did Ada and Bo pass?", "es", "¿Han pasado Ada y Bo?"],
+    ["Who opened the Shift?", "it", "Chi ha aperto lo Shift?"],
+    ["7 or 9 at place 4?", "it", "7 or 9 at place 4?"],
+  ] as const)("of the referee, %s, has words in %s", async (text, language, words) => {
+    await setLanguage(language);
     await show(stateOf({ questions: [{ ...question, text }] }));
     expect(part("question-card")?.querySelector("h2")?.textContent).toBe(words);
     await setLanguage("en");

@@ -1,9 +1,8 @@
 // Every language has the same texts as English, and the language is chosen in the documented order.
 
 import { describe, expect, test } from "vitest";
-import { firstKnown } from "../src/i18n";
+import { firstKnown, languages, setLanguage, showLanguage, t } from "../src/i18n";
 import { en } from "../src/i18n/en";
-import { it as italian } from "../src/i18n/it";
 import { ordinals, plurals } from "../src/i18n/plural";
 
 /** The paths of all texts; a function counts as one. */
@@ -21,20 +20,31 @@ function silent(texts: object, above = ""): string[] {
   });
 }
 
-test("Italian has the texts that English has", () => {
-  expect(paths(italian)).toEqual(expect.arrayContaining(paths(en)));
-  expect(paths(italian).length).toBe(paths(en).length);
-  expect(paths(en).length).toBeGreaterThan(100);
-});
+test.each(languages)(
+  "$label has the texts that English has, and none is empty unless the English one is",
+  async ({ value }) => {
+    await setLanguage(value);
+    expect(paths(t()).toSorted()).toEqual(paths(en).toSorted());
+    expect(silent(t()).toSorted()).toEqual(silent(en).toSorted());
+    expect(paths(en).length).toBeGreaterThan(100);
+  },
+);
 
-test("no Italian text is empty unless the English one is", () => {
-  expect(silent(italian)).toEqual(silent(en));
+test("a language without texts is not shown", async () => {
+  await setLanguage("it");
+  await showLanguage("xx");
+  await showLanguage("toString");
+  expect(t().common.close).toBe("Chiudi");
+  await showLanguage("de");
+  expect(t().common.close).toBe("Schließen");
 });
 
 test.each([
   [[null, null, "it-CH", "en"], "it"],
   [["EN", "it"], "en"],
-  [["de", "fr-FR"], "en"],
+  [["de-AT", "en"], "de"],
+  [["fr-FR", "es-419", "it"], "es"],
+  [["nl", "fr-FR"], "en"],
   [["xx", "it"], "it"],
   [[], "en"],
 ])("of %j the language is %s", (candidates, language) => {
@@ -46,6 +56,9 @@ describe("numbers", () => {
     ["en", 1, "1 card"],
     ["en", 0, "0 cards"],
     ["en", 1200, "1,200 cards"],
+    ["de", 1200, "1.200 cards"],
+    ["es", 12000, "12.000 cards"],
+    ["es", 1_000_000, "1.000.000 cards"],
   ])("%s %d", (language, count, words) => {
     expect(plurals(language)(count, { one: "# card", other: "# cards" })).toBe(words);
   });

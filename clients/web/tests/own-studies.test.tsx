@@ -60,12 +60,12 @@ const button = (words: string) =>
   [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
 const press = (words: string) => act(async () => button(words)?.click());
 
-test("the form makes the settings of a study, and says what is missing", () => {
+test("the form makes the settings of a study, and says what is missing", async () => {
   const form = emptyForm("en");
   expect(Object.keys(faultsOf(form))).toEqual(["name", "title", "consent"]);
   const filled = { ...form, name: "Trust", title: "Cooking", consent: "We record.", godspeed: true, debriefing: "Bye" };
   expect(faultsOf(filled)).toEqual({});
-  const settings = settingsOf(filled);
+  const settings = await settingsOf(filled);
   expect(settings.order).toBe(StudyOrder.BETWEEN);
   expect(settings.conditions?.map(({ id, labels, seats }) => [id, labels, seats?.length])).toEqual([
     ["A", StudyLabels.PLAYERS, 3],
@@ -78,8 +78,18 @@ test("the form makes the settings of a study, and says what is missing", () => {
     "questionnaire",
     "text",
   ]);
-  const within = settingsOf({ ...filled, within: true });
+  const within = await settingsOf({ ...filled, within: true });
   expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
+});
+
+test.each([
+  ["it", "Informazioni su questo studio", true],
+  ["de", "Über diese Studie", false],
+] as const)("a study in %s has its texts in it, and templates that have texts in it", async (language, title, has) => {
+  const form = { ...emptyForm(language), debriefing: "…", nasaTlx: true };
+  const stages = (await settingsOf(form)).stages?.map(({ stage }) => stage);
+  expect(stages?.find((stage) => stage?.case === "text")?.value?.title).toBe(title);
+  expect(stages?.some((stage) => stage?.case === "questionnaire")).toBe(has);
 });
 
 test.each([

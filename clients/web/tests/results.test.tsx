@@ -88,6 +88,8 @@ test("the page has standings, date, settings and the games that count", async ()
 
 test.each([
   ["en", "took 1st place of 5 in the tournament", "took part in the tournament", "first in 2 games"],
+  ["de", "hat im Turnier den 1. Platz von 5 erreicht", "hat am Turnier teilgenommen", "2 gewonnene Partien"],
+  ["es", "obtuvo el 1.º puesto de 5 en el torneo", "participó en el torneo", "2 partidas ganadas"],
   ["it", "ha ottenuto il 1º posto su 5 nel torneo", "ha partecipato al torneo", "2 partite vinte"],
 ] as const)("certificates in %s say who achieved what", async (language, first, part, wins) => {
   await setLanguage(language);

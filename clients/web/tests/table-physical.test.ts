@@ -6,7 +6,7 @@ import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { DecisionSource, type GameEvent, GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
 import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
-import { setLanguage } from "../src/i18n";
+import { type Language, setLanguage } from "../src/i18n";
 import { filmOf } from "../src/replay/frames";
 import { applyUpdate, startLive } from "../src/table/model/live";
 import { applyEvents } from "../src/table/model/reduce";
@@ -193,12 +193,29 @@ describe("a violation", () => {
     [[...BEGUN, plays(2, 1, 2, 20)], ViolatedRule.FACE, "Niente batte il tartufo sul piatto: si può solo passare."],
     [BEGUN, ViolatedRule.CARDS, "The server's sentence."],
   ])("after %# has an Italian sentence where the page can make one", async (before, rule, sentence) => {
-    await setLanguage("it");
+    expect(await sentenceIn("it", before, rule)).toBe(sentence);
+  });
+
+  test.each([
+    [
+      "de",
+      ViolatedRule.FACE,
+      "Auf dem Brett liegen schon Karten mit Wert 9: Nötig ist eine 8 oder eine kleinere Zahl.",
+    ],
+    ["de", ViolatedRule.TURN, "Falsche Reihenfolge: Cleo ist dran."],
+    ["es", ViolatedRule.FACE, "En el tablero ya hay cartas de valor 9: hace falta un 8 o un número más bajo."],
+    ["es", ViolatedRule.TURN, "No es su turno: le toca a Cleo."],
+  ] as const)("in %s of %i", async (language, rule, sentence) => {
+    expect(await sentenceIn(language, BEGUN, rule)).toBe(sentence);
+  });
+
+  async function sentenceIn(language: Language, before: Kind[], rule: ViolatedRule) {
+    await setLanguage(language);
     const { violation, ...table } = tableOf([...before, violates(rule, 0)]);
     const words = violation && violationWords({ ...table, violation }, violation.breach, violation.demand);
     await setLanguage("en");
-    expect(words).toBe(sentence);
-  });
+    return words;
+  }
 });
 
 test("the game is paused and resumed", () => {

@@ -168,7 +168,20 @@ fn complete_questionnaire(
     let name = &message.template;
     let template = Template::from_name(name)
         .ok_or_else(|| problem("stages", format!("there is no template {name:?}")))?;
-    let standard = template.questionnaire(language);
+    let Some(standard) = template.questionnaire(language) else {
+        if message.items.is_empty() {
+            let what = "has no texts in the language of the study";
+            let todo = "list its items, from a validated translation";
+            return Err(problem(
+                "stages",
+                format!("the template {name:?} {what}: {todo}"),
+            ));
+        }
+        if message.id.is_empty() {
+            message.id.clone_from(name);
+        }
+        return Ok(());
+    };
     let default = |text: &mut String, standard: String| {
         if text.is_empty() {
             *text = standard;
@@ -464,7 +477,10 @@ fn language(code: &str) -> Result<Language, SettingsProblem> {
     Language::from_code(code).ok_or_else(|| {
         problem(
             "language",
-            format!("{code:?} is not a language of the page"),
+            format!(
+                "{code:?} is not a language of the page: choose from {}",
+                Language::ALL.map(Language::code).join(", ")
+            ),
         )
     })
 }

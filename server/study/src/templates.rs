@@ -1,25 +1,33 @@
-//! Established questionnaires, in English and Italian. The English texts are those of their
-//! publications, item by item. The Italian ones are translations of this project, not validated.
+//! The languages of the page, and established questionnaires in two of them. The English texts are
+//! those of their publications, item by item. The Italian ones are translations of this project, not
+//! validated. In other languages there are none: a researcher lists the items of a validated
+//! translation.
 
 use crate::questionnaire::{Item, ItemKind, Questionnaire};
 
-/// A language of the page and of the templates.
+/// A language of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
     /// English.
     English,
+    /// German.
+    German,
+    /// Spanish.
+    Spanish,
     /// Italian.
     Italian,
 }
 
 impl Language {
     /// All languages.
-    pub const ALL: [Self; 2] = [Self::English, Self::Italian];
+    pub const ALL: [Self; 4] = [Self::English, Self::German, Self::Spanish, Self::Italian];
 
     /// The code, as in BCP 47.
     pub fn code(self) -> &'static str {
         match self {
             Self::English => "en",
+            Self::German => "de",
+            Self::Spanish => "es",
             Self::Italian => "it",
         }
     }
@@ -28,7 +36,16 @@ impl Language {
     pub fn from_code(code: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|it| it.code() == code)
     }
+}
 
+/// The texts of a template.
+#[derive(Debug, Clone, Copy)]
+enum Texts {
+    English,
+    Italian,
+}
+
+impl Texts {
     fn choose<'t>(self, english: &'t str, italian: &'t str) -> &'t str {
         match self {
             Self::English => english,
@@ -84,37 +101,43 @@ impl Template {
             }
         };
         let translation = match language {
-            Language::English => "",
+            Language::English | Language::German | Language::Spanish => "",
             Language::Italian => ". Italian translation by the Chef's Hat project, not validated",
         };
         format!("{publication}{translation}")
     }
 
-    /// The questionnaire, with the template's name as its id. All items are required.
-    pub fn questionnaire(self, language: Language) -> Questionnaire {
+    /// The questionnaire, with the template's name as its id. All items are required. `None` if it
+    /// has no texts in this language.
+    pub fn questionnaire(self, language: Language) -> Option<Questionnaire> {
+        let texts = match language {
+            Language::English => Texts::English,
+            Language::Italian => Texts::Italian,
+            Language::German | Language::Spanish => return None,
+        };
         let (instructions, items) = match self {
             Self::Godspeed => (
-                language.choose(
+                texts.choose(
                     "Please rate your impression of the robot on these scales.",
                     "Valuta la tua impressione del robot su queste scale.",
                 ),
-                godspeed(language),
+                godspeed(texts),
             ),
             Self::NasaTlx => (
-                language.choose(
+                texts.choose(
                     "Please rate the task you have just done.",
                     "Valuta il compito che hai appena svolto.",
                 ),
-                nasa_tlx(language),
+                nasa_tlx(texts),
             ),
         };
-        Questionnaire {
+        Some(Questionnaire {
             id: self.name().to_owned(),
             title: String::new(),
             instructions: instructions.to_owned(),
             items,
             shuffled: false,
-        }
+        })
     }
 }
 
@@ -145,11 +168,11 @@ perceived_safety|relaxed|Anxious|Relaxed|Ansioso/a|Rilassato/a
 perceived_safety|calm|Agitated|Calm|Agitato/a|Calmo/a
 perceived_safety|surprised|Quiescent|Surprised|Quieto/a|Sorpreso/a";
 
-fn godspeed(language: Language) -> Vec<Item> {
+fn godspeed(texts: Texts) -> Vec<Item> {
     let item = |[scale, id, left_en, right_en, left_it, right_it]: [&str; 6]| {
         // The last scale is about the participant, not about the robot.
         let text = match scale {
-            "perceived_safety" => language.choose(
+            "perceived_safety" => texts.choose(
                 "Please rate your emotional state.",
                 "Valuta il tuo stato emotivo.",
             ),
@@ -162,8 +185,8 @@ fn godspeed(language: Language) -> Vec<Item> {
             required: true,
             kind: ItemKind::SemanticDifferential {
                 points: 5,
-                left: language.choose(left_en, left_it).to_owned(),
-                right: language.choose(right_en, right_it).to_owned(),
+                left: texts.choose(left_en, left_it).to_owned(),
+                right: texts.choose(right_en, right_it).to_owned(),
             },
         }
     };
@@ -180,18 +203,18 @@ performance|How successful were you in accomplishing what you were asked to do?|
 effort|How hard did you have to work to accomplish your level of performance?|Quanto impegno hai dovuto metterci per ottenere il tuo livello di prestazione?|Very Low|Very High|Molto basso|Molto alto
 frustration|How insecure, discouraged, irritated, stressed, and annoyed were you?|Quanta insicurezza, scoraggiamento, irritazione, stress e fastidio hai provato?|Very Low|Very High|Molto basso|Molto alto";
 
-fn nasa_tlx(language: Language) -> Vec<Item> {
+fn nasa_tlx(texts: Texts) -> Vec<Item> {
     let item = |[id, text_en, text_it, left_en, right_en, left_it, right_it]: [&str; 7]| Item {
         id: id.to_owned(),
         scale: String::new(),
-        text: language.choose(text_en, text_it).to_owned(),
+        text: texts.choose(text_en, text_it).to_owned(),
         required: true,
         kind: ItemKind::Slider {
             min: 0,
             max: 100,
             step: 5,
-            left: language.choose(left_en, left_it).to_owned(),
-            right: language.choose(right_en, right_it).to_owned(),
+            left: texts.choose(left_en, left_it).to_owned(),
+            right: texts.choose(right_en, right_it).to_owned(),
         },
     };
     rows(NASA_TLX).map(item).collect()

@@ -39,7 +39,9 @@ pub fn settings() -> Settings {
 /// A study within participants in this number of conditions: consent, practice, then for each
 /// condition two games and a shuffled questionnaire, then a text.
 pub fn within(conditions: usize) -> Settings {
-    let mut questionnaire = Template::Godspeed.questionnaire(Language::Italian);
+    let mut questionnaire = Template::Godspeed
+        .questionnaire(Language::Italian)
+        .expect("it has Italian texts");
     questionnaire.shuffled = true;
     Settings {
         factors: Vec::new(),

@@ -147,10 +147,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
         <SelectField
           label={words.language}
           value={lang}
-          options={[
-            { value: "" as const, label: words.browserLanguage },
-            ...Object.entries(languages).map(([value, label]) => ({ value: value as Language, label })),
-          ]}
+          options={[{ value: "" as const, label: words.browserLanguage }, ...languages]}
           onPick={setLang}
         />
       </div>

@@ -1,21 +1,30 @@
 // The language of the page: ?lang= in the address, else the stored choice, else the browser's, else
-// English. The texts are in en/ and it/, one file per part of the page. English defines their
-// shape: a language that lacks a text does not compile.
+// English. The texts are in a folder per language, one file per part of the page, and are loaded
+// when the language is shown. English defines their shape: a language that lacks a text does not
+// compile. A new language needs its folder and a line in TABLE.
 
 import { signal } from "@preact/signals";
 import { recall, remember } from "../store";
 import type { Texts } from "./en";
 
-/** Languages with texts. */
-export type Language = "en" | "it";
+/** A language: its own name for itself, and how to load its texts. */
+interface Entry {
+  readonly label: string;
+  readonly load: () => Promise<Texts>;
+}
 
-/** The languages by their own names. */
-export const languages: Record<Language, string> = { en: "English", it: "Italiano" };
+const TABLE = {
+  en: { label: "English", load: async () => (await import("./en")).en },
+  de: { label: "Deutsch", load: async () => (await import("./de")).de },
+  es: { label: "Español", load: async () => (await import("./es")).es },
+  it: { label: "Italiano", load: async () => (await import("./it")).it },
+} satisfies Record<string, Entry>;
 
-const loaders: Record<Language, () => Promise<Texts>> = {
-  en: async () => (await import("./en")).en,
-  it: async () => (await import("./it")).it,
-};
+/** Languages with texts, by their ISO 639-1 codes. */
+export type Language = keyof typeof TABLE;
+
+/** The languages with their own names, for a list to choose from. */
+export const languages = (Object.keys(TABLE) as Language[]).map((value) => ({ value, label: TABLE[value].label }));
 
 /** The current language. */
 export const language = signal<Language>("en");
@@ -28,6 +37,11 @@ const texts = signal<Texts | null>(null);
 export function t(): Texts {
   if (texts.value === null) throw new Error("texts are read before startLanguage has ended");
   return texts.value;
+}
+
+/** The texts of a language that need not be the current one. */
+export function textsIn(chosen: Language): Promise<Texts> {
+  return TABLE[chosen].load();
 }
 
 /** A number with a fixed count of digits after the decimal separator of the current language. */
@@ -49,7 +63,7 @@ export async function startLanguage(): Promise<void> {
 
 /** Shows the page in a language without storing it; nothing happens if it has no texts. */
 export async function showLanguage(asked: string): Promise<void> {
-  if ((asked === "en" || asked === "it") && asked !== language.peek()) await load(asked);
+  if (isKnown(asked) && asked !== language.peek()) await load(asked);
 }
 
 /** Changes the language and stores the choice on this device. */
@@ -62,13 +76,17 @@ export async function setLanguage(chosen: Language): Promise<void> {
 export function firstKnown(candidates: readonly (string | null)[]): Language {
   for (const candidate of candidates) {
     const main = candidate?.toLowerCase().split("-")[0];
-    if (main === "en" || main === "it") return main;
+    if (main && isKnown(main)) return main;
   }
   return "en";
 }
 
+function isKnown(code: string): code is Language {
+  return Object.hasOwn(TABLE, code);
+}
+
 async function load(chosen: Language): Promise<void> {
-  texts.value = await loaders[chosen]();
+  texts.value = await textsIn(chosen);
   language.value = chosen;
   document.documentElement.lang = chosen;
 }

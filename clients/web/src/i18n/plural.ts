@@ -1,6 +1,6 @@
 // Numbers with the right form of a word, by the plural rules of a language. For the texts only.
 
-/** The plural forms of English and Italian; Italian's rare "many" uses `other`. */
+/** The plural forms of the page's languages; the rare "many" of Italian and Spanish uses `other`. */
 export interface Forms {
   one: string;
   other: string;

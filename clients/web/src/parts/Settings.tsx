@@ -2,7 +2,7 @@
 // what is stored. Sound and replay speed are on their pages.
 
 import { useState } from "preact/hooks";
-import { type Language, language, languages, setLanguage, t } from "../i18n";
+import { language, languages, setLanguage, t } from "../i18n";
 import { isOn, type Preference, setPreference } from "../preferences";
 import { forgetAll } from "../store";
 import { askToNotify, canNotify } from "../table/attention";
@@ -23,7 +23,7 @@ export function Settings({ onClose }: { onClose: () => void }) {
         <SelectField
           label={words.language}
           value={language.value}
-          options={Object.entries(languages).map(([value, label]) => ({ value: value as Language, label }))}
+          options={languages}
           onPick={(picked) => void setLanguage(picked)}
         />
         <SelectField

@@ -12,7 +12,7 @@ import { navigate } from "../router";
 import css from "./Own.module.css";
 import { createStudy } from "./owning";
 import { settingsFrom } from "./settings-file";
-import { type ConditionForm, emptyForm, faultsOf, type StudyForm, settingsOf } from "./study-form";
+import { type ConditionForm, emptyForm, faultsOf, hasTemplates, type StudyForm, settingsOf } from "./study-form";
 
 /** The page. */
 export function NewStudyPage() {
@@ -78,7 +78,6 @@ function FromFile() {
 }
 
 const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
-const LANGUAGES: readonly StudyForm["language"][] = ["en", "it"];
 
 function FromForm() {
   const words = t().studies.make;
@@ -96,7 +95,7 @@ function FromForm() {
     event.preventDefault();
     setTried(true);
     if (Object.keys(faultsOf(form)).length > 0) return;
-    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settingsOf(form), requestId) }));
+    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
   };
   const text = (name: "name" | "title" | "version" | "external", label: string, hint?: string) => (
     <TextField
@@ -118,8 +117,18 @@ function FromForm() {
       fault={faults[name]}
     />
   );
-  const check = (name: "within" | "practice" | "godspeed" | "nasaTlx" | "traces", label: string) => (
+  const check = (name: "within" | "practice" | "traces", label: string) => (
     <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
+  );
+  const inLanguage = hasTemplates(form.language);
+  const template = (name: "godspeed" | "nasaTlx", label: string) => (
+    <CheckField
+      label={label}
+      hint={inLanguage ? undefined : words.templateLanguages}
+      checked={form[name] && inLanguage}
+      disabled={!inLanguage}
+      onCheck={(checked) => change({ [name]: checked })}
+    />
   );
   const long = (name: "consent" | "debriefing", label: string) => (
     <Field label={label} fault={faults[name]}>
@@ -142,7 +151,7 @@ function FromForm() {
         <SelectField
           label={words.language}
           value={form.language}
-          options={LANGUAGES.map((value) => ({ value, label: languages[value] }))}
+          options={languages}
           onPick={(chosen) => change({ language: chosen })}
         />
         {number("participants", words.participants)}
@@ -197,8 +206,8 @@ function FromForm() {
       {check("practice", words.practice)}
       {long("consent", words.consent)}
       <div class={css.fields}>{text("version", words.version)}</div>
-      {check("godspeed", words.godspeed)}
-      {check("nasaTlx", words.nasaTlx)}
+      {template("godspeed", words.godspeed)}
+      {template("nasaTlx", words.nasaTlx)}
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
       {check("traces", words.traces)}

@@ -3,7 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { StudyLabels, StudyOrder, type StudySettingsSchema, type StudyStageSchema } from "../gen/chefshat/v1/study_pb";
-import { t } from "../i18n";
+import { type Language, t, textsIn } from "../i18n";
 
 /** A condition in the form. */
 export interface ConditionForm {
@@ -17,7 +17,7 @@ export interface ConditionForm {
 export interface StudyForm {
   readonly name: string;
   readonly title: string;
-  readonly language: "en" | "it";
+  readonly language: Language;
   readonly participants: string;
   readonly within: boolean;
   readonly conditions: readonly ConditionForm[];
@@ -33,8 +33,13 @@ export interface StudyForm {
   readonly traces: boolean;
 }
 
+/** Whether the questionnaires Godspeed and NASA-TLX have texts in this language. */
+export function hasTemplates(language: Language): boolean {
+  return language === "en" || language === "it";
+}
+
 /** The form at first. */
-export function emptyForm(language: "en" | "it"): StudyForm {
+export function emptyForm(language: Language): StudyForm {
   return {
     name: "",
     title: "",
@@ -92,13 +97,14 @@ export function faultsOf(form: StudyForm): StudyFaults {
   return faults;
 }
 
-/** The settings of the study that the form describes, in texts of the participants' language. */
-export function settingsOf(form: StudyForm): MessageInitShape<typeof StudySettingsSchema> {
-  const words = t().studies.make;
+/** The settings of the study that the form describes, with texts in the participants' language. */
+export async function settingsOf(form: StudyForm): Promise<MessageInitShape<typeof StudySettingsSchema>> {
+  const words = (await textsIn(form.language)).studies.make;
+  const templates = hasTemplates(form.language);
   type Stage = MessageInitShape<typeof StudyStageSchema>;
   const inBlock: Stage[] = [{ stage: { case: "games", value: { count: Number(form.games) } } }];
-  if (form.godspeed) inBlock.push({ stage: { case: "questionnaire", value: { template: "godspeed" } } });
-  if (form.nasaTlx) inBlock.push({ stage: { case: "questionnaire", value: { template: "nasa_tlx" } } });
+  if (form.godspeed && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "godspeed" } } });
+  if (form.nasaTlx && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "nasa_tlx" } } });
   const stages: Stage[] = [
     { stage: { case: "consent", value: { text: form.consent.trim(), version: form.version.trim() } } },
   ];

@@ -3,6 +3,7 @@
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
+import { languages } from "../../src/i18n";
 import { byClicks, playOn, sitDown } from "./play";
 import { gameOf, newRoom } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
@@ -59,7 +60,7 @@ test("a turn, and the end of the game, at every size", async () => {
   let looked = 0;
   await playOn(page, byClicks, async (taken) => {
     if (taken > 0) return;
-    for (const language of ["en", "it"]) {
+    for (const { value: language } of languages) {
       await page.goto(`${address}?lang=${language}`);
       await page.locator("[data-decision]").waitFor();
       await expectSeen(page, [
@@ -72,7 +73,7 @@ test("a turn, and the end of the game, at every size", async () => {
       looked += 1;
     }
   });
-  expect(looked).toBe(2);
+  expect(looked).toBe(languages.length);
   await expectSeen(page, [
     ...EVERYBODY,
     '[data-part~="own"] [data-part~="chip"]',
@@ -110,7 +111,7 @@ test("a replay: its controls cover no seat on a desktop, and nothing is wider th
   }
 });
 
-test.each(["en", "it"])("the tutorial in %s, with its text, at every size", async (language) => {
+test.each(languages)("the tutorial in $label, with its text, at every size", async ({ value: language }) => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tutorial?lang=${language}`);
   await page.locator('[data-part~="lesson"] [data-part~="button"]').waitFor();

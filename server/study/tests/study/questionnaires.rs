@@ -199,8 +199,8 @@ fn each_participant_has_an_order_of_its_own_that_stays() {
 fn templates_are_complete_in_both_languages() {
     for (template, count, scales) in [(Template::Godspeed, 24, 5), (Template::NasaTlx, 6, 1)] {
         assert_eq!(Template::from_name(template.name()), Some(template));
-        let ids = Language::ALL.map(|language| {
-            let questionnaire = template.questionnaire(language);
+        let ids = [Language::English, Language::Italian].map(|language| {
+            let questionnaire = template.questionnaire(language).unwrap();
             assert!(template.source(language).contains("doi:10."));
             let items = questionnaire.items.clone();
             assert_eq!(items.len(), count);
@@ -217,5 +217,8 @@ fn templates_are_complete_in_both_languages() {
             template.questionnaire(Language::English),
             template.questionnaire(Language::Italian)
         );
+        for without in [Language::German, Language::Spanish] {
+            assert_eq!(template.questionnaire(without), None);
+        }
     }
 }

@@ -136,7 +136,8 @@ fn a_problem_of_a_stage_names_its_field() {
         it.stages[1] = games(0)
     });
     check("stages[2].questionnaire.id", settings(), |it| {
-        let twice = Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English));
+        let twice =
+            Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English).unwrap());
         it.stages[1] = Stage::Once(twice.clone());
         it.stages[2] = Stage::Once(twice);
     });

@@ -32,7 +32,7 @@ fn participants_of_different_conditions_get_the_same() {
         2,
         Stage::PerCondition(vec![
             Task::Practice { in_data: false },
-            Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English)),
+            Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English).unwrap()),
         ]),
     );
     let mut lab = Lab::new(settings, 8);

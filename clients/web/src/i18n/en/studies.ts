@@ -181,6 +181,7 @@ export const studies = {
     version: "Version of the consent text",
     godspeed: "Godspeed questionnaire after the games",
     nasaTlx: "NASA-TLX after the games",
+    templateLanguages: "Its texts exist in English and Italian only.",
     external: "Address of a questionnaire after the games",
     externalHint: "https://…; {participant} is replaced by the code.",
     externalText: "Please fill in this questionnaire.",

@@ -182,6 +182,7 @@ export const studies: Texts["studies"] = {
     version: "Versione del testo del consenso",
     godspeed: "Questionario Godspeed dopo le partite",
     nasaTlx: "NASA-TLX dopo le partite",
+    templateLanguages: "I suoi testi esistono solo in inglese e in italiano.",
     external: "Indirizzo di un questionario dopo le partite",
     externalHint: "https://…; {participant} diventa il codice.",
     externalText: "Compila questo questionario.",

@@ -603,7 +603,8 @@ class StudyQuestionnaire(_message.Message):
     template: _builtins.str
     """An established questionnaire in the language of the study: "godspeed" (Bartneck, Kulić, Croft and
     Zoghbi 2009) or "nasa_tlx" (Hart and Staveland 1988, without weights). Its items are used if
-    `items` is empty.
+    `items` is empty. They have texts in English and Italian; in other languages, `items` is
+    required.
     """
     title: _builtins.str
     """Title, at most 128 characters; by default that of the template."""
@@ -870,7 +871,7 @@ class StudySettings(_message.Message):
     title: _builtins.str
     """Title that participants see, 1..=128 characters."""
     language: _builtins.str
-    """Language of the page and of templates: "en" or "it"; by default "en"."""
+    """Language of the page and of templates: "en", "de", "es" or "it"; by default "en"."""
     participants: _builtins.int
     """Number of slots, that is of participants who complete the study, 1..=10000."""
     order: Global___StudyOrder.ValueType
@@ -1244,7 +1245,7 @@ class StudyView(_message.Message):
     title: _builtins.str
     """Title of the study."""
     language: _builtins.str
-    """Language of the page: "en" or "it"."""
+    """Language of the page: "en", "de", "es" or "it"."""
     pseudonym: _builtins.str
     """The participant's pseudonym; empty after its data were deleted."""
     step: _builtins.int

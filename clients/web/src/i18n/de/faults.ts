@@ -1,0 +1,113 @@
+// What can go wrong in a call, in German.
+
+import type { Texts } from "../en";
+import { time } from "./time";
+
+export const faults: Texts["faults"] = {
+  notReached: "Der Server antwortet nicht. Vielleicht startet er gerade neu; versuche es gleich noch einmal.",
+  unknown: "Etwas ist schiefgegangen.",
+  tooMuch: "Das war zu viel auf einmal.",
+  again: (ms: number) => `Versuche es in ${time(ms)} noch einmal.`,
+  byReason: {
+    TOKEN_MISSING:
+      "Dieser Server ist nur für Eingeladene offen. Bitte die Person, die ihn betreibt, um einen Link mit Token und öffne ihn hier.",
+    TOKEN_UNKNOWN:
+      "Der Server kennt das Token deines Links nicht. Prüfe, ob du den vollständigen Link geöffnet hast, oder bitte die Person, die den Server betreibt, um einen neuen.",
+    TOKEN_EXPIRED:
+      "Das Token deines Links ist abgelaufen. Bitte die Person, die den Server betreibt, um einen neuen Link.",
+    ROLE_TOO_LOW: "Dein Link erlaubt das nicht. Bitte die Person, die den Server betreibt, um einen passenden.",
+    OUT_OF_SCOPE: "Dein Link gilt für einen anderen Raum oder ein anderes Turnier.",
+    ROOM_UNKNOWN: "Diesen Raum gibt es nicht mehr, oder er ist privat.",
+    ROOM_FULL: "Alle Plätze dieses Raums sind besetzt.",
+    SEAT_TAKEN: "Diesen Platz hat gerade jemand anders genommen.",
+    NO_SUCH_SEAT: "Diesen Platz gibt es in diesem Raum nicht.",
+    KIND_NOT_ADMITTED: "Die freien Plätze sind für andere Arten von Teilnehmern reserviert.",
+    CLIENT_HAS_SEAT: "Du hast in diesem Raum schon einen Platz, und alle dürfen nur einen nehmen.",
+    GAME_STARTED: "Die Partie hat schon begonnen. Du kannst zuschauen.",
+    GAME_OVER: "Die Partie ist zu Ende.",
+    GAME_NOT_STARTED: "Die Partie hat noch nicht begonnen.",
+    GAME_NOT_PHYSICAL: "Diese Partie wird nicht mit echten Karten gespielt.",
+    NO_PHYSICAL_TABLES:
+      "Dieses Turnier hat keine Partien mit echten Karten; daher kann niemand an einem Tisch hinzugefügt werden.",
+    NO_SUCH_OPTION: "Diese Antwort gibt es zu der Frage nicht, oder sie ist schon beantwortet.",
+    TOO_MANY_QUESTIONS: "Zu viele Fragen sind offen. Beantworte zuerst diese.",
+    TOO_MANY_SEATINGS: "Plätze dieses Raums wurden zu oft genommen und aufgegeben. Bitte um einen neuen Raum.",
+    TOO_MANY_HELD_REPORTS:
+      "Warte: Zuerst muss eine Frage beantwortet werden. Von der Antwort hängen die wartenden Meldungen ab.",
+    NOT_CORRECTABLE: "Diese Meldung kann nicht mehr berichtigt werden.",
+    JOIN_CODE_WRONG:
+      "Dieser Code gehört zu keinem Raum oder Turnier, dem du beitreten kannst. Prüfe ihn; vielleicht ist die Partie auch schon zu Ende.",
+    TICKET_UNKNOWN: "Dieser Platz wurde aufgegeben. Tritt mit dem Code noch einmal bei.",
+    SPECTATORS_NOT_ADMITTED: "In diesem Raum darf niemand zuschauen.",
+    TOO_MANY_SPECTATORS: "Dieser Raum hat schon so viele Zuschauer, wie er erlaubt.",
+    DECISION_CLOSED: "Diese Entscheidung ist nicht mehr offen.",
+    HINTS_OFF: "In diesem Raum gibt es keine Tipps.",
+    TOO_MANY_HINTS: "Du hast für diese Entscheidung schon alle Tipps bekommen.",
+    TOO_MANY_EXPRESSIONS: "Zu viele Reaktionen auf einmal. Warte einen Moment.",
+    TOO_MANY_ROOMS:
+      "Es können gerade keine Räume mehr erstellt werden. Schließe einen, den du nicht mehr brauchst, oder warte, bis einer endet.",
+    TOO_MANY_CALLS: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
+    TOO_MANY_CALLS_AT_ONCE: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
+    TOO_MANY_UNREAD_ANSWERS: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
+    TOO_MANY_WAITING_CALLS:
+      "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link. Lade die Seite neu.",
+    TOO_MANY_STREAMS:
+      "Aus deinem Netz oder mit deinem Link sind zu viele Seiten und Agenten verbunden. Schließe einige davon.",
+    TOO_MANY_FOLLOWERS: "Gerade verfolgen zu viele Leute Turniere.",
+    TOO_MANY_WRONG_CODES: "Es wurden zu viele falsche Codes eingegeben. Prüfe den Code.",
+    READER_TOO_SLOW: "Deine Verbindung ist zu langsam, um diese Partie zu laden. Versuche es mit einer besseren.",
+    EVENTS_GONE: "Der Anfang dieser Partie wird nicht mehr gezeigt. Ihr Replay gibt es, wenn sie zu Ende ist.",
+    DISK_NEARLY_FULL:
+      "Die Festplatte des Servers ist fast voll: Es können keine neuen Partien beginnen. Bitte die Person, die ihn betreibt, Platz zu schaffen. Laufende Partien gehen weiter.",
+    STORE_FAILED:
+      "Der Server kann keine Partien speichern und hält an. Deine bisherigen Entscheidungen sind gespeichert; die Partien gehen weiter, wenn er wieder da ist.",
+    OWNER_UNREACHABLE:
+      "Der zuständige Server ist nicht erreichbar, oder ein anderer übernimmt gerade. Versuche es gleich noch einmal.",
+    ROOM_GONE: "Dieser Raum wurde gerade geschlossen, oder der Server hält an. Versuche es gleich noch einmal.",
+    INTERNAL:
+      "Der Server konnte das nicht ausführen. Versuche es noch einmal; wenn es wieder fehlschlägt, sag der Person Bescheid, die ihn betreibt.",
+    SHUTTING_DOWN: "Der Server wird gerade abgeschaltet. Die Partien gehen weiter, wenn er wieder da ist.",
+    GAME_UNKNOWN: "Der Server hat keine Aufzeichnung dieser Partie, oder sie ist privat.",
+    GAME_RUNNING: "Die Partie läuft noch. Ihre Aufzeichnung gibt es, wenn sie zu Ende ist.",
+    SERIES_OPEN:
+      "Andere Partien mit denselben Karten laufen noch. Die Aufzeichnung gibt es, wenn die Runde zu Ende ist.",
+    TOURNAMENT_UNKNOWN: "Dieses Turnier gibt es nicht, oder es ist privat.",
+    TOURNAMENT_STARTED: "Das Turnier hat schon begonnen.",
+    TOO_FEW_PARTICIPANTS: "Vor dem Start müssen sich mindestens zwei Teilnehmer anmelden.",
+    TOO_MANY_TOURNAMENTS:
+      "Es können gerade keine Turniere mehr erstellt werden. Schließe eines, das du nicht mehr brauchst, oder warte, bis eines zu Ende ist.",
+    OWNER_TOKEN_WRONG: "Das geht nur auf dem Gerät, auf dem es erstellt wurde.",
+    NOT_STATELESS: "Personen können sich nicht anmelden: Dieselben Karten werden mehrmals gespielt.",
+    TOURNAMENT_FULL: "Das Turnier ist voll.",
+    NAME_REFUSED: "Dieser Name ist länger als 64 Zeichen oder enthält unsichtbare Zeichen. Wähle einen anderen.",
+    NAME_RESERVED: "So heißen eingebaute Agenten, die Tische auffüllen. Wähle einen anderen Namen.",
+    PARTICIPANT_UNKNOWN: "Diesen Teilnehmer gibt es nicht mehr.",
+    PARTICIPANT_IS_FILLER: "Dieser Agent füllt die Tische auf und kann nicht gehen. Du kannst ihn ersetzen.",
+    REPLACED_TOO_OFTEN: "Dieser Platz wurde schon so oft weitergegeben, wie es möglich ist.",
+    TOURNAMENT_OVER: "Das Turnier ist zu Ende.",
+    TOURNAMENT_NOT_PLAYING: "Das geht nur, während das Turnier läuft.",
+    GAME_NOT_DUE: "Die Partie hat inzwischen begonnen oder ist zu Ende.",
+    NOBODY_LEFT: "Alle Teilnehmer dieser Partie sind gegangen. Ersetze zuerst einen von ihnen.",
+    NOT_IN_GAME: "Du spielst in dieser Partie nicht mit.",
+    POSTPONED_TOO_OFTEN: "Du hast diese Partie schon so oft verschoben, wie es möglich ist. Frage die Turnierleitung.",
+    TOO_MANY_CHANGES: "Dieses Turnier wurde zu oft geändert.",
+    NAME_TAKEN: "Diesen Namen hat schon jemand anders. Wähle einen anderen.",
+    LINK_UNKNOWN:
+      "Dieser Link gehört zu keiner Studie auf diesem Server. Prüfe, ob du den vollständigen Link geöffnet hast, oder frage die Person, die ihn dir gegeben hat.",
+    SESSION_UNKNOWN: "Die Verbindung zur Studie wurde unterbrochen. Öffne deinen Link noch einmal.",
+    SESSION_SUPERSEDED:
+      "Die Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter.",
+    STUDY_FULL: "Alle Plätze dieser Studie sind vergeben. Danke für dein Interesse.",
+    STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für dein Interesse.",
+    STUDY_UNKNOWN: "Diese Studie gibt es nicht, oder der Schlüssel gehört nicht zu ihr.",
+    STUDIES_NOT_HOSTED:
+      "Dieser Server kann keine Studien durchführen: Er ist Knoten eines Clusters, oder er speichert nichts.",
+    TOO_MANY_STUDIES: "Auf diesem Server können keine Studien mehr erstellt werden.",
+    TOO_MANY_SESSIONS: "Diese Studie wurde in kurzer Zeit zu oft geöffnet. Versuche es gleich noch einmal.",
+    TOO_MANY_PARTICIPANTS: "Zu dieser Studie können keine Teilnehmer mehr hinzugefügt werden.",
+    PARTICIPATION_OVER: "Diese Teilnahme ist zu Ende.",
+    ANSWER_REFUSED: "Eine Antwort gehört nicht zu den möglichen. Prüfe deine Antworten.",
+    GAME_NOT_OVER: "Die Partie ist noch nicht zu Ende.",
+    COUNT_REFUSED: "Gib eine Zahl von 1 bis 1000 ein.",
+  },
+};

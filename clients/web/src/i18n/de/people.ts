@@ -1,0 +1,69 @@
+// German texts of people/.
+
+import type { Texts } from "../en";
+import { plurals } from "../plural";
+
+const plural = plurals("de");
+
+export const people: Texts["people"] = {
+  title: "Bestenliste",
+  text: "Alle, die auf diesem Server eine gewertete Partie gespielt haben. Namen sind frei gewählt und nicht geschützt.",
+  ratedGames: (games) => plural(games, { one: "# gewertete Partie", other: "# gewertete Partien" }),
+  kinds: { label: "Wer", all: "Alle", human: "Personen", robot: "Roboter", agent: "Agenten" },
+  minGames: {
+    label: "Mit mindestens",
+    games: (games) => plural(games, { one: "# Partie", other: "# Partien" }),
+  },
+  none: "Hier hat noch niemand eine gewertete Partie gespielt.",
+  noneOfThese: "Niemand passt zu diesen Filtern. Wähle weniger Partien oder alle.",
+  toLobby: "Geh in die Lobby und spiele eine",
+  columns: {
+    place: "Platz",
+    name: "Name",
+    rating: "Wertung",
+    ratingHint: "Geschätzte Spielstärke, ± ihre Unsicherheit (95 %)",
+    games: "Partien",
+    places: "Platzierungen",
+    range: (from, to) => `zwischen ${from} und ${to}`,
+  },
+  order: "Sortiert nach einer vorsichtigen Schätzung: Wertung minus zwei Standardabweichungen.",
+  which: {
+    title: "Welche Partien werden gewertet?",
+    text: "Eine Partie wird automatisch gewertet, wenn",
+    conditions: [
+      "sie bis zum Ende gespielt wurde;",
+      "der Server die Karten nach einem eigenen Seed ausgeteilt hat: kein fester Seed, keine vorgegebenen Blätter, keine Abzweigung einer anderen Partie, keine anderswo gespielte Partie;",
+      "auf jedem Platz ein anderer Teilnehmer saß, nach Name und Art: nicht zweimal derselbe eingebaute Agent und nicht zwei Personen mit demselben Namen;",
+      "kein Ersatz für jemanden entschieden hat und niemand einen Tipp bekam.",
+    ],
+    toSee: "In der Liste der Partien eines Teilnehmers steht, warum eine Partie nicht gewertet wird.",
+  },
+  notRated: (why) => `nicht gewertet: ${why}`,
+  unrated: {
+    added: "anderswo gespielt",
+    hinted: "jemand bekam Tipps",
+    notDealt: "nicht nach einem Seed des Servers ausgeteilt",
+    recorded: "ein aufgezeichneter Spieler nahm teil",
+    substituted: "ein Ersatz traf Entscheidungen",
+    twice: "jemand spielte auf zwei Plätzen",
+  },
+  person: {
+    unrated: "Noch keine gewerteten Partien.",
+    rated: (place) => `Platz ${place} der Bestenliste`,
+    rating: "Wertung",
+    ratingRange: (from, to) => `Die Spielstärke liegt mit 95 % Sicherheit zwischen ${from} und ${to}.`,
+    games: "Partien",
+    wins: "Gewonnen",
+    meanPlace: "Mittlerer Platz",
+    sameName:
+      "Namen sind nicht geschützt: Das können Partien mehrerer Personen sein, die denselben Namen gewählt haben.",
+    played: "Gespielte Partien",
+    none: "Es gibt keine Aufzeichnung einer Partie mit diesem Namen.",
+    ofNewest: (count) => `der neuesten ${count}`,
+    columns: { date: "Wann", place: "Platz", points: "Punkte", others: "Gegen", game: "Partie" },
+    aborted: "abgebrochen",
+    replay: "Replay",
+    of: (room, date) => `${room}, ${date}`,
+    toLeaderboard: "Zur Bestenliste",
+  },
+};

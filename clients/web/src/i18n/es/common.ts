@@ -1,0 +1,94 @@
+// Spanish texts that several parts of the page use: the frame, kinds of participants, words of the
+// game. The same word stands for the same thing in all parts: face "valor", board "tablero", hand
+// "mano", play "jugar", "jugada", pass "pasar", declare "declarar", exchange "intercambio", game
+// "partida".
+
+import type { Texts } from "../en";
+import { ordinals, plurals } from "../plural";
+
+const plural = plurals("es");
+
+export const common: Texts["common"] = {
+  name: "Chef’s Hat",
+  skipToContent: "Saltar al contenido",
+  nav: {
+    label: "Páginas",
+    lobby: "Vestíbulo",
+    tournaments: "Torneos",
+    leaderboard: "Clasificación",
+    tutorial: "Aprende a jugar",
+  },
+  settings: {
+    title: "Ajustes",
+    language: "Idioma",
+    theme: "Tema",
+    themes: { system: "Sistema", light: "Claro", dark: "Oscuro" },
+    table: {
+      title: "En la mesa",
+      names: {
+        notification: "Avísame cuando me toque",
+        tab: "Muestra mi turno en la pestaña del navegador",
+        vibration: "Vibra cuando me toque",
+        awake: "Mantén la pantalla encendida",
+        keys: "Teclas para las cartas, pasar y jugar",
+        plans: "Déjame elegir antes de mi turno",
+        autoPass: "Pasa por mí cuando no pueda jugar nada",
+        moments: "Muestra en grande los momentos especiales",
+      },
+      hints: {
+        notification: "Mientras miras otra cosa. El navegador te lo pregunta antes.",
+        tab: "En el título y en el icono.",
+        vibration: "En los dispositivos que pueden hacerlo.",
+        awake: "Durante una partida.",
+        keys: "9 e Intro juegan un 9, p pasa. El signo de interrogación las muestra todas.",
+        plans: "Se juega en tu turno, si todavía está permitido.",
+        autoPass: "Tras una pausa como las tuyas, para no revelar nada a los demás. No en los estudios.",
+        moments: "Food Fight, Dinner is Served, la carta dorada, una última carta.",
+      },
+      notAllowed:
+        "Tu navegador no permite las notificaciones de esta página. Puedes cambiarlo en los ajustes del navegador.",
+    },
+    fullScreen: "Pantalla completa",
+    fullScreenOff: "Salir de la pantalla completa",
+    forget: "Olvidar todo en este dispositivo",
+    forgetSure:
+      "Se borran de este dispositivo tus asientos, tus plazas en torneos, las salas y los torneos que has creado, tu nombre y tus ajustes. No podrás recuperarlos.",
+    forgetDo: "Olvidar todo",
+  },
+  kinds: { agent: "agente", human: "persona", robot: "robot", builtIn: "agente integrado", open: "libre" },
+  roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cocinero", waiter: "Camarero", dishwasher: "Lavaplatos" },
+  faces: [
+    "trufa",
+    "gamba",
+    "anchoa",
+    "alcachofa",
+    "chile",
+    "albahaca",
+    "aceituna",
+    "pimiento",
+    "champiñón",
+    "tomate",
+    "mozzarella",
+  ],
+  joker: "comodín",
+  golden: "dorado",
+  cards: (count) => plural(count, { one: "# carta", other: "# cartas" }),
+  points: (count) => plural(count, { one: "# punto", other: "# puntos" }),
+  place: ordinals("es", { other: ".º" }),
+  seat: (seat) => `Asiento ${seat + 1}`,
+  close: "Cerrar",
+  cancel: "Cancelar",
+  changedMeanwhile: (before, now) => `No se ha hecho nada: mientras tanto, ${now} ha ocupado el lugar de ${before}.`,
+  back: "Atrás",
+  copy: "Copiar",
+  copied: "Copiado",
+  loading: "Cargando…",
+  more: "Más",
+  showMore: "Mostrar más",
+  pageNotLoaded: "No se ha podido cargar esta página. Comprueba tu conexión y vuelve a cargarla.",
+  notFound: {
+    title: "Página no encontrada",
+    text: "En esta dirección no hay nada.",
+    link: "Ir al vestíbulo",
+  },
+};

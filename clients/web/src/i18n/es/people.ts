@@ -1,0 +1,68 @@
+// Spanish texts of people/.
+
+import type { Texts } from "../en";
+import { plurals } from "../plural";
+
+const plural = plurals("es");
+
+export const people: Texts["people"] = {
+  title: "Clasificación",
+  text: "Quienes han jugado una partida puntuable en este servidor. Cada cual elige su nombre; los nombres no están protegidos.",
+  ratedGames: (games) => plural(games, { one: "# partida puntuable", other: "# partidas puntuables" }),
+  kinds: { label: "Quién", all: "Todos", human: "Personas", robot: "Robots", agent: "Agentes" },
+  minGames: {
+    label: "Con al menos",
+    games: (games) => plural(games, { one: "# partida", other: "# partidas" }),
+  },
+  none: "Aquí todavía nadie ha jugado una partida puntuable.",
+  noneOfThese: "Nadie cumple estos filtros. Elige menos partidas, o a todos.",
+  toLobby: "Ve al vestíbulo y juega una",
+  columns: {
+    place: "Puesto",
+    name: "Nombre",
+    rating: "Valoración",
+    ratingHint: "Habilidad estimada, ± su incertidumbre (95 %)",
+    games: "Partidas",
+    places: "Puestos",
+    range: (from, to) => `entre ${from} y ${to}`,
+  },
+  order: "Orden según una estimación prudente: valoración menos dos desviaciones estándar.",
+  which: {
+    title: "¿Qué partidas son puntuables?",
+    text: "Una partida es puntuable automáticamente si",
+    conditions: [
+      "se jugó hasta el final;",
+      "el servidor repartió las cartas con una semilla propia: sin semilla fija, sin manos fijadas de antemano, ni variante de otra partida, ni partida jugada en otro sitio;",
+      "cada asiento tenía un participante distinto, por nombre y tipo: ni dos veces el mismo agente integrado, ni dos personas con el mismo nombre;",
+      "ningún sustituto decidió por nadie, y nadie recibió una pista.",
+    ],
+    toSee: "La lista de partidas de un participante dice por qué una partida no es puntuable.",
+  },
+  notRated: (why) => `no puntuable: ${why}`,
+  unrated: {
+    added: "jugada en otro sitio",
+    hinted: "alguien recibió pistas",
+    notDealt: "cartas no repartidas con una semilla del servidor",
+    recorded: "participó un jugador grabado",
+    substituted: "un sustituto tomó decisiones",
+    twice: "alguien jugó en dos asientos",
+  },
+  person: {
+    unrated: "Todavía no hay partidas puntuables.",
+    rated: (place) => `Puesto ${place} de la clasificación`,
+    rating: "Valoración",
+    ratingRange: (from, to) => `La habilidad está entre ${from} y ${to} con una confianza del 95 %.`,
+    games: "Partidas",
+    wins: "Ganadas",
+    meanPlace: "Puesto medio",
+    sameName: "Los nombres no están protegidos: pueden ser partidas de varias personas que eligieron el mismo nombre.",
+    played: "Partidas jugadas",
+    none: "No hay registro de ninguna partida con este nombre.",
+    ofNewest: (count) => `de las ${count} más recientes`,
+    columns: { date: "Cuándo", place: "Puesto", points: "Puntos", others: "Contra", game: "Partida" },
+    aborted: "interrumpida",
+    replay: "Repetición",
+    of: (room, date) => `${room}, ${date}`,
+    toLeaderboard: "A la clasificación",
+  },
+};

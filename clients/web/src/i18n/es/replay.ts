@@ -1,0 +1,46 @@
+// Spanish texts of replay/.
+
+import type { Texts } from "../en";
+
+export const replay: Texts["replay"] = {
+  title: "Repetición",
+  controls: "Repetición",
+  first: "Al principio",
+  before: "Un paso atrás",
+  play: "Reproducir",
+  pause: "Pausa",
+  after: "Un paso adelante",
+  last: "Al final",
+  moment: "Posición en la partida",
+  decisionOf: (decision, all) => `${decision} de ${all} decisiones tomadas`,
+  shift: "Shift",
+  speed: "Velocidad",
+  perspective: "Cartas visibles",
+  allHands: "todas las manos",
+  noHands: "cartas jugadas (no se conoce ninguna mano)",
+  as: (name) => `como ${name}`,
+  asSpectator: "como espectador",
+  possible: "Acciones posibles",
+  answered: (name, answer) => `${name}: ${answer}`,
+  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
+  estimate: (value) => `estimación ${value.toFixed(2).replace(".", ",")}`,
+  noTable: "Esta decisión no es un turno y no tiene tabla.",
+  analysis: {
+    title: "Análisis",
+    subtitle: (name) => `lo que valían las acciones, según lo que ${name} sabía`,
+    running: "Se juegan los repartos posibles…",
+    caption: (rollouts) =>
+      `Puntos medios del Shift y error estándar, de ${rollouts.toLocaleString("es")} partidas continuadas por agentes greedy`,
+    action: "Acción",
+    points: "Puntos",
+    value: (points, error) => `${points.toFixed(2)} ± ${error.toFixed(2)}`.replaceAll(".", ","),
+    taken: "jugada",
+    best: "mejor",
+    others: (count) => (count === 1 ? "Otra acción vale menos." : `Otras ${count} acciones valen menos.`),
+    hands: "Cartas que cada asiento tiene de media",
+    seat: "Asiento",
+    joker: "J",
+    cards: (count) => count.toFixed(1).replace(".", ","),
+  },
+  empty: "Este registro no contiene eventos.",
+};
