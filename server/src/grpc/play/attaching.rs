@@ -111,6 +111,10 @@ impl Reader {
         while let Some(remote) = &mut self.remote
             && let Poll::Ready((handle, parked)) = remote.poll_given_back(context)
         {
+            // Its node cannot be reached from here, but perhaps from another one.
+            if parked.is_overdue() && !self.has_live_seats() {
+                self.outbox.end(StreamEnd::RoomGone);
+            }
             self.park_again(handle, *parked);
         }
         let Some(parking) = &mut self.parked else {

@@ -35,6 +35,11 @@ impl Parked {
             commands: Vec::new(),
         }
     }
+
+    /// Whether it has waited for longer than a client's longest pause.
+    pub(super) fn is_overdue(&self) -> bool {
+        self.since.elapsed() >= PATIENCE
+    }
 }
 
 /// What a search has found: the handle of an attachment, and whether this node has its room or
@@ -102,8 +107,7 @@ impl Parking {
 
     /// Whether an attachment has waited for so long that its client should rather try another node.
     pub(super) fn is_overdue(&self) -> bool {
-        let overdue = |parked: &Parked| parked.since.elapsed() >= PATIENCE;
-        self.waiting.values().any(overdue)
+        self.waiting.values().any(Parked::is_overdue)
     }
 
     /// Waits for the end of the next search; what it has found is still parked. `begin` begins one:

@@ -277,26 +277,51 @@ async fn a_seat_is_attached_when_its_room_has_been_taken_over() {
     );
 }
 
-#[tokio::test]
-async fn an_attachment_to_a_node_that_has_just_died_ends_no_stream() {
+/// A node to which nobody can connect.
+async fn unreachable_node() -> Location {
     let closed = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let endpoint = closed.local_addr().expect("bound").to_string();
     drop(closed);
-    let died = Location::Node(Peer {
+    Location::Node(Peer {
         node: "died".into(),
         endpoint: endpoint.into(),
-    });
-    let directory = Says::first(died, Location::Nowhere);
-    let node = Node::start(&directory);
+    })
+}
+
+/// A stream whose seats may be at other nodes.
+async fn stream_of_gateway(node: &Node, directory: &Arc<Says>) -> Stream {
     let own = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let peers = PeerPort::new(own, None)
         .expect("a loopback address")
         .peers();
     let limits = Arc::new(CallLimits::new(Shares::default()));
-    let known: Arc<dyn Directory> = Arc::clone(&directory) as _;
+    let known: Arc<dyn Directory> = Arc::clone(directory) as _;
     let gateway = ForwardLayer::new(known, peers, limits).gateway(&http::Request::new(()));
-    let mut stream = node.stream();
-    stream.reader = stream.reader.with_remote(Some(gateway));
+    let Stream { reader, updates } = node.stream();
+    let reader = reader.with_remote(Some(gateway));
+    Stream { reader, updates }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_client_whose_room_is_at_a_node_that_cannot_be_reached_from_here_tries_another() {
+    let directory = Says::only(unreachable_node().await);
+    let node = Node::start(&directory);
+    let mut stream = stream_of_gateway(&node, &directory).await;
+    stream.read(0, Command::Attach(elsewhere()));
+    for _ in 0..1_000 {
+        stream.search().await;
+        if let Err(end) = stream.received() {
+            return assert_eq!(end, StreamEnd::RoomGone);
+        }
+    }
+    panic!("it is tried here for ever");
+}
+
+#[tokio::test]
+async fn an_attachment_to_a_node_that_has_just_died_ends_no_stream() {
+    let directory = Says::first(unreachable_node().await, Location::Nowhere);
+    let node = Node::start(&directory);
+    let mut stream = stream_of_gateway(&node, &directory).await;
     stream.reader.attach(node.seat().await).await;
     assert_eq!(stream.received(), Ok(vec![(0, "attached")]));
     stream.read(0, Command::Attach(elsewhere()));
