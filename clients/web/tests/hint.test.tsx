@@ -1,4 +1,5 @@
 // The hint at the table: asked for by a button, it picks the suggested cards and shows the points.
+// The replay says which decisions had one.
 
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
@@ -7,6 +8,8 @@ import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { HintSchema } from "../src/gen/chefshat/v1/play_service_pb";
+import { DecisionRecordSchema } from "../src/gen/chefshat/v1/record_pb";
+import { Decision } from "../src/replay/ReplayPage";
 import type { GivenHint } from "../src/table/acting";
 import { actionOf } from "../src/table/model/actions";
 import { cardsFromNumbers } from "../src/table/model/cards";
@@ -72,4 +75,15 @@ test("a hint without estimates, and one for an earlier decision", async () => {
   expect(text()).toBe("Suggested: Pass");
   await show({ decision: 6n, hint: create(HintSchema, { action: PASS }) }, () => {});
   expect(text()).toBeUndefined();
+});
+
+test.each([
+  [0, "Ada: Pass"],
+  [1, "Ada: Pass · after a hint"],
+  [3, "Ada: Pass · after 3 hints"],
+])("the replay of a decision with %d hints", async (hints, words) => {
+  const table = { ...tableOf(stateOf({ observation: DEALT })), faces: FACES };
+  const open = create(DecisionRecordSchema, { seat: 0, kind: DecisionKind.TURN, action: PASS, hints });
+  await act(() => render(<Decision table={table} open={open} />, root));
+  expect(root.querySelector("summary .soft")?.textContent).toBe(words);
 });

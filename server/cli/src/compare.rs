@@ -333,10 +333,13 @@ impl Played<'_> {
 fn searched(search: &Searchers) -> String {
     let decisions = &search.decisions;
     let others = decisions.too_many_deals() + decisions.history_unknown();
+    let searched = decisions.searched();
+    let rollouts = (decisions.rollouts() as f64 / searched.max(1) as f64).round();
     format!(
-        "{}: {} searched, {} taken as {} does.",
+        "{}: {} searched (about {} each), {} taken as {} does.",
         search.plays,
-        counted(decisions.searched(), "decision"),
+        counted(searched, "decision"),
+        counted(rollouts as u64, "rollout"),
         counted(others, "decision"),
         search.plays.prior.name(),
     )
@@ -364,6 +367,7 @@ fn entrant_json(entrant: &Entrant) -> Value {
             "margin": MARGIN,
             "decisions": {
                 "searched": search.decisions.searched(),
+                "rollouts": search.decisions.rollouts(),
                 "too_many_deals": search.decisions.too_many_deals(),
                 "history_unknown": search.decisions.history_unknown(),
             },

@@ -68,6 +68,7 @@ impl AgentMaker for Searchers {
 #[derive(Debug, Default)]
 pub struct Decisions {
     searched: AtomicU64,
+    rollouts: AtomicU64,
     too_many_deals: AtomicU64,
     history_unknown: AtomicU64,
 }
@@ -76,6 +77,11 @@ impl Decisions {
     /// Those that were searched.
     pub fn searched(&self) -> u64 {
         self.searched.load(Ordering::Relaxed)
+    }
+
+    /// The rollouts of all of them.
+    pub fn rollouts(&self) -> u64 {
+        self.rollouts.load(Ordering::Relaxed)
     }
 
     /// Those played as the prior does because there were too many possible deals to count.
@@ -89,9 +95,13 @@ impl Decisions {
         self.history_unknown.load(Ordering::Relaxed)
     }
 
-    fn count(&self, found: Result<(), &KnowledgeError>) {
+    fn count(&self, found: Result<&[Estimate], &KnowledgeError>) {
         let number = match found {
-            Ok(_) => &self.searched,
+            Ok(estimates) => {
+                let rollouts = estimates.iter().map(|it| it.rollouts).sum();
+                self.rollouts.fetch_add(rollouts, Ordering::Relaxed);
+                &self.searched
+            }
             Err(KnowledgeError::TooManySteps(_)) => &self.too_many_deals,
             Err(_) => &self.history_unknown,
         };
@@ -215,8 +225,8 @@ impl Following for Player {
             return prior;
         }
         let found = self.search(observation, legal, prior);
-        self.plays.decisions.count(found.as_ref().map(|_| ()));
-        found.unwrap_or(prior)
+        self.plays.decisions.count(found.as_deref());
+        found.map_or(prior, |estimates| suggested(&estimates))
     }
 
     fn boxed_clone(&self) -> Box<dyn Following> {
@@ -230,7 +240,7 @@ impl Player {
         observation: &Observation,
         legal: &Mask,
         prior: ActionId,
-    ) -> Result<ActionId, KnowledgeError> {
+    ) -> Result<Vec<Estimate>, KnowledgeError> {
         let choice = Choice {
             rules: self.rules,
             observation,
@@ -239,7 +249,8 @@ impl Player {
             prior,
         };
         let Searchers { plays, pool, .. } = &self.plays;
-        choice.search(*plays, self.chance.seed(), pool.as_deref(), || false)
+        let seed = self.chance.seed();
+        choice.estimates(*plays, Allocation::Halving, seed, pool.as_deref(), || false)
     }
 }
 

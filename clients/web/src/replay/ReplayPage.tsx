@@ -119,8 +119,8 @@ function Playback({ gameId, film }: { gameId: string; film: Film }) {
   );
 }
 
-/** The open decision: answer, decision time and possible plays. */
-function Decision({ table, open }: { table: TableState; open: DecisionRecord }) {
+/** The open decision: answer, decision time, hints and possible plays. */
+export function Decision({ table, open }: { table: TableState; open: DecisionRecord }) {
   const words = t().replay;
   const move = moveOf(open.action, table.faces);
   const seconds = Number(open.decisionTimeUs) / 1e6;
@@ -133,6 +133,7 @@ function Decision({ table, open }: { table: TableState; open: DecisionRecord }) 
           {words.answered(distinctName(table, open.seat), move ? moveWords(move) : open.text)}
           {seconds >= SHOWN_SECONDS && ` · ${words.seconds(seconds)}`}
           {estimate !== undefined && ` · ${words.estimate(estimate)}`}
+          {open.hints > 0 && ` · ${words.hints(open.hints)}`}
         </span>
       </summary>
       {open.kind === DecisionKind.TURN && open.actionMask.length === 0 ? (

@@ -54,6 +54,7 @@ fn a_number_of_rollouts_makes_games_repeatable() {
     assert_eq!(once["a"]["agent"], "monte_carlo:20:random");
     let decisions = &once["a"]["decisions"];
     assert!(decisions["searched"].as_u64().unwrap() > 50, "{decisions}");
+    assert!(decisions["rollouts"].as_u64() > decisions["searched"].as_u64());
     assert_eq!(decisions["history_unknown"], 0);
     assert_eq!(once["shifts"], 16);
     assert_ne!(
@@ -75,7 +76,7 @@ fn agents_that_search_are_named_with_their_budgets() {
     assert!(text.contains(title), "{text}");
     assert!(text.contains("monte_carlo:11:random: "), "{text}");
     assert!(
-        text.contains(" searched, 0 decisions taken as trained does."),
+        text.contains(" rollouts each), 0 decisions taken as trained does."),
         "{text}"
     );
     let table = text.split("Per seat").nth(1).unwrap();

@@ -22,6 +22,7 @@ export const replay = {
   answered: (name: string, answer: string) => `${name}: ${answer}`,
   seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
   estimate: (value: number) => `estimate ${value.toFixed(2)}`,
+  hints: (count: number) => (count === 1 ? "after a hint" : `after ${count} hints`),
   noTable: "This decision is not a turn, so it has no look-up table.",
   analysis: {
     title: "Analysis",

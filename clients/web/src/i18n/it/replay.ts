@@ -24,6 +24,7 @@ export const replay: Texts["replay"] = {
   answered: (name, answer) => `${name}: ${answer}`,
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `stima ${value.toFixed(2).replace(".", ",")}`,
+  hints: (count) => (count === 1 ? "dopo un suggerimento" : `dopo ${count} suggerimenti`),
   noTable: "Questa decisione non è un turno e non ha una tabella.",
   analysis: {
     title: "Analisi",
