@@ -26,8 +26,10 @@ const SHOWN: usize = 20_000;
 /// How long leases last. As on real machines also means that the database syncs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Leases {
-    /// As short as a busy machine allows, so that a takeover takes about a second.
+    /// A takeover takes about a second. A very busy machine cannot keep them, and plays when it can.
     Short,
+    /// Kept on a machine that is ten times as busy as it should be.
+    Steady,
     /// As on real machines.
     Default,
 }
@@ -93,7 +95,7 @@ impl Cluster {
     pub(crate) async fn start(count: usize, leases: Leases) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let postgres = tokio::task::block_in_place(match leases {
-            Leases::Short => Postgres::start,
+            Leases::Short | Leases::Steady => Postgres::start,
             Leases::Default => Postgres::syncing,
         });
         let database = tokio::task::block_in_place(|| postgres.database());
@@ -125,9 +127,11 @@ impl Cluster {
                 .with("--peer-cert", certificate.certificate.display())
                 .with("--peer-key", certificate.key.display())
                 .with("--peer-ca", certificate.authority.display());
-            if leases == Leases::Short {
-                launch = launch.with("--lease", 1_000);
-            }
+            launch = match leases {
+                Leases::Short => launch.with("--lease", 1_000),
+                Leases::Steady => launch.with("--lease", 4_000),
+                Leases::Default => launch,
+            };
             nodes.push(Node {
                 launch,
                 process: None,
