@@ -16,9 +16,9 @@ use chefshat_record::samples;
 use chefshat_room::ids::Id;
 
 /// Most bytes of the samples of one seat: 8 channels, 30 times a second, for more than 15 hours.
-pub const MAX_SAMPLE_BYTES: u64 = 64 * 1024 * 1024;
+pub(crate) const MAX_SAMPLE_BYTES: u64 = 64 * 1024 * 1024;
 /// Most streams of a seat.
-pub const MAX_STREAMS: usize = 16;
+pub(crate) const MAX_STREAMS: usize = 16;
 /// How far in the future samples may be: clocks are not known exactly.
 const MAX_AHEAD: Duration = Duration::from_secs(1);
 /// Most files that stay open while nothing is written to them.
