@@ -212,8 +212,8 @@ fn a_seat_attached_twice_is_one_seat() {
         (FIRST_HANDLE + 1, decision(4)),
     ]);
     assert_eq!(sent, [format!("{}:4=10", FIRST_HANDLE + 1)]);
-    let lines = cup.new_lines();
-    assert_eq!(lines.len(), 1);
+    let logs = cup.new_lines();
+    assert_eq!(logs.len(), 1);
     let lines = [
         "attached 0",
         "event 1",
@@ -221,7 +221,7 @@ fn a_seat_attached_twice_is_one_seat() {
         "event 2",
         "decide 4 None",
     ];
-    assert_eq!(lines[0].1, lines);
+    assert_eq!(logs[0].1, lines);
 }
 
 #[test]
