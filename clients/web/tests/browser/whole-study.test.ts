@@ -2,7 +2,8 @@
 // changes the device, and others take the free places. In the end the conditions are balanced, no
 // byte that reached a participant names one, the data are complete, and the deleted are nowhere.
 
-import { readdirSync, readFileSync } from "node:fs";
+import { mkdtempSync, readdirSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fromJson, type JsonValue } from "@bufbuild/protobuf";
 import type { Page } from "playwright-core";
@@ -11,7 +12,7 @@ import { RecordLineSchema } from "../../src/gen/chefshat/v1/record_pb";
 import { type StudyParticipant, StudyParticipantState } from "../../src/gen/chefshat/v1/study_pb";
 import { consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
 import { PATIENCE_MS } from "./patience";
-import { clientsOf } from "./rooms";
+import { clientsOf, program } from "./rooms";
 import { browser, person, server, until, useStage } from "./stage";
 import { Tap } from "./tap";
 
@@ -135,8 +136,8 @@ test(
     expectComplete(files, participants, decisions);
     const deleted = pseudonyms[DROPPING_OUT] ?? "";
     expect([...files].filter(([, text]) => text.includes(deleted)).map(([name]) => name)).toEqual([]);
-    await until(() => !holds(server.dataDir, deleted));
-    expect(holds(server.dataDir, pseudonyms.at(-1) ?? "")).toBe(true);
+    await until(async () => !(await isStored(deleted)));
+    expect(await isStored(pseudonyms.at(-1) ?? "")).toBe(true);
   },
   (COUNT + 4) * PATIENCE_MS,
 );
@@ -229,8 +230,13 @@ async function exported(owned: { studyId: string; ownerToken: string }): Promise
   return files;
 }
 
-/** Whether a file below a folder has these bytes. */
-function holds(folder: string, text: string): boolean {
-  const entries = readdirSync(folder, { recursive: true, withFileTypes: true });
-  return entries.some((entry) => entry.isFile() && readFileSync(join(entry.parentPath, entry.name)).includes(text));
+/** Whether a copy of the data directory, which has no unused pages of the database, has a text. */
+async function isStored(text: string): Promise<boolean> {
+  const folder = mkdtempSync(join(tmpdir(), "chefshat-copy-"));
+  const copy = join(folder, "copy");
+  expect(await program("backup", copy, "--data-dir", server.dataDir)).toBe(0);
+  const entries = readdirSync(copy, { recursive: true, withFileTypes: true });
+  const found = entries.some((one) => one.isFile() && readFileSync(join(one.parentPath, one.name)).includes(text));
+  rmSync(folder, { recursive: true });
+  return found;
 }
