@@ -7,6 +7,7 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
+import { ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
 import { type StudyShownItem, StudyShownItemSchema, StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
 import { ContinueStudyResponseSchema } from "../src/gen/chefshat/v1/study_service_pb";
 import { setLanguage } from "../src/i18n";
@@ -17,7 +18,8 @@ import type { Trace } from "../src/studies/participating";
 import { StudyPage } from "../src/studies/StudyPage";
 import { startTracing, targetOf } from "../src/studies/tracing";
 import { startLive } from "../src/table/model/live";
-import { emptyTable } from "../src/table/model/state";
+import { emptyTable, seatFromParticipant } from "../src/table/model/state";
+import { SeatPanel } from "../src/table/view/SeatPanel";
 import { root } from "./mounted";
 import { fakeStudy, refused, viewOf } from "./study-fake";
 
@@ -308,4 +310,11 @@ test("traces name what was touched and how long, and wait for the server", async
   pass?.dispatchEvent(new Event("pointerover", { bubbles: true }));
   await vi.advanceTimersByTimeAsync(60_000);
   expect(send).toHaveBeenCalledTimes(2);
+});
+
+test("a seat whose kind a study hides has its name, and is not free", async () => {
+  const seat = seatFromParticipant(create(ParticipantSchema, { seat: 0, name: "Player 1", connected: true }));
+  await act(() => render(<SeatPanel table={emptyTable([seat])} seat={seat} deciding={false} />, root));
+  expect(root.querySelector("h2")?.textContent).toBe("Player 1");
+  expect(root.querySelector('[data-part~="kind-badge"]')).toBeNull();
 });

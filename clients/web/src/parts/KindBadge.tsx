@@ -12,8 +12,9 @@ interface KindBadgeProps {
   builtIn?: string;
 }
 
-/** The badge of a participant. */
+/** The badge of a participant; nothing if its kind is hidden by a study. */
 export function KindBadge({ kind, builtIn = "" }: KindBadgeProps) {
+  if (builtIn === "" && kind === ParticipantKind.UNSPECIFIED) return null;
   return (
     <span class={css.kindBadge} data-part="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
       <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />

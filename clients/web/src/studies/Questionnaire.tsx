@@ -98,7 +98,7 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
       data-missing={missing || undefined}
       aria-describedby={missing ? `${id}-fault` : undefined}
     >
-      <legend class={item.text ? "" : "visually-hidden"}>
+      <legend class={item.text ? css.question : "visually-hidden"}>
         {question}
         {item.optional && <span class="soft small"> {words.optional}</span>}
       </legend>

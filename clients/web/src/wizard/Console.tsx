@@ -1,6 +1,6 @@
-// The console of a person who plays a robot's or an agent's seat: lines to say, expressions, how
-// long the robot should seem to think, and every legal move with the agent's suggestion. Others see
-// the same as from a robot.
+// The console of a person who plays a robot's or an agent's seat: how long the robot should seem to
+// think, every legal move with the agent's suggestion, lines to say, and expressions. Others see the
+// same as from a robot.
 
 import { useEffect, useState } from "preact/hooks";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
@@ -42,6 +42,8 @@ export function Console(props: ConsoleProps) {
       <h2>{words.title}</h2>
       <p class="soft small">{words.what}</p>
       <div class={css.columns}>
+        <Timing decision={props.decision} />
+        <Moves {...props} />
         <Lines onExpress={props.onExpress} />
         <fieldset class={css.part}>
           <legend>{words.expressions}</legend>
@@ -61,8 +63,6 @@ export function Console(props: ConsoleProps) {
             ))}
           </div>
         </fieldset>
-        <Timing decision={props.decision} />
-        <Moves {...props} />
       </div>
     </section>
   );

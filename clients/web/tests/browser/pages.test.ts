@@ -1,19 +1,16 @@
 // Every page: no serious accessibility error in the light and the dark theme, no horizontal
 // scrolling on a phone; and the size of the first page.
 
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
-import type { AxeResults, RunOptions } from "axe-core";
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { languages } from "../../src/i18n";
+import { PHONE, serious, tooWide } from "./checks";
+import { newStudy } from "./participants";
 import { byClicks, nextDecision, sitDown } from "./play";
 import { agent, clientsOf, gameOf, newPhysicalRoom, newRoom } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
 
-const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const PHONE = { width: 360, height: 740 };
 const COMPUTER = { width: 1280, height: 800 };
 const MOST_FIRST_PAGE_BYTES = 200_000;
 
@@ -23,7 +20,9 @@ let gameId: string;
 let tournamentId: string;
 /** A tournament created by the device that has not started. */
 let ownId: string;
-let rooms: { table: string; waiting: string };
+let rooms: { table: string; waiting: string; wizard: string };
+/** A study whose key the device has. */
+let studyId: string;
 /** A room with real cards, which the device attends to. */
 let physicalId: string;
 /** Join code of a room in which the device has no seat. */
@@ -47,7 +46,8 @@ beforeAll(async () => {
   tournamentId = tournament?.tournamentId ?? "";
   const table = await newRoom(server, { seats: ["person", "greedy", "random", "greedy"] });
   const waiting = await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Sunday" });
-  rooms = { table: table.roomId, waiting: waiting.roomId };
+  const wizard = await newRoom(server, { seats: ["wizard", "greedy", "random", "greedy"], policy: { hints: true } });
+  rooms = { table: table.roomId, waiting: waiting.roomId, wizard: wizard.roomId };
   code = (await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Monday" })).code;
   seated = (await person(browser)).page;
   const physical = await newPhysicalRoom(server, ["Ada", "Bo", "Cleo"]);
@@ -56,12 +56,20 @@ beforeAll(async () => {
   await seated.locator('[data-part~="entry"]').waitFor();
   await sitDown(seated, server, waiting.code, "Rosa");
   await sitDown(seated, server, table.code, "Rosa");
+  await sitDown(seated, server, `${wizard.code}?as=robot`, "Robo");
   await seated.goto(`${server.url}/tournaments/new`);
   await seated.getByLabel("Name of the tournament").fill("My league");
   await seated.getByLabel("greedy", { exact: true }).fill("2");
   await seated.getByRole("button", { name: "Create the tournament" }).click();
   await seated.locator('[data-part~="organiser"]').waitFor();
   ownId = new URL(seated.url()).pathname.split("/").at(-1) ?? "";
+  const study = await newStudy(server, { participants: 4 });
+  studyId = study.studyId;
+  await clientsOf(server).studies.addStudyParticipants({ ...study, count: 2 });
+  await seated.goto(`${server.url}/studies/${studyId}`);
+  await seated.getByLabel("Owner token").fill(study.ownerToken);
+  await seated.getByRole("button", { name: "Use this key" }).click();
+  await seated.locator('[data-part~="participants"]').waitFor();
   await seated.goto(`${server.url}/rooms/${rooms.table}`);
   // A few turns later, so that the board and the log have content.
   for (let turn = 0, id = await nextDecision(seated); turn < 2; turn += 1) {
@@ -100,6 +108,7 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   },
   settings: { path: () => "/tutorial", ready: '[data-part~="lesson"]', opened: '[data-part~="header-settings"]' },
   rules: { path: () => "/rules", ready: '[data-part~="rules"]' },
+  console: { path: () => `/rooms/${rooms.wizard}`, ready: '[data-part~="wizard-moves"] button' },
   leaving: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: '[data-part~="tool-leave"]' },
   "table with real cards": { path: () => `/rooms/${physicalId}/table`, ready: '[data-part~="entry"]' },
   "entering a play": {
@@ -133,6 +142,9 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: '[data-part~="standings"] tbody tr' },
   "wall before": { path: () => `/tournaments/${ownId}?wall`, ready: '[data-part~="entrants"] li' },
   results: { path: () => `/tournaments/${tournamentId}/results`, ready: '[data-part~="certificates"], footer' },
+  studies: { path: () => "/studies", ready: "main li a" },
+  "new study": { path: () => "/studies/new", ready: "main form" },
+  "study of one's own": { path: () => `/studies/${studyId}`, ready: '[data-part~="participants"] tbody tr' },
   leaderboard: { path: () => "/leaderboard", ready: "tbody tr" },
   "a person": { path: () => "/people/Gustav", ready: "h1" },
   tutorial: { path: () => "/tutorial", ready: '[data-part~="lesson"]' },
@@ -147,7 +159,6 @@ test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than 
   await page.goto(server.url + path());
   await page.locator(ready).first().waitFor();
   if (opened) await page.locator(opened).first().click();
-  await page.evaluate(AXE);
   expect(await serious(page)).toEqual([]);
   await page.emulateMedia({ colorScheme: "dark" });
   expect(await serious(page, { runOnly: ["color-contrast"] })).toEqual([]);
@@ -184,30 +195,3 @@ test.each(["en-GB", "de-DE", "es-ES", "it-IT"])("the first page, in %s, loads le
   expect(bytes).toBeGreaterThan(50_000);
   expect(bytes).toBeLessThan(MOST_FIRST_PAGE_BYTES);
 });
-
-/** The accessibility errors with a serious or critical impact. */
-async function serious(page: Page, options: RunOptions = {}): Promise<string[]> {
-  const found = await page.evaluate(
-    async (options) => {
-      const { axe } = globalThis as unknown as { axe: { run(options: RunOptions): Promise<AxeResults> } };
-      return axe.run(options);
-    },
-    { ...options, resultTypes: ["violations" as const] },
-  );
-  expect(found.passes.length + found.incomplete.length).toBeGreaterThan(0);
-  return found.violations
-    .filter(({ impact }) => impact === "serious" || impact === "critical")
-    .flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target} ${failureSummary}`));
-}
-
-/** The elements that make the page scroll horizontally. */
-async function tooWide(page: Page): Promise<string[]> {
-  return page.evaluate(() => {
-    const { scrollWidth, clientWidth } = document.documentElement;
-    if (scrollWidth <= clientWidth) return [];
-    const wide = [...document.querySelectorAll("body *")].filter(
-      (element) => element.getBoundingClientRect().right > clientWidth + 1,
-    );
-    return [`${scrollWidth} > ${clientWidth}`, ...wide.slice(0, 5).map((element) => element.outerHTML.slice(0, 120))];
-  });
-}

@@ -33,7 +33,7 @@ export function clientsOf(server: Server) {
 /** The options of a room. */
 interface Wanted {
   name?: string;
-  /** Each seat: a built-in agent by name, or reserved for a person or an agent. */
+  /** Each seat: a built-in agent by name, or reserved for a person, an agent or a person as a robot ("wizard"). */
   seats: readonly string[];
   shifts?: number;
   /** Fewer than 11 for a short Shift. */
@@ -46,7 +46,7 @@ interface Wanted {
   hands?: readonly (readonly number[])[];
   /** Whether the game is rated and so dealt at random; otherwise its deals are fixed. */
   rated?: boolean;
-  policy?: Partial<Pick<RoomPolicy, "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
+  policy?: Partial<Pick<RoomPolicy, "hints" | "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
 }
 
 /** Creates a room for a few Shifts with an hour per decision. */
@@ -88,6 +88,7 @@ function secondShift(dealt: readonly (readonly number[])[], top: number) {
 function filledBy(who: string) {
   if (who === "person") return { case: "reservedFor" as const, value: ParticipantKind.HUMAN };
   if (who === "agent") return { case: "reservedFor" as const, value: ParticipantKind.AGENT };
+  if (who === "wizard") return { case: "wizard" as const, value: ParticipantKind.ROBOT };
   return { case: "builtInAgent" as const, value: who };
 }
 

@@ -1,4 +1,4 @@
-// A proxy between a browser and the server that records the body of every response, and parses its
+// A proxy between a browser and the server that records every response, uncompressed, and parses its
 // messages.
 
 import { createServer, type Server as HttpServer, request } from "node:http";
@@ -17,6 +17,8 @@ const HEAD_BYTES = 5;
 /** The response to a request. */
 interface Answer {
   readonly path: string;
+  /** Names and values of its headers. */
+  head: readonly string[];
   readonly parts: Buffer[];
 }
 
@@ -31,10 +33,12 @@ export class Tap {
   static async before(server: Server): Promise<Tap> {
     const [host, port] = server.address.split(":");
     const http = createServer((asked, answered) => {
-      const { method, url: path = "", headers } = asked;
-      const answer: Answer = { path, parts: [] };
+      const { method, url: path = "" } = asked;
+      const headers = { ...asked.headers, "accept-encoding": "identity" };
+      const answer: Answer = { path, head: [], parts: [] };
       tap.answers.push(answer);
       const on = request({ host, port, method, path, headers }, (answering) => {
+        answer.head = answering.rawHeaders;
         answered.writeHead(answering.statusCode ?? 502, answering.headers);
         answering.on("data", (part: Buffer) => {
           answer.parts.push(part);
@@ -66,6 +70,14 @@ export class Tap {
       .filter(({ path }) => path === method)
       .flatMap(({ parts }) => framesOf(Buffer.concat(parts)))
       .map((frame) => fromBinary(schema, frame));
+  }
+
+  /** The requests whose responses so far have a text, in the head or in the body. */
+  having(text: string): string[] {
+    const found = this.answers.filter(
+      ({ head, parts }) => head.join().includes(text) || Buffer.concat(parts).includes(text),
+    );
+    return found.map(({ path }) => path);
   }
 
   async stop(): Promise<void> {

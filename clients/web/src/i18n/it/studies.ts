@@ -58,7 +58,7 @@ export const studies: Texts["studies"] = {
       deleted: "Ti sei ritirato, e i tuoi dati sono stati cancellati.",
       droppedOut:
         "La tua assenza è stata troppo lunga e il tuo posto è passato a un’altra persona. Se vuoi continuare, chiedi a chi conduce lo studio.",
-      removed: "Chi conduce lo studio ha concluso la tua partecipazione. Per domande, rivolgiti a loro.",
+      removed: "Chi conduce lo studio ha concluso la tua partecipazione. Se hai domande, chiedi a chi lo conduce.",
     },
     pseudonym: (pseudonym) => `Il tuo codice nello studio è ${pseudonym}. Indicalo se hai domande sui tuoi dati.`,
     close: "Puoi chiudere questa pagina.",

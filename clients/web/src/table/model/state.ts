@@ -260,9 +260,9 @@ export function withHistory(table: TableState): TableState {
   return { ...table, history: { start: { ...table, history: undefined }, events: [] } };
 }
 
-/** Whether a participant has the seat. */
+/** Whether a participant has the seat. A study may hide its kind, but not its name. */
 export function isTaken(seat: SeatState): boolean {
-  return seat.builtIn !== "" || seat.kind !== ParticipantKind.UNSPECIFIED;
+  return seat.builtIn !== "" || seat.kind !== ParticipantKind.UNSPECIFIED || seat.name !== "";
 }
 
 /**

@@ -523,7 +523,8 @@ class StudyService(object):
 class ParticipationServiceStub(object):
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     def __init__(self, channel):
@@ -572,7 +573,8 @@ class ParticipationServiceStub(object):
 class ParticipationServiceServicer(object):
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     def OpenStudy(self, request, context):
@@ -688,7 +690,8 @@ def add_ParticipationServiceServicer_to_server(servicer, server):
 class ParticipationService(object):
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     @staticmethod

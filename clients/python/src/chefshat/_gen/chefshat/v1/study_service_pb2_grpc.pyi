@@ -258,7 +258,8 @@ def add_StudyServiceServicer_to_server(servicer: StudyServiceServicer, server: _
 class ParticipationServiceStub:
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     @_typing.overload
@@ -306,7 +307,8 @@ class ParticipationServiceStub:
 class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -350,7 +352,8 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
 class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
     """Taking part in a study. A link's secret opens a session; the newest session of a participant is
     the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
-    text that is not a link of this server.
+    text that is not a link of this server. The view in a response may be older than one that
+    FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
     @_abc_1.abstractmethod

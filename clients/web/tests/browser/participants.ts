@@ -1,0 +1,121 @@
+// Participants of a study: what they do in each stage, and everything that reaches them, in which
+// nothing may name a condition.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import type { Page } from "playwright-core";
+import { expect } from "vitest";
+import { StudyLabels, type StudySettingsSchema } from "../../src/gen/chefshat/v1/study_pb";
+import { byClicks } from "./play";
+import { clientsOf } from "./rooms";
+import { type Server, until } from "./stage";
+import type { Tap } from "./tap";
+
+/** What no participant may meet: names of the study, its conditions, factors, seats and programs. */
+const SECRETS = ["Trust pilot", "cond-warm", "cond-cold", "warmth", "lvl-high", "lvl-low", "Ofelia", "Gaspare", "nods"];
+/** Names of built-in agents, which differ between the conditions. */
+const AGENTS = ["greedy", "random"];
+
+/** A study with two conditions and all kinds of stages; `changed` replaces settings. */
+export async function newStudy(server: Server, changed: MessageInitShape<typeof StudySettingsSchema> = {}) {
+  const { studies } = clientsOf(server);
+  const condition = (id: string, level: string, agent: string, name: string) => ({
+    id,
+    levels: { warmth: level },
+    rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+    policy: { decisionTimeMs: 3_600_000, paceMs: 0 },
+    seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent }, name })),
+    robotBehaviour: `${level} nods`,
+    labels: StudyLabels.PLAYERS,
+  });
+  const { study, ownerToken } = await studies.createStudy({
+    settings: {
+      name: "Trust pilot",
+      title: "Cooking together",
+      factors: [{ name: "warmth", levels: ["lvl-high", "lvl-low"] }],
+      conditions: [
+        condition("cond-warm", "lvl-high", "greedy", "Ofelia"),
+        condition("cond-cold", "lvl-low", "random", "Gaspare"),
+      ],
+      traces: true,
+      stages: [
+        { stage: { case: "consent", value: { text: "We record your games.", version: "1" } } },
+        { stage: { case: "practice", value: {} } },
+        { stage: { case: "games", value: { count: 1 } } },
+        { stage: { case: "questionnaire", value: QUESTIONNAIRE } },
+        { stage: { case: "text", value: { title: "About this study", text: "Thank you." } } },
+      ],
+      ...changed,
+    },
+  });
+  return { studyId: study?.studyId ?? "", ownerToken };
+}
+
+const QUESTIONNAIRE = {
+  id: "after",
+  title: "About the game",
+  items: [
+    { id: "liked", text: "I liked it", kind: { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } } },
+    { id: "real", kind: { case: "semanticDifferential" as const, value: { points: 7, left: "Fake", right: "Real" } } },
+    { id: "effort", text: "Effort", kind: { case: "slider" as const, value: { min: 0, max: 100, step: 5 } } },
+    {
+      id: "said",
+      text: "Anything else",
+      optional: true,
+      kind: { case: "freeText" as const, value: { maxCharacters: 200 } },
+    },
+  ],
+};
+
+/** Expects that no response names a condition. Scripts, which are the same for everybody, name agents. */
+export function expectNoSecretSent(tap: Tap): void {
+  expect(tap.having("Cooking together").length).toBeGreaterThan(0);
+  const calls = (text: string) => tap.having(text).filter((path) => path.startsWith("/chefshat."));
+  const found = [...SECRETS.flatMap((secret) => tap.having(secret)), ...AGENTS.flatMap(calls)];
+  expect(found).toEqual([]);
+}
+
+/** Expects that nothing names a condition in what a page shows and stores, its address and title. */
+export async function expectNoSecretOn(page: Page): Promise<void> {
+  const all = await page.evaluate(() =>
+    JSON.stringify([
+      location.href,
+      document.documentElement.outerHTML,
+      document.cookie,
+      { ...localStorage },
+      { ...sessionStorage },
+    ]),
+  );
+  expect([...SECRETS, ...AGENTS].filter((secret) => all.includes(secret))).toEqual([]);
+}
+
+/** Agrees, with the keyboard alone, and waits for the practice game. */
+export async function consent(page: Page): Promise<void> {
+  await page.getByLabel("I have read this text").press("Space");
+  await page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+  await page.locator("[data-decision]").waitFor();
+}
+
+/** Plays at most so many decisions, and continues once the game is over. Returns their number. */
+export async function playGame(page: Page, most = Number.POSITIVE_INFINITY): Promise<number> {
+  const onward = page.locator('[data-part~="study-game"]').getByRole("button", { name: "Continue" });
+  const decision = page.locator("[data-decision]");
+  let before = "";
+  for (let taken = 0; taken < most; taken += 1) {
+    const found = await page.waitForFunction((before) => {
+      const buttons = [...document.querySelectorAll('[data-part~="study-game"] button')];
+      if (buttons.some(({ textContent }) => textContent === "Continue")) return "over";
+      const id = document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision;
+      return id !== undefined && id !== before && id;
+    }, before);
+    before = String(await found.jsonValue());
+    if (before === "over") {
+      await onward.click();
+      await onward.waitFor({ state: "detached" });
+      return taken;
+    }
+    await byClicks(page);
+  }
+  // The last answer has reached the server.
+  await until(async () => (await decision.count()) === 0 || (await decision.getAttribute("data-decision")) !== before);
+  return most;
+}
