@@ -174,7 +174,9 @@ test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than 
   }
 });
 
-test.each(["en-GB", "de-DE", "es-ES", "it-IT"])("the first page, in %s, loads less than 200 kB", async (locale) => {
+const LOCALES = ["en-GB", "de-DE", "es-ES", "it-IT"];
+
+test.each(LOCALES)("the first page in %s loads one language and less than 200 kB", async (locale) => {
   const { page } = await person(browser, { locale });
   const network = await page.context().newCDPSession(page);
   let bytes = 0;
@@ -182,7 +184,12 @@ test.each(["en-GB", "de-DE", "es-ES", "it-IT"])("the first page, in %s, loads le
   await network.send("Network.enable");
   const underWay = new Set<string>();
   network.on("Network.requestWillBeSent", ({ requestId }) => underWay.add(requestId));
-  network.on("Network.responseReceived", ({ type }) => kinds.add(type));
+  const texts = new Set<string>();
+  network.on("Network.responseReceived", ({ type, response }) => {
+    kinds.add(type);
+    const [, language] = /\/assets\/([a-z]{2})-[^/]+\.js$/.exec(response.url) ?? [];
+    if (language) texts.add(language);
+  });
   network.on("Network.loadingFinished", ({ requestId, encodedDataLength }) => {
     bytes += encodedDataLength;
     underWay.delete(requestId);
@@ -192,6 +199,7 @@ test.each(["en-GB", "de-DE", "es-ES", "it-IT"])("the first page, in %s, loads le
   await page.evaluate(() => document.fonts.ready.then(() => undefined));
   const loaded = expect.arrayContaining(["Document", "Script", "Stylesheet", "Font", "Fetch"]);
   await expect.poll(() => ({ kinds: [...kinds], underWay: underWay.size })).toEqual({ kinds: loaded, underWay: 0 });
+  expect([...texts]).toEqual([locale.slice(0, 2)]);
   expect(bytes).toBeGreaterThan(50_000);
   expect(bytes).toBeLessThan(MOST_FIRST_PAGE_BYTES);
 });

@@ -16,8 +16,8 @@ export const attend: Texts["attend"] = {
   gone: "Diesen Tisch gibt es nicht mehr, oder der Link ist falsch.",
   now: {
     label: "Worauf der Tisch wartet",
-    waiting: "Warten auf entfernte Spieler",
-    waitingText: "Die Partie beginnt, sobald alle entfernten Plätze besetzt und verbunden sind.",
+    waiting: "Warten auf die Online-Spieler",
+    waitingText: "Die Partie beginnt, sobald alle Online-Plätze besetzt und verbunden sind.",
     hand: (name) => `Zeige das Blatt von ${name}`,
     handText:
       "Halte die Karten so, dass die Kamera sie alle sieht, oder gib sie unten ein. Zeige sie nicht den anderen.",
@@ -30,7 +30,7 @@ export const attend: Texts["attend"] = {
     opening: (face) => `Wer die goldene ${face} hat, eröffnet den Shift`,
     turn: (name) => `${name} ist dran`,
     turnOf: (name) => `${name} entscheidet gerade`,
-    remoteText: "Hier wird aus der Ferne gespielt. Bis die Entscheidung da ist, gibt es nichts zu tun.",
+    remoteText: "Hier wird online gespielt. Bis die Entscheidung da ist, gibt es nichts zu tun.",
     question: "Eine Frage an dich",
     questionText: "Die Partie geht weiter, wenn sie beantwortet ist.",
     over: "Die Partie ist zu Ende",
@@ -156,7 +156,7 @@ export const attend: Texts["attend"] = {
   seats: {
     title: "Sitzplätze",
     atTable: "am Tisch",
-    remote: "entfernt",
+    remote: "online",
     handKnown: "Blatt bekannt",
     handUnknown: "Blatt nicht bekannt",
     passed: "gepasst",

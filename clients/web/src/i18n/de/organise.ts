@@ -20,7 +20,7 @@ export const organise: Texts["organise"] = {
       "Einige Runden, in denen Teilnehmer mit ähnlichem Punktestand aufeinandertreffen. Niemand scheidet aus, und es braucht weniger Partien.",
   },
   players: "Spieler pro Tisch",
-  playersKnockout: "Das K.-o.-System hat immer Vierertische.",
+  playersKnockout: "Das K.‑o.‑System hat immer Vierertische.",
   rounds: "Runden",
   roundsHint: "Leer: so viele, wie die Turnierform vorschlägt",
   gamesPerPairing: "Partien pro Tisch und Runde",

@@ -8,7 +8,7 @@ const plural = plurals("de");
 export const studies: Texts["studies"] = {
   title: "Studie",
   next: "Weiter",
-  lost: "Verbindung verloren. Neuer Versuch…",
+  lost: "Verbindung verloren. Wird wiederhergestellt…",
   progress: (step, steps) => `Schritt ${step} von ${steps}`,
   elsewhere: {
     title: "Du machst auf einem anderen Gerät oder einer anderen Seite weiter",

@@ -108,7 +108,7 @@ export const table: Texts["table"] = {
       case ViolatedRule.PASS:
         return "Passen ist jetzt nicht erlaubt.";
       case ViolatedRule.DECISION:
-        return "Aus der Ferne wurde anders entschieden.";
+        return "Online wurde anders entschieden.";
       default:
         return text;
     }
@@ -295,7 +295,7 @@ export const table: Texts["table"] = {
   },
   link: {
     connecting: "Verbindung wird hergestellt…",
-    lost: "Verbindung verloren. Neuer Versuch…",
+    lost: "Verbindung verloren. Wird wiederhergestellt…",
     superseded: "Dieser Platz wird in einem anderen Fenster benutzt.",
     takeBack: "Hier spielen",
     substituted: "Du warst weg: Ein eingebauter Agent spielt für dich.",

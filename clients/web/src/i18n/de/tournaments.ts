@@ -17,7 +17,7 @@ export const tournaments: Texts["tournaments"] = {
     finished: "beendet",
     closed: "vorzeitig geschlossen",
   },
-  formats: { knockout: "K.-o.-System", roundRobin: "Jeder gegen jeden", swiss: "Schweizer System" },
+  formats: { knockout: "K.‑o.‑System", roundRobin: "Jeder gegen jeden", swiss: "Schweizer System" },
   deals: {
     same: "Alle Tische einer Runde bekommen dieselben Karten. Zuschauen und Replays gibt es erst nach der Runde.",
     rotated: "Jeder Tisch spielt jede Kartenverteilung einmal pro Sitzplatz.",
@@ -175,7 +175,7 @@ export const tournaments: Texts["tournaments"] = {
     replaced: "Jemand anders hat deinen Platz in diesem Turnier eingenommen.",
     over: "Das Turnier ist zu Ende. Danke fürs Mitspielen.",
     connecting: "Verbindung wird hergestellt…",
-    lost: "Verbindung verloren. Neuer Versuch…",
+    lost: "Verbindung verloren. Wird wiederhergestellt…",
     superseded: "Du nimmst in einem anderen Fenster teil.",
     takeBack: "Hier teilnehmen",
     begins: (place) => `Deine Partie beginnt: ${place}.`,

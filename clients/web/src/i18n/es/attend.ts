@@ -160,7 +160,7 @@ export const attend: Texts["attend"] = {
     handKnown: "mano conocida",
     handUnknown: "mano desconocida",
     passed: "ha pasado",
-    next: "le toca",
+    next: "juega",
   },
   board: "En el tablero",
   link: {

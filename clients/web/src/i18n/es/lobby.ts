@@ -49,7 +49,7 @@ export const lobby: Texts["lobby"] = {
     shifts: (shifts) => plural(shifts, { one: "# Shift", other: "# Shifts" }),
     decisionTime: (ms) => `${time(ms)} por decisión`,
     ofTournament: "en un torneo",
-    unlisted: "no listada",
+    unlisted: "sin listar",
     private: "privada",
   },
   seats: {
@@ -91,13 +91,13 @@ export const lobby: Texts["lobby"] = {
     waiting: "Tu asiento queda libre para otra persona. Para volver, necesitas de nuevo la invitación.",
     substituted: (timeouts, substitute) =>
       `La partida continúa sin ti. Cada decisión tuya espera hasta que se agota su tiempo; ${plural(timeouts, {
-        one: "tras una decisión sin tiempo",
-        other: "tras # decisiones seguidas sin tiempo",
+        one: "tras agotarse el tiempo una vez",
+        other: "tras agotarse el tiempo # veces seguidas",
       })}, el agente «${substitute}» juega por ti.`,
     givenUp: (timeouts) =>
       `La partida continúa sin ti. Cada decisión tuya espera hasta que se agota su tiempo; ${plural(timeouts, {
-        one: "tras una decisión sin tiempo",
-        other: "tras # decisiones seguidas sin tiempo",
+        one: "tras agotarse el tiempo una vez",
+        other: "tras agotarse el tiempo # veces seguidas",
       })}, la partida termina sin resultado.`,
     awaySubstituted: (seconds, substitute) =>
       `La partida continúa sin ti. En tu próxima decisión, después de ${seconds} s, el agente «${substitute}» juega por ti.`,
@@ -197,7 +197,7 @@ export const lobby: Texts["lobby"] = {
     fault: {
       invalid: "Intentos no válidos",
       invalidHint: "Tras este número se toma la decisión predeterminada; 0 para no poner límite.",
-      timeouts: "Decisiones sin tiempo",
+      timeouts: "Tiempos agotados",
       timeoutsHint: "Tras este número seguido juega un sustituto.",
       absence: "Ausencia, segundos",
       absenceHint:

@@ -20,7 +20,7 @@ export const table: Texts["table"] = {
   you: "tú",
   freeSeat: "asiento libre",
   pointsWord: "puntos",
-  chips: { toPlay: "le toca", toGive: "da", toDeclare: "¿declara?", passed: "ha pasado" },
+  chips: { toPlay: "juega", toGive: "da", toDeclare: "¿declara?", passed: "ha pasado" },
   presence: {
     away: "sin conexión",
     substituted: (agent) => `juega ${agent}`,
