@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::io;
-use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -54,8 +54,8 @@ pub fn key_of(data_dir: &Path) -> Result<Option<SigningKey>, KeyError> {
         }
         text => text.map_err(failed)?,
     };
-    let mode = fs::metadata(&path).map_err(failed)?.permissions().mode();
-    if mode & 0o077 != 0 {
+    let metadata = fs::metadata(&path).map_err(failed)?;
+    if is_exposed(metadata.mode(), metadata.uid(), metadata.gid()) {
         return Err(KeyError::Exposed(path));
     }
     let mut seed = [0; 32];
@@ -64,6 +64,16 @@ pub fn key_of(data_dir: &Path) -> Result<Option<SigningKey>, KeyError> {
         Some(Ok(())) => Ok(Some(SigningKey::from_seed(&seed))),
         _ => Err(KeyError::NotAKey(path)),
     }
+}
+
+/// Whether others can read a file of this user and group. If it is root's, a group other than
+/// root's may read it, as with PostgreSQL: Kubernetes mounts secrets so.
+fn is_exposed(mode: u32, user: u32, group: u32) -> bool {
+    let readers = match (user, group) {
+        (0, 1..) => 0o740,
+        _ => 0o700,
+    };
+    mode & 0o777 & !readers != 0
 }
 
 /// The key of a data directory. Creates it, readable only by its owner, if there is none.
@@ -150,7 +160,26 @@ impl Signer {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
     use super::*;
+
+    #[test]
+    fn a_group_reads_only_keys_that_root_gives_to_it() {
+        const ROOT: u32 = 0;
+        const SERVER: u32 = 65_532;
+        for (mode, user, group, exposed) in [
+            (0o600, SERVER, SERVER, false),
+            (0o640, SERVER, SERVER, true),
+            (0o440, ROOT, SERVER, false),
+            (0o460, ROOT, SERVER, true),
+            (0o444, ROOT, SERVER, true),
+            (0o440, ROOT, ROOT, true),
+        ] {
+            let found = is_exposed(mode, user, group);
+            assert_eq!(found, exposed, "{mode:o} of {user}:{group}");
+        }
+    }
 
     #[test]
     fn a_key_is_created_once_and_only_its_owner_can_read_it() {

@@ -1,6 +1,6 @@
 //! The data directory, which has the database and the records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use chefshat_record::files::{RecordFile, find_records};
 use clap::Args;
@@ -11,13 +11,27 @@ use super::CommandError;
 /// The given or default data directory, created with its folder of records.
 pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     let folder = name(wanted)?;
-    std::fs::create_dir_all(folder.join("records")).map_err(|error| {
+    create(&folder, "records")?;
+    Ok(folder)
+}
+
+/// The given or default data directory, created without a folder of records, which a node of a
+/// cluster does not have. A directory that exists may be read-only.
+pub(super) fn prepare_without_records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+    let folder = name(wanted)?;
+    create(&folder, "")?;
+    Ok(folder)
+}
+
+/// Creates a folder inside a data directory, and the directory.
+fn create(data_dir: &Path, folder: &str) -> Result<(), CommandError> {
+    std::fs::create_dir_all(data_dir.join(folder)).map_err(|error| {
         format!(
             "cannot use the data directory {}: {error}; choose another with --data-dir",
-            folder.display()
+            data_dir.display()
         )
-    })?;
-    Ok(folder)
+        .into()
+    })
 }
 
 /// The given or default data directory; it may not exist.

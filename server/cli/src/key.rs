@@ -1,9 +1,10 @@
-//! `chefshat key show`: the public key with which a server signs its records.
+//! `chefshat key`: the key with which a server signs its records.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_server::signing::key_of;
+use chefshat_record::signature::PublicKey;
+use chefshat_server::signing::{key_of, key_or_new};
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -17,9 +18,10 @@ key where people trust it, such as the page of a tournament; they check records 
 
 Examples:
   chefshat key show
-  chefshat key show --data-dir ./chefshat-data";
+  chefshat key show --data-dir ./chefshat-data
+  chefshat key create --data-dir ./keys";
 
-/// Show the key that signs a server's records.
+/// Show or create the key that signs a server's records.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct KeyCommand {
@@ -30,11 +32,14 @@ pub(super) struct KeyCommand {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Print the public key: `ed25519:` and 64 hexadecimal digits.
-    Show(Show),
+    Show(Folder),
+    /// Create the key if there is none, for example for the nodes of a cluster to share, and print
+    /// the public key.
+    Create(Folder),
 }
 
 #[derive(Debug, Args)]
-struct Show {
+struct Folder {
     /// Data directory of the server. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
@@ -45,19 +50,29 @@ struct Show {
 
 impl KeyCommand {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let Command::Show(show) = self.command;
-        let folder = data_dir::name(show.data_dir)?;
-        let Some(key) = key_of(&folder)? else {
-            return Err(format!(
-                "no signing key in {} yet: a server creates it when it starts with this data directory",
-                folder.display()
-            )
-            .into());
+        let (key, json) = match self.command {
+            Command::Show(Folder { data_dir, json }) => (shown(data_dir)?, json),
+            Command::Create(Folder { data_dir, json }) => {
+                let folder = data_dir::prepare_without_records(data_dir)?;
+                (key_or_new(&folder)?.public(), json)
+            }
         };
-        match show.json {
-            true => say(json!({ "public_key": key.public().to_string() }))?,
-            false => say(key.public())?,
+        match json {
+            true => say(json!({ "public_key": key.to_string() }))?,
+            false => say(key)?,
         }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// The public key of a data directory.
+fn shown(data_dir: Option<PathBuf>) -> Result<PublicKey, CommandError> {
+    let folder = data_dir::name(data_dir)?;
+    let key = key_of(&folder)?.ok_or_else(|| {
+        format!(
+            "no signing key in {} yet: a server creates it when it starts with this data directory",
+            folder.display()
+        )
+    })?;
+    Ok(key.public())
 }

@@ -274,6 +274,9 @@ impl Serve {
             (true, Some(_)) => {
                 return Err("--no-records and --data-dir cannot be used together".into());
             }
+            (false, data_dir) if settings.node.database.is_some() => {
+                Some(data_dir::prepare_without_records(data_dir)?)
+            }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
         let (listener, address) = listen::listen(&settings.listen).await?;

@@ -207,8 +207,8 @@ impl Cluster {
         let ports = self.nodes[node].database.way().ports();
         let ports: Vec<String> = ports.iter().map(u16::to_string).collect();
         self.select(&format!(
-            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE client_port IN (-2, {})",
-            ports.join(", ")
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE client_port = ANY ('{{{}}}')",
+            ports.join(",")
         ));
     }
 

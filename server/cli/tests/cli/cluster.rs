@@ -21,6 +21,8 @@ fn a_drained_node_hands_its_room_to_another_and_stops() {
     };
     let (mut first, address) = node(0, "first");
     let (_second, other) = node(1, "second");
+    // It may be mounted read-only.
+    assert!(!folders[0].path().join("records").exists());
     let created = run(&address, "room create --name Coppa --json").clean();
     let room = created.json()["room"]["roomId"].clone();
     assert_eq!((rooms_of("first"), rooms_of("second")), (Some(1), Some(0)));

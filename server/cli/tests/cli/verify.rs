@@ -155,5 +155,10 @@ fn a_pinned_key_accepts_only_what_it_signed() {
 fn a_data_directory_without_a_key_says_where_keys_come_from() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().to_str().unwrap();
-    chefshat(&["key", "show", "--data-dir", folder]).assert_failed("a server creates it");
+    let key = |command: &str| chefshat(&["key", command, "--data-dir", folder]);
+    key("show").assert_failed("a server creates it");
+    let created = key("create").clean().stdout;
+    assert!(created.starts_with("ed25519:"), "{created}");
+    assert_eq!(key("show").clean().stdout, created);
+    assert_eq!(key("create").clean().stdout, created, "it is created once");
 }
