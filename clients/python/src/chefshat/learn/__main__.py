@@ -5,6 +5,7 @@ Imports packages of the extra only after parsing the options, so that `--help` w
 
 import argparse
 import importlib
+import json
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -113,8 +114,12 @@ def _ppo(command: argparse.ArgumentParser) -> None:
         nargs="+",
         default=["greedy"],
         metavar="NAME",
-        help="who plays the other seats of these: built-in agents or network files, one or one for each seat; for instance "
-        "past.safetensors trained greedy",
+        help="who plays the other seats of these: built-in agents, network files or players of the Players Club "
+        "(club:module.path:Class), one or one for each seat; for instance past.safetensors trained greedy",
+    )
+    plan.add_argument("--club-python", default="", metavar="PYTHON", help="the Python with these players (default: this one)")
+    plan.add_argument(
+        "--club-arguments", type=_json_object, default="{}", metavar="JSON", help="arguments of their constructors, as an object"
     )
     plan.add_argument("--steps", type=_count, default=128, help="decisions in each game between two updates")
     plan.add_argument("--epochs", type=_count, default=2, help="passes over them in an update")
@@ -220,6 +225,16 @@ def _natural(text: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text) < 2**31):
         raise argparse.ArgumentTypeError("must be a number from 0 to 2147483647")
     return int(text)
+
+
+def _json_object(text: str) -> str:
+    try:
+        read = json.loads(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"is not JSON: {error}") from error
+    if not isinstance(read, dict):
+        raise argparse.ArgumentTypeError('must be a JSON object, such as {"agentType": "vsSelf"}')
+    return text
 
 
 def _above_zero(text: str) -> float:

@@ -54,7 +54,7 @@ class Evaluation:
 
 def evaluate(
     player: Network | Policy,
-    opponents: str | Sequence[str],
+    opponents: str | Sequence[str | Policy],
     *,
     games: int,
     seed: Seed = None,
@@ -65,7 +65,7 @@ def evaluate(
 
     Args:
         player: a network, which takes the legal action with the highest output, or a function that chooses actions.
-        opponents: built-in agents or network files of the other seats, one name for all or one for each.
+        opponents: built-in agents, network files or functions of the other seats, one for all or one for each.
         games: number of games.
         seed: seed of the deals.
         rules: the rule set.
@@ -96,7 +96,8 @@ def evaluate(
                 f"not with {env.players}, {env.faces} and {env.hand_size}"
             )
         others = env.players - 1
-        names = (opponents,) * others if isinstance(opponents, str) else tuple(opponents) * (others if len(opponents) == 1 else 1)
+        given = [opponents] if isinstance(opponents, str) else opponents
+        names = tuple(_name(opponent) for opponent in given) * (others if len(given) == 1 else 1)
         batch = env.reset()
         indices: list[npt.NDArray[np.uint64]] = []
         points: list[npt.NDArray[np.uint32]] = []
@@ -115,6 +116,10 @@ def evaluate(
             batch = env.step(actions)
         taken = np.bincount(np.concatenate(places), minlength=env.players + 1)[1:]
     return summed_up(names, games, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
+
+
+def _name(opponent: str | Policy) -> str:
+    return opponent if isinstance(opponent, str) else getattr(opponent, "__name__", type(opponent).__name__)
 
 
 def run(options: argparse.Namespace) -> int:

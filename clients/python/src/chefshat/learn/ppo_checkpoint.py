@@ -23,6 +23,8 @@ from chefshat.learn.training_file import network_info, opened
 from chefshat.vector_setup import NETWORK_SUFFIX
 
 FORMAT = "chefshat-ppo-training-2"
+# Before the class of a player of the Players Club.
+CLUB = "club:"
 # With weights as (out, in), and with older names in the plan.
 OLD_FORMAT = "chefshat-ppo-training-1"
 
@@ -32,12 +34,16 @@ class Opponent:
     """An opponent of a training.
 
     Attributes:
-        name: a built-in agent, or the path of a network file.
-        sha256: the SHA-256 of the file in hexadecimal; empty: not known yet, or a built-in agent.
+        name: a built-in agent, the path of a network file, or `CLUB` and "module.path:Class", a player of the Players Club.
+        sha256: the SHA-256 of the file in hexadecimal; empty: not known yet, or not a file.
+        python: the Python of a player of the Players Club; empty: this program's.
+        arguments: the arguments of that player's constructor, a JSON object; empty: none.
     """
 
     name: str
     sha256: str = ""
+    python: str = ""
+    arguments: str = ""
 
     def checked(self) -> Self:
         """Returns the opponent with the digest of its file.

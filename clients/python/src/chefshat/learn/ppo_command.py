@@ -25,10 +25,12 @@ from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters
-from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import CLUB, Opponent, Plan, Progress, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
+from chefshat.players_club import AgentError
+from chefshat.players_club.opponent import ClubOpponent
 
 LOG = logging.getLogger("chefshat.learn")
 OPPONENTS = ("greedy", "random")
@@ -47,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
             LOG.info(json.dumps(_setup(trainer.training)))
             with Scalars(options.tensorboard) as scalars:
                 evaluations = _train(trainer, options, state, scalars)
-    except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
+    except (AgentError, ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:
         print(json.dumps({"event": "trained", "file": str(out), **_summary(trainer.training, evaluations)}))
@@ -67,7 +69,7 @@ def _start(options: argparse.Namespace) -> Training:
     plan = Plan(
         games=options.games,
         opponent_games=options.opponent_games,
-        opponents=tuple(Opponent(name) for name in options.opponents),
+        opponents=tuple(_opponent(name, options) for name in options.opponents),
         value_updates=options.value_updates,
         steps=options.steps,
         epochs=options.epochs,
@@ -91,6 +93,12 @@ def _start(options: argparse.Namespace) -> Training:
     return ppo_checkpoint.begin(plan, options.seed, rules, runs.trained_by("", options.trained_by), begin_with)
 
 
+def _opponent(name: str, options: argparse.Namespace) -> Opponent:
+    if not name.startswith(CLUB):
+        return Opponent(name)
+    return Opponent(name, python=options.club_python, arguments=options.club_arguments)
+
+
 def _policy(file: Path, rules: pb.RuleSet) -> Network:
     """Reads the initial policy of a training under these rules."""
     policy = network.load(file)
@@ -105,7 +113,9 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     training = ppo_checkpoint.load(runs.existing(state))
     plan, hyper = training.plan, training.plan.hyper
     opponents = [opponent.name for opponent in plan.opponents]
-    fixed = {"opponents": opponents, "seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
+    club = next((opponent for opponent in plan.opponents if opponent.name.startswith(CLUB)), Opponent(""))
+    fixed = {"opponents": opponents, "club_python": club.python, "club_arguments": club.arguments}
+    fixed |= {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
     runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
     if "rules" in options.given:
         runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), training.rules)
@@ -148,9 +158,9 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     training = trainer.training
     current = training.network(options.name)
     plan = training.plan.checked()
-    tables: list[tuple[str, ...]] = [(name,) for name in OPPONENTS]
+    tables: list[tuple[str | ClubOpponent, ...]] = [(name,) for name in OPPONENTS]
     if plan.opponent_games:
-        tables.append(tuple(opponent.name for opponent in plan.opponents))
+        tables.append(tuple(trainer.opponents))
     evaluations = [
         evaluate(
             current,

@@ -6,6 +6,8 @@ in `self_play`, learning in `ppo`, files are in `ppo_checkpoint`, the command is
 
 import dataclasses
 import itertools
+import json
+import sys
 import time
 from collections.abc import Sequence
 from typing import Any, Self
@@ -19,9 +21,10 @@ from chefshat.address import ServerAddress
 from chefshat.learn import ppo
 from chefshat.learn.all_hands import other_hands
 from chefshat.learn.ppo import Params, Samples
-from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import CLUB, Opponent, Plan, Progress, Training
 from chefshat.learn.runs import SEED_STEP
 from chefshat.learn.self_play import Collector, Floats, advantages
+from chefshat.players_club.opponent import ClubOpponent
 from chefshat.vector import VectorEnv
 
 
@@ -35,17 +38,22 @@ class Trainer:
             ChefsHatError: they are refused, or the server does not answer.
             ValueError: a network file among the opponents has changed since the training began.
             OSError: such a file cannot be read.
+            AgentError: a player of the Players Club could not be created.
         """
         plan = training.plan.checked()
         runs = training.progress.runs + 1
         self.training = dataclasses.replace(training, plan=plan, progress=dataclasses.replace(training.progress, runs=runs))
         # Every resumption plays other games.
         first_seed = training.seed + SEED_STEP * runs
-        alone = {"client_seats": [0], "opponents": [opponent.name for opponent in plan.opponents]}
-        kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
         self._envs: list[VectorEnv] = []
         self._collectors: list[Collector] = []
+        #: Who plays against the policy in games that are not self-play: names, and players of the Players Club.
+        self.opponents: list[str | ClubOpponent] = []
         try:
+            for opponent in plan.opponents if plan.opponent_games else ():
+                self.opponents.append(seated(opponent))
+            alone = {"client_seats": [0], "opponents": self.opponents}
+            kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
             for number, (games, others) in enumerate(kinds):
                 if games == 0:
                     continue
@@ -64,9 +72,12 @@ class Trainer:
         self.close()
 
     def close(self) -> None:
-        """Ends the games."""
+        """Ends the games, and the players of the Players Club."""
         for env in self._envs:
             env.close()
+        for opponent in self.opponents:
+            if isinstance(opponent, ClubOpponent):
+                opponent.close()
 
     def update(self, done: float) -> dict[str, float]:
         """Plays and learns once. Returns the losses of the last epoch by name.
@@ -97,6 +108,18 @@ class Trainer:
         )
         self.training = dataclasses.replace(self.training, learner=learner, progress=progress)
         return found
+
+
+def seated(opponent: Opponent) -> str | ClubOpponent:
+    """Returns an opponent as a `VectorEnv` takes it. Starts a player of the Players Club, which the caller closes.
+
+    Raises:
+        AgentError: it could not be created.
+    """
+    if not opponent.name.startswith(CLUB):
+        return opponent.name
+    arguments = json.loads(opponent.arguments or "{}")
+    return ClubOpponent(opponent.name.removeprefix(CLUB), arguments=arguments, python=opponent.python or sys.executable)
 
 
 def play(collector: Collector, params: Params, key: jax.Array, plan: Plan) -> Samples:

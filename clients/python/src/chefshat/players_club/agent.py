@@ -157,7 +157,7 @@ class PlayersClubAgent(Agent):
         except AgentError as error:
             self._failed(error)
             return None
-        if not (_is_numbers(answer) and len(answer) == len(ACTIONS)):
+        if not (is_numbers(answer) and len(answer) == len(ACTIONS)):
             self._failed(f"get_action returned {_shape(answer)}, not {len(ACTIONS)} numbers")
             return None
         return np.array(answer, np.float64)
@@ -176,7 +176,7 @@ class PlayersClubAgent(Agent):
             except AgentError as error:
                 self._failed(error)
                 return self._replaced(request.default_action)
-            if not (_is_numbers(answer) and len(answer) == amount and all(card in range(1, JOKER + 1) for card in answer)):
+            if not (is_numbers(answer) and len(answer) == amount and all(card in range(1, JOKER + 1) for card in answer)):
                 self._failed(f"get_exhanged_cards returned {_shape(answer)}, not a list of {amount} of its cards")
                 return self._replaced(request.default_action)
             self._to_give = [int(card) for card in answer]
@@ -218,7 +218,7 @@ class PlayersClubAgent(Agent):
             LOG.warning("%s: further failures are counted, but not logged", self._process.name)
 
 
-def _is_numbers(answer: object) -> TypeGuard[list[float]]:
+def is_numbers(answer: object) -> TypeGuard[list[float]]:
     """Whether the answer is a list of numbers, which may be infinite, but not NaN."""
     if not (isinstance(answer, list) and all(isinstance(number, int | float) for number in answer)):
         return False
