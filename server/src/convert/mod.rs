@@ -20,6 +20,8 @@ mod room;
 mod standings;
 mod start;
 mod study;
+#[cfg(test)]
+mod study_tests;
 mod study_view;
 mod summary;
 mod table;
