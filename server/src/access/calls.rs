@@ -291,6 +291,17 @@ pub const CALLS: &[Call] = &[
     call("/chefshat.v1.AdminService/GetStorage", Admin, Refused),
     call("/chefshat.v1.AdminService/PruneRecords", Admin, Refused),
     call(
+        "/chefshat.v1.AdminService/ExportParticipant",
+        Admin,
+        Refused,
+    )
+    .streaming(),
+    call(
+        "/chefshat.v1.AdminService/DeleteParticipant",
+        Admin,
+        Refused,
+    ),
+    call(
         "/chefshat.v1.ServerService/GetServerInfo",
         Anyone,
         Unlimited,

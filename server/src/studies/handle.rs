@@ -140,6 +140,14 @@ impl StudyHandle {
         self.committed().participant(number).map(|_| number)
     }
 
+    /// The participant with this pseudonym.
+    pub fn number_by_pseudonym(&self, pseudonym: &str) -> Option<u32> {
+        let study = self.committed();
+        let mut participants = study.participants().iter();
+        let found = participants.find(|(_, it)| it.pseudonym == pseudonym);
+        found.map(|(number, _)| *number)
+    }
+
     /// The participant and the number of its session with this secret.
     pub fn session_of(&self, secret: &SessionSecret) -> Option<(u32, u32)> {
         let (number, session) = secret.verify(&self.header.key)?;
