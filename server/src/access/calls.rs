@@ -124,6 +124,7 @@ pub const CALLS: &[Call] = &[
         Host,
         Refused,
     ),
+    call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused),
     call(
         "/chefshat.v1.ParticipationService/OpenStudy",
         Player,

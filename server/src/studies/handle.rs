@@ -317,6 +317,19 @@ impl StudyHandle {
         closed.await.map(drop)
     }
 
+    /// Deletes the study, and returns the number of its games once all is deleted. Whoever is in
+    /// the middle of it is removed if `force` is set.
+    ///
+    /// # Errors
+    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
+    /// many.
+    pub(super) async fn delete(&self, force: bool) -> Result<Result<usize, usize>, Stopped> {
+        let (reply, answer) = oneshot::channel();
+        let sent = self.mailbox.send(Message::Delete { force, reply }).await;
+        sent.map_err(|_| Stopped)?;
+        answer.await.map_err(|_| Stopped)
+    }
+
     /// Records interface traces of a participant's game.
     ///
     /// # Errors

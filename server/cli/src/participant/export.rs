@@ -1,6 +1,5 @@
 //! `chefshat participant export`: writes a participant's data as JSON Lines.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
