@@ -37,6 +37,9 @@ impl RoomClock {
     }
 }
 
+/// Tells the time of day, milliseconds since the Unix epoch: [`since_epoch_ms`], except in tests.
+pub type TimeOfDay = fn() -> u64;
+
 /// The time of day, milliseconds since the Unix epoch.
 pub fn since_epoch_ms() -> u64 {
     u64::try_from(since_epoch().as_millis()).unwrap_or(u64::MAX)

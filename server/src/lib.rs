@@ -15,6 +15,7 @@ pub mod host;
 pub mod limits;
 pub mod metrics;
 pub mod outbox;
+pub mod participants;
 pub mod proxies;
 pub mod record_writer;
 pub mod retention;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tokio::sync::{OwnedRwLockWriteGuard, RwLock};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
@@ -19,6 +20,8 @@ pub struct RecordWriter {
     data_dir: Option<PathBuf>,
     tracker: TaskTracker,
     background: Arc<Background>,
+    /// Locked for reading while a record is written.
+    writing: Arc<RwLock<()>>,
 }
 
 impl RecordWriter {
@@ -34,12 +37,18 @@ impl RecordWriter {
             data_dir,
             tracker,
             background,
+            writing: Arc::default(),
         }
     }
 
     /// The data directory, if records are written.
     pub fn data_dir(&self) -> Option<&Path> {
         self.data_dir.as_deref()
+    }
+
+    /// Waits until no record is being written, and lets none begin while the value lives.
+    pub async fn pause(&self) -> OwnedRwLockWriteGuard<()> {
+        Arc::clone(&self.writing).write_owned().await
     }
 
     /// Queues the record of a finished game, charged to its creator, and marks it as written in the
@@ -54,6 +63,7 @@ impl RecordWriter {
     async fn write(self, game: Id, charged: Key, data_dir: PathBuf) {
         // Before it is read: a long record takes much memory.
         let _slice = self.background.slice(charged).await;
+        let _writing = self.writing.read().await;
         let stored = match self.store.finished(game).await {
             Ok(Some(stored)) => stored,
             Ok(None) => return,

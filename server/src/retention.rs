@@ -3,12 +3,11 @@
 //! nothing behind that the next run does not delete.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::MAX_SEATS;
-use chefshat_record::{jsonl, samples};
+use chefshat_record::jsonl;
 use chefshat_room::ids::Id;
 use tracing::{error, info};
 
@@ -121,21 +120,20 @@ impl Retention {
             if games.is_empty() {
                 continue;
             }
+            let ids: Vec<Id> = games.into_iter().map(|(_, game)| game).collect();
+            // Files before the games: after a crash in between, the next run deletes them.
             if let Some(data_dir) = self.rooms.record_writer().data_dir() {
-                let paths: Vec<_> = (games.iter())
-                    .flat_map(|(_, game)| files_of(data_dir, *game))
+                let paths: Vec<_> = (ids.iter())
+                    .map(|game| jsonl::path_of(data_dir, &game.to_string()))
                     .collect();
-                for (_, game) in &games {
-                    self.rooms.samples().forget(*game);
-                }
-                // Before the games: after a crash in between, the next run deletes them.
                 let deleting = move || paths.iter().try_for_each(|path| remove(path));
                 (tokio::task::spawn_blocking(deleting).await)
                     .map_err(|error| StoreError::Failed(error.to_string()))?
                     .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
             }
-            pruned.games += games.len() as u64;
-            let ids: Vec<Id> = games.into_iter().map(|(_, game)| game).collect();
+            let deleting = self.rooms.samples().delete(ids.clone()).await;
+            deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
+            pruned.games += ids.len() as u64;
             store.delete(ids).await?;
             tokio::time::sleep(PAUSE).await;
         }
@@ -162,14 +160,6 @@ impl Retention {
             }
         }
     }
-}
-
-/// The files that a game may have: its record and the samples of its seats.
-fn files_of(data_dir: &Path, game: Id) -> impl Iterator<Item = PathBuf> {
-    let id = game.to_string();
-    let samples = (0..MAX_SEATS).map(|seat| samples::path_of(data_dir, &id, seat));
-    let record = jsonl::path_of(data_dir, &id);
-    samples.chain([record]).collect::<Vec<_>>().into_iter()
 }
 
 /// Bytes and number of the files of a folder.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use chefshat_engine::Seat;
+use chefshat_engine::{MAX_SEATS, Seat};
 use chefshat_proto::v1::SampleChunk;
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::samples;
@@ -126,10 +126,31 @@ impl Samples {
         appended
     }
 
-    /// Closes the files of a game that are deleted.
-    pub fn forget(&self, game: Id) {
-        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
-        files.retain(|(of, _), _| *of != game);
+    /// Deletes the samples of games.
+    ///
+    /// # Errors
+    /// The file system failed.
+    pub async fn delete(&self, games: Vec<Id>) -> io::Result<()> {
+        let Some(data_dir) = self.data_dir.clone() else {
+            return Ok(());
+        };
+        {
+            let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+            files.retain(|(of, _), _| !games.contains(of));
+        }
+        let deleting = move || {
+            let seats = games
+                .iter()
+                .flat_map(|game| (0..MAX_SEATS).map(move |seat| (game, seat)));
+            let mut paths =
+                seats.map(|(game, seat)| samples::path_of(&data_dir, &game.to_string(), seat));
+            paths.try_for_each(|path| match std::fs::remove_file(path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+                _ => Ok(()),
+            })
+        };
+        let deleted = tokio::task::spawn_blocking(deleting).await;
+        deleted.map_err(io::Error::other)?
     }
 }
 
@@ -278,6 +299,9 @@ mod tests {
         );
         assert_eq!(add(chunk("stream0", 1, 1)).await.expect("still open"), 1);
         assert_eq!(recorded(folder.path(), game, 0).len(), MAX_STREAMS + 1);
+        server.delete(vec![game]).await.expect("deleted");
+        assert!(recorded(folder.path(), game, 0).is_empty());
+        assert_eq!(add(chunk("stream0", 1, 1)).await.expect("a new file"), 1);
         let nowhere = Arc::new(Samples::new(None));
         let refused = nowhere.add(game, seat, chunk("affect", 0, 1), HOUR).await;
         assert!(matches!(refused, Err(SampleError::Off)));

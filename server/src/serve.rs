@@ -41,6 +41,7 @@ use crate::forwarded::ForwardedLayer;
 use crate::grpc;
 use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
+use crate::participants::Participants;
 use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
 use crate::rooms::Rooms;
@@ -531,7 +532,17 @@ fn routes(
     );
     let study_calls =
         grpc::StudyCalls::new(Arc::clone(studies), Arc::clone(calls), closing.clone());
-    let admin = grpc::AdminCalls::new(reach.clone(), Arc::clone(connections), retention);
+    let participants = Participants::new(
+        Arc::clone(rooms),
+        Arc::clone(tournaments),
+        Arc::clone(studies),
+    );
+    let admin = grpc::AdminCalls::new(
+        reach.clone(),
+        Arc::clone(connections),
+        retention,
+        Arc::new(participants),
+    );
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let routes = Routes::new(

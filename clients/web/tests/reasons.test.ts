@@ -52,6 +52,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "CLIENT_UNKNOWN",
     "FACES_OUT_OF_RANGE",
     "MARKER_REFUSED",
+    "PARTICIPANT_PLAYING",
     "SAMPLES_OFF",
     "SAMPLES_REFUSED",
     "TOO_MANY_SAMPLES",

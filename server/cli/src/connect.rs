@@ -44,6 +44,11 @@ impl fmt::Debug for ServerArg {
 }
 
 impl ServerArg {
+    /// The server with this address.
+    pub(super) fn new(server: String, token: Option<String>, ca: Option<PathBuf>) -> Self {
+        Self { server, token, ca }
+    }
+
     /// The address as it was given.
     pub(super) fn url(&self) -> &str {
         &self.server

@@ -26,6 +26,7 @@ mod cli {
     mod room;
     mod run;
     mod simulate;
+    mod study;
     mod terminal;
     mod token;
     mod tournament;

@@ -1,7 +1,9 @@
-//! Pseudonymizes a participant in a record: replaces the name and drops expressions and
-//! annotations. Decisions stay, so the record still verifies.
+//! Pseudonymizes a participant in a record: replaces the name, also in markers, and drops
+//! expressions and annotations. Decisions stay, so the record still verifies.
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+
+use crate::convert::MAX_LABEL;
 
 /// The longest name of a room, characters.
 const MAX_ROOM_NAME: usize = 64;
@@ -140,7 +142,10 @@ impl Pseudonym {
                 out.expressions += u64::from(drop);
                 !drop
             }
-            Some(Line::Marker(_)) => true,
+            Some(Line::Marker(marker)) => {
+                out.names += self.in_label(&mut marker.label);
+                true
+            }
             Some(Line::Footer(footer)) => {
                 footer.events = footer.events.saturating_sub(dropped_events);
                 true
@@ -177,6 +182,17 @@ impl Pseudonym {
     /// Replaces the name where it occurs as whole words in a room name; returns the number of
     /// replacements.
     pub fn in_text(&self, text: &mut String) -> u64 {
+        self.in_words(text, MAX_ROOM_NAME)
+    }
+
+    /// Replaces the name where it occurs as whole words in the label of a marker; returns the
+    /// number of replacements.
+    pub fn in_label(&self, label: &mut String) -> u64 {
+        self.in_words(label, MAX_LABEL)
+    }
+
+    /// As [`Pseudonym::in_text`], for a text of at most `max` characters.
+    fn in_words(&self, text: &mut String, max: usize) -> u64 {
         let is_part = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
         let (mut replaced, mut rest, mut found) = (String::new(), text.as_str(), 0);
         while !self.name.is_empty()
@@ -192,7 +208,7 @@ impl Pseudonym {
         }
         if found > 0 {
             replaced.push_str(rest);
-            *text = replaced.chars().take(MAX_ROOM_NAME).collect();
+            *text = replaced.chars().take(max).collect();
         }
         found
     }

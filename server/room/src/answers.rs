@@ -65,6 +65,11 @@ pub enum LeaveError {
     /// The game has ended.
     #[error("the game of this room is over; there is nothing to leave")]
     GameOver,
+    /// The seat is that of a study's participant.
+    #[error(
+        "a study has assigned this seat, which stays yours; withdraw from the study on its page"
+    )]
+    Assigned,
 }
 
 /// Why an expression is refused.

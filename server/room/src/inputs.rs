@@ -83,12 +83,16 @@ impl Core {
     /// Frees a seat before the game starts.
     ///
     /// # Errors
-    /// The game has started.
+    /// The game has started, or a study has assigned the seat.
     pub fn leave(&mut self, now: Duration, seat: Seat) -> Result<(), LeaveError> {
         match self.state {
             State::Waiting => {}
             State::Playing => return Err(LeaveError::GameStarted),
             State::Finished | State::Aborted(_) => return Err(LeaveError::GameOver),
+        }
+        let study = self.header.study.as_ref();
+        if study.is_some_and(|game| game.seat == seat) {
+            return Err(LeaveError::Assigned);
         }
         self.commit(now, Change::Vacated(seat));
         Ok(())

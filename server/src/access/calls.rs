@@ -130,6 +130,7 @@ pub const CALLS: &[Call] = &[
         Host,
         Refused,
     ),
+    call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused),
     call(
         "/chefshat.v1.ParticipationService/OpenStudy",
         Player,
@@ -296,6 +297,17 @@ pub const CALLS: &[Call] = &[
     call("/chefshat.v1.AdminService/CloseTournament", Admin, Refused).forwarded(),
     call("/chefshat.v1.AdminService/GetStorage", Admin, Refused),
     call("/chefshat.v1.AdminService/PruneRecords", Admin, Refused),
+    call(
+        "/chefshat.v1.AdminService/ExportParticipant",
+        Admin,
+        Refused,
+    )
+    .streaming(),
+    call(
+        "/chefshat.v1.AdminService/DeleteParticipant",
+        Admin,
+        Refused,
+    ),
     call(
         "/chefshat.v1.ServerService/GetServerInfo",
         Anyone,

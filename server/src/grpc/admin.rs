@@ -1,21 +1,29 @@
 //! `AdminService`: operates the server. The role that its calls need stands in `access`.
 
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::UNIX_EPOCH;
 
 use chefshat_proto::v1::{self, admin_service_server::AdminService};
 use chefshat_record::convert::FieldProblem;
+use futures::Stream;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
 use super::limits::charged;
 use super::pages;
 use super::reach::Reach;
-use super::status::{Refusal, field, room_unknown, status, store_failed, tournament_unknown};
+use super::status::{
+    Refusal, field, room_unknown, shutting_down, status, store_failed, tournament_unknown,
+};
 use super::tournaments;
+use crate::config::FOLLOW_SEND_TIMEOUT;
 use crate::connections::{Client, Connections};
+use crate::participants::{DataError, Participants};
 use crate::retention::Retention;
-use crate::store::Keep;
+use crate::store::{ForgetError, Keep};
 use chefshat_room::ids::Id;
 
 /// Most clients in a page.
@@ -27,21 +35,31 @@ pub struct AdminCalls {
     reach: Reach,
     connections: Arc<Connections>,
     retention: Retention,
+    participants: Arc<Participants>,
 }
 
 impl AdminCalls {
     /// Creates the service for this server.
-    pub fn new(reach: Reach, connections: Arc<Connections>, retention: Retention) -> Self {
+    pub fn new(
+        reach: Reach,
+        connections: Arc<Connections>,
+        retention: Retention,
+        participants: Arc<Participants>,
+    ) -> Self {
         Self {
             reach,
             connections,
             retention,
+            participants,
         }
     }
 }
 
 #[tonic::async_trait]
 impl AdminService for AdminCalls {
+    type ExportParticipantStream =
+        Pin<Box<dyn Stream<Item = Result<v1::ExportParticipantResponse, Status>> + Send>>;
+
     async fn list_clients(
         &self,
         request: Request<v1::ListClientsRequest>,
@@ -149,6 +167,103 @@ impl AdminService for AdminCalls {
             games: pruned.games,
             freed_bytes: pruned.freed_bytes,
         }))
+    }
+
+    async fn export_participant(
+        &self,
+        request: Request<v1::ExportParticipantRequest>,
+    ) -> Result<Response<Self::ExportParticipantStream>, Status> {
+        let name = given(request.into_inner().name)?;
+        let (sender, responses) = mpsc::channel(1);
+        let (lines, mut exported) = mpsc::channel(1);
+        let participants = Arc::clone(&self.participants);
+        let gathering = async move { participants.export(&name, &lines).await };
+        let forwarding = async move {
+            let mut count = 0_u64;
+            while let Some(line) = exported.recv().await {
+                count += 1;
+                let response = v1::ExportParticipantResponse {
+                    line,
+                    ..v1::ExportParticipantResponse::default()
+                };
+                let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
+                if sent.await.is_err() {
+                    break;
+                }
+            }
+            (sender, count)
+        };
+        tokio::spawn(async move {
+            let (gathered, (sender, count)) = tokio::join!(gathering, forwarding);
+            let last = match gathered {
+                Ok(skipped) if count == 0 && skipped.named.is_empty() => Err(status(
+                    Code::NotFound,
+                    "PARTICIPANT_UNKNOWN",
+                    "nothing is stored under this name; give the exact name the participant played under",
+                    [("field", "name")],
+                )),
+                Ok(skipped) => Ok(v1::ExportParticipantResponse {
+                    line: String::new(),
+                    unread_files: skipped.named,
+                }),
+                Err(error) => Err(data_failed(error)),
+            };
+            // The client may have gone.
+            let _ = sender.send_timeout(last, FOLLOW_SEND_TIMEOUT).await;
+        });
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn delete_participant(
+        &self,
+        request: Request<v1::DeleteParticipantRequest>,
+    ) -> Result<Response<v1::DeleteParticipantResponse>, Status> {
+        let name = given(request.into_inner().name)?;
+        let participants = Arc::clone(&self.participants);
+        // Runs to completion even if the client goes.
+        let deleting = tokio::spawn(async move { participants.delete(&name).await });
+        let deleted = deleting.await.map_err(|error| {
+            tracing::error!(%error, "deleting a participant's data failed");
+            store_failed()
+        })?;
+        let deleted = deleted.map_err(data_failed)?;
+        Ok(Response::new(v1::DeleteParticipantResponse {
+            pseudonym: deleted.pseudonym,
+            games: deleted.games,
+            tournaments: deleted.tournaments,
+            studies: deleted.studies,
+            record_files: deleted.files,
+            expressions: deleted.redactions.expressions,
+            annotations: deleted.redactions.annotations,
+            unchanged_files: deleted.skipped.named,
+        }))
+    }
+}
+
+/// A participant's name from a request. Empty seats have an empty one.
+fn given(name: String) -> Result<String, Status> {
+    if name.is_empty() {
+        let problem = FieldProblem::new("name", "give the exact name the participant played under");
+        return Err(field("NAME_REFUSED", &problem));
+    }
+    Ok(name)
+}
+
+fn data_failed(error: DataError) -> Status {
+    match error {
+        DataError::Forget(
+            running @ (ForgetError::GameRunning(_) | ForgetError::TournamentRunning(_)),
+        ) => status(
+            Code::FailedPrecondition,
+            "PARTICIPANT_PLAYING",
+            running.to_string(),
+            [("field", "name")],
+        ),
+        DataError::ShuttingDown => shutting_down(),
+        error => {
+            tracing::error!(%error, "a request for a participant's data failed");
+            store_failed()
+        }
     }
 }
 

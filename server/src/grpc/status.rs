@@ -345,6 +345,7 @@ impl From<LeaveError> for Refusal {
         let reason = match error {
             LeaveError::GameStarted => "GAME_STARTED",
             LeaveError::GameOver => "GAME_OVER",
+            LeaveError::Assigned => "SEAT_ASSIGNED",
         };
         Self(status(
             Code::FailedPrecondition,

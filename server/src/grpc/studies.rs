@@ -295,6 +295,21 @@ impl StudyService for StudyCalls {
             games: convert::number(games),
         }))
     }
+
+    async fn delete_study(
+        &self,
+        request: Request<v1::DeleteStudyRequest>,
+    ) -> Result<Response<v1::DeleteStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let deleted = self.studies.delete(handle, request.force).await;
+        let (participants, games) = deleted.map_err(stopped)?.map_err(study_running)?;
+        Ok(Response::new(v1::DeleteStudyResponse {
+            participants: convert::number(participants),
+            games: convert::number(games),
+        }))
+    }
 }
 
 /// Sends a study and then what changes of it, until it is over.
@@ -380,6 +395,17 @@ fn study_unknown() -> Status {
         "STUDY_UNKNOWN",
         "this server has no study with this id and owner token",
         [("field", "study_id")],
+    )
+}
+
+fn study_running(active: usize) -> Status {
+    status(
+        Code::FailedPrecondition,
+        "STUDY_RUNNING",
+        format!(
+            "{active} participants are in the middle of the study; wait for them, or set `force` to remove them"
+        ),
+        [("participants", &active.to_string())],
     )
 }
 

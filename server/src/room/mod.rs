@@ -6,6 +6,8 @@
 
 mod clients;
 mod handle;
+#[cfg(test)]
+mod label_tests;
 mod markers;
 mod message;
 mod observed;

@@ -141,6 +141,8 @@ pub struct Rooms {
     created: Notify,
     /// Number of games that have ended since the server was started.
     ended: AtomicU64,
+    /// Number of participants whose data were deleted since the server was started.
+    forgotten: AtomicU64,
     context: TaskContext,
     /// Where the rooms and tournaments of other nodes are.
     directory: Arc<dyn Directory>,
@@ -194,6 +196,7 @@ impl Rooms {
             changed: Notify::new(),
             created: Notify::new(),
             ended: AtomicU64::new(0),
+            forgotten: AtomicU64::new(0),
             context: TaskContext {
                 record_writer: RecordWriter::new(
                     Arc::clone(&store),
@@ -306,6 +309,15 @@ impl Rooms {
             .collect()
     }
 
+    /// All rooms whose games are over, or all whose are not and that are not suspended.
+    pub fn all(&self, over: bool) -> Vec<Handle> {
+        let table = self.lock();
+        let wanted = |entry: &&Entry| entry.over == over && (over || !entry.suspended);
+        (table.by_number.values().filter(wanted))
+            .map(|entry| entry.handle.clone())
+            .collect()
+    }
+
     /// What was fixed about the game of a room before it started.
     pub fn header(&self, id: Id) -> Option<Arc<GameHeader>> {
         Some(Arc::clone(&self.lock().get(id)?.header))
@@ -353,6 +365,16 @@ impl Rooms {
     /// Number of ended games. Each of them has been committed.
     pub fn ended(&self) -> u64 {
         self.ended.load(Ordering::Acquire)
+    }
+
+    /// Number of participants whose data were deleted: what was computed before shows their names.
+    pub fn forgotten(&self) -> u64 {
+        self.forgotten.load(Ordering::Acquire)
+    }
+
+    /// Counts a participant whose data were deleted.
+    pub fn count_forgotten(&self) {
+        self.forgotten.fetch_add(1, Ordering::AcqRel);
     }
 
     /// Withholds the records of a series, or of all games of a tournament, or releases them once

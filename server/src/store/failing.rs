@@ -4,13 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Pseudonym;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
+    ForgetError, Forgotten, Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store,
+    StoreError, StoredGame,
 };
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
@@ -109,6 +111,10 @@ impl Store for FailingStore {
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
         self.inner.delete(games)
+    }
+
+    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+        self.inner.forget(who)
     }
 
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {

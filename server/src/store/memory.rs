@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, btree_map};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
+use super::forget::{ForgetError, Forgotten, forget_stored};
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
@@ -195,6 +197,17 @@ impl Store for MemoryStore {
         ready(Ok(())).boxed()
     }
 
+    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+        let mut forgotten = Forgotten::default();
+        for game in lock(&self.finished).games.values_mut() {
+            let redactions = forget_stored(&mut game.stored, &mut game.summary, who);
+            if redactions != Redactions::default() {
+                forgotten.add(game.id, false, redactions);
+            }
+        }
+        ready(Ok(forgotten)).boxed()
+    }
+
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
@@ -272,6 +285,16 @@ impl Store for MemoryStore {
             study.traces.retain(|traces| traces.number != forgotten);
         }
         ready(Ok(())).boxed()
+    }
+
+    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        lock_studies(&self.studies).remove(&study);
+        ready(Ok(())).boxed()
+    }
+
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        let studies = lock_studies(&self.studies);
+        ready(Ok(studies.keys().copied().collect())).boxed()
     }
 
     fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {

@@ -5,6 +5,7 @@ pub mod cluster;
 mod codec;
 mod ephemeral;
 mod failing;
+mod forget;
 mod form;
 mod memory;
 mod postgres;
@@ -17,18 +18,19 @@ pub mod tournaments;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Pseudonym;
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
 pub use failing::FailingStore;
+pub use forget::{ForgetError, Forgotten};
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{
     DatabaseError, PostgresOptions, PostgresStore, TransferError, Transferred, migrate, transfer,
 };
 pub use sqlite::{
-    DATABASE_FILE, DatabaseCopy, ForgetError, Forgetting, Forgotten, LOCK_FILE, OpenError,
-    SqliteStore, check_copy, copy_database,
+    DATABASE_FILE, DatabaseCopy, LOCK_FILE, OpenError, SqliteStore, check_copy, copy_database,
 };
 
 use crate::metrics::StoreMetrics;
@@ -194,6 +196,14 @@ pub trait Store: Send + Sync + 'static {
     fn delete(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
+    /// Replaces the name of a participant in all games and tournaments by a pseudonym, and deletes
+    /// its expressions and annotations, in one commit. Changed records lose their signature and
+    /// count as not written to files. What contains the name and is not over refuses it. A store
+    /// that cannot forget fails.
+    fn forget<'a>(&'a self, _who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+        let failure = StoreError::Failed("this store cannot remove participants".to_owned());
+        ready(Err(failure.into())).boxed()
+    }
     /// Finished games whose record is not yet written to a file.
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
     /// Marks the record of a game as written to a file.
@@ -242,6 +252,11 @@ pub trait Store: Send + Sync + 'static {
         _changes: Vec<StudyChange>,
         _forgotten: u32,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Err(no_studies())).boxed()
+    }
+    /// Deletes a study with its journal and interface traces, if there is one. Its games are
+    /// deleted as games.
+    fn delete_study(&self, _study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Err(no_studies())).boxed()
     }
     /// A study, or `None`.

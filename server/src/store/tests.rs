@@ -1,5 +1,6 @@
 //! Behavior that all stores share. Each test runs with games in memory, in SQLite and in PostgreSQL.
 
+mod forget;
 mod lists;
 mod studies;
 mod tournaments;

@@ -11,7 +11,6 @@ use tokio::time::Instant;
 use tracing::warn;
 
 use super::task::Task;
-use crate::clock::since_epoch_ms;
 use crate::config::TOURNAMENT_RETRY;
 use crate::convert::PARTICIPANT_KIND;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
@@ -65,7 +64,7 @@ impl Task {
 
     fn end_game(&mut self, number: u32, game: &PlayedGame, outcome: Outcome) {
         let id = game.placed.game;
-        if let Some(change) = (self.state).game_ended(number, id, outcome, since_epoch_ms()) {
+        if let Some(change) = (self.state).game_ended(number, id, outcome, (self.now)()) {
             self.fold(change);
         }
         self.closing.remove(&Id(game.placed.room));

@@ -140,6 +140,14 @@ impl StudyHandle {
         self.committed().participant(number).map(|_| number)
     }
 
+    /// The participant with this pseudonym.
+    pub fn number_by_pseudonym(&self, pseudonym: &str) -> Option<u32> {
+        let study = self.committed();
+        let mut participants = study.participants().iter();
+        let found = participants.find(|(_, it)| it.pseudonym == pseudonym);
+        found.map(|(number, _)| *number)
+    }
+
     /// The participant and the number of its session with this secret.
     pub fn session_of(&self, secret: &SessionSecret) -> Option<(u32, u32)> {
         let (number, session) = secret.verify(&self.header.key)?;
@@ -307,6 +315,19 @@ impl StudyHandle {
     pub async fn close(&self) -> Result<(), Stopped> {
         let closed = self.command(|study, _| Ok((Vec::from_iter(study.close()), 0)));
         closed.await.map(drop)
+    }
+
+    /// Deletes the study, and returns the number of its games once all is deleted. Whoever is in
+    /// the middle of it is removed if `force` is set.
+    ///
+    /// # Errors
+    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
+    /// many.
+    pub(super) async fn delete(&self, force: bool) -> Result<Result<usize, usize>, Stopped> {
+        let (reply, answer) = oneshot::channel();
+        let sent = self.mailbox.send(Message::Delete { force, reply }).await;
+        sent.map_err(|_| Stopped)?;
+        answer.await.map_err(|_| Stopped)
     }
 
     /// Records interface traces of a participant's game.

@@ -13,6 +13,14 @@ pub(super) type Command =
 pub(super) enum Message {
     /// Executes a command; answers once its changes are committed.
     Command(Command, oneshot::Sender<Result<u32, Refusal>>),
+    /// Deletes the study; answers with the number of its games once all is deleted. Refused with
+    /// the number of those who are in the middle of it, unless `force` is set.
+    Delete {
+        /// Whether to remove them.
+        force: bool,
+        /// The answer.
+        reply: oneshot::Sender<Result<usize, usize>>,
+    },
     /// A stream shows the study to a participant.
     Present {
         /// The participant.

@@ -6,6 +6,8 @@ mod games;
 mod handle;
 mod message;
 mod task;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicU64;
@@ -22,7 +24,7 @@ pub use export::{ExportError, ExportedFile};
 pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, Presence, StudyHandle, TraceRefusal};
 pub use message::Stopped;
 
-use crate::clock::since_epoch_ms;
+use crate::clock::{TimeOfDay, since_epoch_ms};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::convert::{self, StudyPlan};
 use crate::limits::{Held, Key, Places, Refused};
@@ -67,6 +69,7 @@ pub enum CreateProblem {
 #[derive(Debug)]
 pub struct Studies {
     rooms: Arc<Rooms>,
+    now: TimeOfDay,
     tracker: TaskTracker,
     stop: Stop,
     /// In the order of their creation, with a number.
@@ -82,12 +85,25 @@ struct Table {
     by_id: BTreeMap<Id, Arc<StudyHandle>>,
 }
 
+impl Table {
+    fn remove(&mut self, id: Id) {
+        self.by_id.remove(&id);
+        self.in_order.retain(|handle| handle.id() != id);
+    }
+}
+
 impl Studies {
     /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
     pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        Self::at(since_epoch_ms, rooms, tracker)
+    }
+
+    /// As [`Studies::new`], with this clock.
+    fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         let places = Places::new(MAX_STUDIES, rooms.shares());
         Arc::new(Self {
             rooms,
+            now,
             tracker,
             stop: Stop::default(),
             table: Mutex::default(),
@@ -162,7 +178,7 @@ impl Studies {
         let header = StudyHeader {
             id: owner.room,
             settings,
-            created_at_ms: since_epoch_ms(),
+            created_at_ms: (self.now)(),
             owner: owner.hash(),
             key: random_bytes(),
         };
@@ -206,6 +222,30 @@ impl Studies {
             info!(studies = count, "studies resumed");
         }
         Ok(())
+    }
+
+    /// Deletes a study with all its data. Returns the numbers of its participants and games.
+    ///
+    /// # Errors
+    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
+    /// many.
+    pub async fn delete(
+        self: &Arc<Self>,
+        handle: Arc<StudyHandle>,
+        force: bool,
+    ) -> Result<Result<(usize, usize), usize>, Stopped> {
+        let studies = Arc::clone(self);
+        // Runs to completion even if the caller is cancelled.
+        let deleting = self.tracker.spawn(async move {
+            let games = match handle.delete(force).await? {
+                Ok(games) => games,
+                Err(active) => return Ok(Err(active)),
+            };
+            studies.lock().remove(handle.id());
+            let participants = handle.read(|study| study.participants().len());
+            Ok(Ok((participants, games)))
+        });
+        deleting.await.map_err(|_| Stopped)?
     }
 
     /// Stops beginning and counting games; those that end from here on count when the server is
@@ -274,7 +314,7 @@ impl Studies {
         table.in_order.push(Arc::clone(&handle));
         table.by_id.insert(handle.id(), Arc::clone(&handle));
         drop(table);
-        let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows);
+        let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), self.now, rows);
         self.tracker.spawn(task.run(inbox, self.stop.clone()));
         handle
     }

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_study::{Change, Refusal, Status, Study};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
 use super::handle::StudyHandle;
 use super::message::{Command, Message};
-use crate::clock::since_epoch_ms;
+use crate::clock::TimeOfDay;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use chefshat_room::ids::Id;
@@ -34,6 +34,7 @@ pub(super) struct Stop {
 pub(super) struct Task {
     pub(super) handle: Arc<StudyHandle>,
     pub(super) rooms: Arc<Rooms>,
+    pub(super) now: TimeOfDay,
     /// The state with pending changes; the handle's copy follows when they are committed.
     pub(super) state: Study,
     /// Number of committed rows.
@@ -56,11 +57,18 @@ pub(super) struct Task {
     pub(super) retry: Option<Instant>,
     /// Whether something visible has changed that is not committed.
     has_changed: bool,
+    /// Who waits for the deletion of the study, once that is requested.
+    deletion: Option<oneshot::Sender<Result<usize, usize>>>,
 }
 
 impl Task {
     /// Creates the task of a study with this number of committed rows.
-    pub(super) fn new(handle: Arc<StudyHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
+    pub(super) fn new(
+        handle: Arc<StudyHandle>,
+        rooms: Arc<Rooms>,
+        now: TimeOfDay,
+        rows: u64,
+    ) -> Self {
         let state = handle.committed().clone();
         let participants = state.participants();
         let playing = participants
@@ -73,6 +81,7 @@ impl Task {
         Self {
             handle,
             rooms,
+            now,
             rows,
             pending: Vec::new(),
             replies: Vec::new(),
@@ -83,11 +92,12 @@ impl Task {
             closing: BTreeSet::new(),
             retry: None,
             has_changed: false,
+            deletion: None,
             state,
         }
     }
 
-    /// Runs the study until the server ends or its store fails.
+    /// Runs the study until it is deleted, the server ends or its store fails.
     pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: Stop) {
         let rooms = Arc::clone(&self.rooms);
         let mut messages = Vec::new();
@@ -99,6 +109,14 @@ impl Task {
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
                 error!(study = %self.handle.id(), %error, "the store failed; the study stops");
                 return;
+            }
+            match self.delete_study().await {
+                Ok(false) => {}
+                Ok(true) => return,
+                Err(error) => {
+                    error!(study = %self.handle.id(), %error, "the store failed; the study stops");
+                    return;
+                }
             }
             let wake = self.wake_at();
             let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
@@ -118,7 +136,7 @@ impl Task {
 
     fn wake_at(&self) -> Option<Instant> {
         let by_core = self.state.wake_at().map(|at_ms| {
-            let wait = at_ms.saturating_sub(since_epoch_ms());
+            let wait = at_ms.saturating_sub((self.now)());
             Instant::now() + Duration::from_millis(wait)
         });
         by_core.into_iter().chain(self.retry).min()
@@ -132,6 +150,24 @@ impl Task {
                     // The caller may have gone.
                     let _ = reply.send(executed);
                 }));
+            }
+            Message::Delete { force, reply } => {
+                let participants = self.state.participants().iter();
+                let active = participants.filter(|(_, it)| it.status == Status::Active);
+                let active: Vec<u32> = active.map(|(number, _)| *number).collect();
+                if !active.is_empty() && !force {
+                    // The caller may have gone.
+                    let _ = reply.send(Err(active.len()));
+                    return;
+                }
+                let at_ms = (self.now)();
+                for number in active {
+                    self.fold(Change::Removed { number, at_ms });
+                }
+                if let Some(change) = self.state.close() {
+                    self.fold(change);
+                }
+                self.deletion = Some(reply);
             }
             Message::Present {
                 number,
@@ -154,13 +190,16 @@ impl Task {
     }
 
     fn execute(&mut self, command: Command) -> Result<u32, Refusal> {
-        let (changes, number) = command(&self.state, since_epoch_ms())?;
+        if self.deletion.is_some() {
+            return Err(Refusal::Closed);
+        }
+        let (changes, number) = command(&self.state, (self.now)())?;
         changes.into_iter().for_each(|change| self.fold(change));
         Ok(number)
     }
 
     fn set_connected(&mut self, number: u32, connected: bool) {
-        let now_ms = since_epoch_ms();
+        let now_ms = (self.now)();
         self.state.set_connected(number, connected, now_ms);
         (self.handle.committed()).set_connected(number, connected, now_ms);
         self.touched.insert(number);
@@ -182,7 +221,7 @@ impl Task {
             Change::Opened { number, .. } => {
                 // The stream of the earlier session ends.
                 self.streams.remove(number);
-                let now_ms = since_epoch_ms();
+                let now_ms = (self.now)();
                 self.state.set_connected(*number, false, now_ms);
                 (self.handle.committed()).set_connected(*number, false, now_ms);
             }
@@ -204,7 +243,7 @@ impl Task {
         loop {
             if !no_more_games {
                 self.read_ended_games().await?;
-                let now_ms = since_epoch_ms();
+                let now_ms = (self.now)();
                 while let Some(change) = self.state.next(now_ms) {
                     self.fold(change);
                 }
@@ -267,12 +306,43 @@ impl Task {
                 self.rooms.forget(Id(game.placed.room));
             }
             let count = ids.len();
-            store.delete(ids).await?;
+            self.delete_games(ids).await?;
             handle.lock_deleting().remove(&number);
             info!(study = %handle.id(), number, games = count, "the data of a participant were deleted");
             any = true;
         }
         Ok(any)
+    }
+
+    /// Deletes games with their samples.
+    async fn delete_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
+        let deleting = self.rooms.samples().delete(games.clone()).await;
+        deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
+        self.rooms.store().delete(games).await
+    }
+
+    /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
+    async fn delete_study(&mut self) -> Result<bool, StoreError> {
+        if self.deletion.is_none() || !self.playing.is_empty() {
+            return Ok(false);
+        }
+        let participants = self.state.participants().values();
+        let played: Vec<_> = participants.flat_map(|it| &it.games).collect();
+        for game in &played {
+            self.rooms.forget(Id(game.placed.room));
+        }
+        let games: Vec<Id> = played.iter().map(|game| Id(game.placed.game)).collect();
+        let count = games.len();
+        let store = self.rooms.store();
+        // The games first: a repetition completes what was interrupted in between.
+        self.delete_games(games).await?;
+        store.delete_study(self.handle.id()).await?;
+        info!(study = %self.handle.id(), games = count, "a study was deleted");
+        if let Some(reply) = self.deletion.take() {
+            // The caller may have gone.
+            let _ = reply.send(Ok(count));
+        }
+        Ok(true)
     }
 
     /// Whether a participant is in the middle of the study.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard};
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Pseudonym;
 use chefshat_tournament::{BeginProblem, Change, GameState, JoinProblem, State, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
@@ -165,6 +166,11 @@ impl TournamentHandle {
         Token::parse(token).is_some_and(|token| {
             token.room == self.header.id && self.header.owner.matches(&token.secret)
         })
+    }
+
+    /// Renames a participant; the store must have done so. Returns whether there was one.
+    pub(super) fn forget(&self, who: &Pseudonym) -> bool {
+        (self.committed().core).rename(&who.name, &who.pseudonym)
     }
 
     /// Who sees it and its games.

@@ -37,16 +37,18 @@ struct Board {
     ratings: Arc<Ratings<Identity>>,
     /// Number of games that had ended before.
     ended: u64,
+    /// Number of participants whose data had been deleted before.
+    forgotten: u64,
     /// When they were computed, and how long that took.
     at: Instant,
     took: Duration,
 }
 
 impl Board {
-    /// Whether it is still valid after this number of ended games.
-    fn is_current(&self, ended: u64) -> bool {
+    /// Whether it is still valid after these numbers of ended games and forgotten participants.
+    fn is_current(&self, ended: u64, forgotten: u64) -> bool {
         let rest = LEADERBOARD_AGE.max(self.took * LEADERBOARD_SHARE);
-        self.ended == ended || self.at.elapsed() < rest
+        self.forgotten == forgotten && (self.ended == ended || self.at.elapsed() < rest)
     }
 }
 
@@ -67,19 +69,21 @@ impl Leaderboard {
         let rooms = Arc::clone(&self.rooms);
         let work = async move {
             let (began, ended) = (Instant::now(), rooms.ended());
+            let forgotten = rooms.forgotten();
             let games = rated_games(rooms.store().as_ref()).await?;
             let folding = tokio::task::spawn_blocking(move || restored(games));
             Ok(Board {
                 ratings: Arc::new(folding.await?),
                 ended,
+                forgotten,
                 at: Instant::now(),
                 took: began.elapsed(),
             })
         };
-        let ended = self.rooms.ended();
+        let (ended, forgotten) = (self.rooms.ended(), self.rooms.forgotten());
         let board = self
             .known
-            .get(|board| board.is_current(ended), work)
+            .get(|board| board.is_current(ended, forgotten), work)
             .await?;
         Ok(Arc::clone(&board.ratings))
     }
@@ -150,6 +154,7 @@ mod tests {
         Board {
             ratings: Arc::default(),
             ended,
+            forgotten: 0,
             at: Instant::now(),
             took,
         }
@@ -158,18 +163,19 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_board_is_valid_until_it_is_old_and_games_have_ended() {
         let board = board(3, Duration::ZERO);
-        assert!(board.is_current(3) && board.is_current(4));
+        assert!(board.is_current(3, 0) && board.is_current(4, 0));
+        assert!(!board.is_current(3, 1), "it shows a name that was deleted");
         tokio::time::advance(LEADERBOARD_AGE).await;
-        assert!(board.is_current(3));
-        assert!(!board.is_current(4));
+        assert!(board.is_current(3, 0));
+        assert!(!board.is_current(4, 0));
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_board_that_took_long_is_valid_for_longer() {
         let board = board(3, LEADERBOARD_AGE);
         tokio::time::advance(LEADERBOARD_AGE * (LEADERBOARD_SHARE - 1)).await;
-        assert!(board.is_current(4));
+        assert!(board.is_current(4, 0));
         tokio::time::advance(LEADERBOARD_AGE).await;
-        assert!(!board.is_current(4));
+        assert!(!board.is_current(4, 0));
     }
 }

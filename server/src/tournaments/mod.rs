@@ -18,6 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use chefshat_record::convert::FieldProblem;
+use chefshat_record::pseudonym::Pseudonym;
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
 use tokio::sync::{Mutex as AsyncMutex, Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
@@ -286,6 +287,27 @@ impl Tournaments {
             .collect();
         let wanted = (earlier.into_iter()).filter(|(_, handle)| is_wanted(handle));
         wanted.take(count).collect()
+    }
+
+    /// Whether somebody of this name, other than a built-in agent, is in a tournament that is not
+    /// over.
+    pub fn is_playing(&self, name: &str) -> bool {
+        let all = self.newest(None, None, usize::MAX);
+        all.iter()
+            .any(|(_, handle)| !handle.is_over() && handle.read(|core| core.has_person(name)))
+    }
+
+    /// Renames a participant in the tournaments in memory that are over. Returns in how many.
+    pub async fn forget(&self, who: &Pseudonym) -> u64 {
+        let mut count = 0;
+        for (_, handle) in self.newest(None, None, usize::MAX) {
+            if handle.is_over() && handle.forget(who) {
+                handle.follower_update.clear().await;
+                handle.results.clear().await;
+                count += 1;
+            }
+        }
+        count
     }
 
     /// Adds a tournament to the table and starts its task.

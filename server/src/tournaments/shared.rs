@@ -57,6 +57,11 @@ impl<T> Default for Shared<T> {
 }
 
 impl<T: Send + Sync + 'static> Shared<T> {
+    /// Drops the last value.
+    pub(super) async fn clear(&self) {
+        *self.0.lock().await = None;
+    }
+
     /// Returns the last value if it is still `valid`, else computes it with `work`. Concurrent
     /// callers wait for that value and use it if it is valid for them.
     pub(super) async fn get(

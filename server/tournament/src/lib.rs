@@ -133,6 +133,24 @@ impl Tournament {
         &self.state.settings
     }
 
+    /// Whether a participant other than a built-in agent has this name.
+    pub fn has_person(&self, name: &str) -> bool {
+        let mut participants = self.state.participants.iter();
+        participants.any(|it| it.built_in.is_none() && it.name == name)
+    }
+
+    /// Gives participants of this name, other than built-in agents, another one, as if they had
+    /// joined under it. Returns whether there were any.
+    pub fn rename(&mut self, name: &str, to: &str) -> bool {
+        let participants = self.state.participants.iter_mut();
+        let mut any = false;
+        for entrant in participants.filter(|it| it.built_in.is_none() && it.name == name) {
+            to.clone_into(&mut entrant.name);
+            any = true;
+        }
+        any
+    }
+
     /// The participants, by number.
     pub fn participants(&self) -> &[Entrant] {
         &self.state.participants

@@ -34,6 +34,7 @@ mod spectators;
 mod stops;
 mod stranger;
 mod studies;
+mod study_calls;
 mod table_bridge;
 mod terminal;
 mod tmux;

@@ -54,9 +54,9 @@ const STEPS: u32 = 5;
 
 /// A connection of participants to the server, whose address may change, that records what they
 /// receive.
-struct Tap {
+pub(crate) struct Tap {
     address: SocketAddr,
-    target: Arc<Mutex<SocketAddr>>,
+    pub(crate) target: Arc<Mutex<SocketAddr>>,
     /// The bytes of each connection.
     received: Received,
 }
@@ -64,7 +64,7 @@ struct Tap {
 type Received = Arc<Mutex<Vec<Vec<u8>>>>;
 
 impl Tap {
-    async fn new(target: SocketAddr) -> Self {
+    pub(crate) async fn new(target: SocketAddr) -> Self {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
         let listener = listener.expect("a free port");
         let address = listener.local_addr().expect("bound");
@@ -117,7 +117,7 @@ async fn forward(client: TcpStream, address: SocketAddr, received: Received) {
     tokio::join!(up, down);
 }
 
-async fn host(folder: &Path) -> Host {
+pub(crate) async fn host(folder: &Path) -> Host {
     let store = SqliteStore::open(folder).await.expect("a store");
     let config = ServerConfig {
         data_dir: Some(PathBuf::from(folder)),
@@ -128,7 +128,7 @@ async fn host(folder: &Path) -> Host {
     host.expect("a free port")
 }
 
-fn address(host: &Host) -> SocketAddr {
+pub(crate) fn address(host: &Host) -> SocketAddr {
     let url = host.url();
     let address = url.trim_start_matches("http://").parse();
     address.expect("an address")
@@ -160,7 +160,7 @@ fn condition(temperament: &str, robot: &str, agent: &str, behaviour: &str) -> v1
     }
 }
 
-fn settings() -> v1::StudySettings {
+pub(crate) fn settings() -> v1::StudySettings {
     v1::StudySettings {
         name: "warmth-study-2031".to_owned(),
         title: "A game of cards".to_owned(),
@@ -197,7 +197,7 @@ fn settings() -> v1::StudySettings {
 }
 
 /// A participant with a device of its own.
-struct Person {
+pub(crate) struct Person {
     service: ParticipationServiceClient<Channel>,
     client: Client,
     link: String,
@@ -205,7 +205,7 @@ struct Person {
 }
 
 impl Person {
-    async fn new(tap: &Tap, link: &str) -> (Self, v1::StudyView) {
+    pub(crate) async fn new(tap: &Tap, link: &str) -> (Self, v1::StudyView) {
         let url = tap.url();
         let endpoint = Channel::from_shared(url.clone()).expect("a URL");
         let mut person = Self {
@@ -220,7 +220,7 @@ impl Person {
         (person, view)
     }
 
-    async fn open(&mut self) -> Result<v1::StudyView, Status> {
+    pub(crate) async fn open(&mut self) -> Result<v1::StudyView, Status> {
         let link = self.link.clone();
         let opened = self
             .service
@@ -232,7 +232,7 @@ impl Person {
     }
 
     /// What is shown, once it is what is wanted.
-    async fn until(&mut self, wanted: impl Fn(&Content) -> bool) -> v1::StudyView {
+    pub(crate) async fn until(&mut self, wanted: impl Fn(&Content) -> bool) -> v1::StudyView {
         let session = self.session.clone();
         let request = v1::FollowParticipationRequest { session };
         let following = async {
@@ -317,7 +317,7 @@ impl Person {
     }
 
     /// Does everything until a step is reached. Returns the view and the tickets of its games.
-    async fn go_on(
+    pub(crate) async fn go_on(
         &mut self,
         mut view: v1::StudyView,
         until_step: u32,
@@ -333,7 +333,7 @@ impl Person {
 }
 
 /// The game of a view, if it has a room.
-fn playable(content: &Content) -> Option<&v1::StudyShownGame> {
+pub(crate) fn playable(content: &Content) -> Option<&v1::StudyShownGame> {
     match content {
         Content::Game(game) if !game.ticket.is_empty() => Some(game),
         _ => None,
@@ -357,15 +357,15 @@ fn reason(status: &Status) -> String {
 }
 
 /// The researcher.
-struct Lab {
-    service: StudyServiceClient<Channel>,
+pub(crate) struct Lab {
+    pub(crate) service: StudyServiceClient<Channel>,
     records: RecordServiceClient<Channel>,
-    study_id: String,
-    owner_token: String,
+    pub(crate) study_id: String,
+    pub(crate) owner_token: String,
 }
 
 impl Lab {
-    async fn connect(host: &Host, (study_id, owner_token): (String, String)) -> Self {
+    pub(crate) async fn connect(host: &Host, (study_id, owner_token): (String, String)) -> Self {
         let channel = Channel::from_shared(host.url().to_owned()).expect("a URL");
         let channel = channel.connect().await.expect("the server listens");
         Self {
@@ -376,7 +376,7 @@ impl Lab {
         }
     }
 
-    async fn links(&mut self, pseudonyms: Vec<String>) -> Vec<String> {
+    pub(crate) async fn links(&mut self, pseudonyms: Vec<String>) -> Vec<String> {
         let request = v1::AddStudyParticipantsRequest {
             study_id: self.study_id.clone(),
             owner_token: self.owner_token.clone(),
@@ -388,7 +388,7 @@ impl Lab {
         links.into_iter().map(|link| link.link).collect()
     }
 
-    async fn participants(&mut self) -> Vec<v1::StudyParticipant> {
+    pub(crate) async fn participants(&mut self) -> Vec<v1::StudyParticipant> {
         let request = v1::GetStudyRequest {
             study_id: self.study_id.clone(),
             owner_token: self.owner_token.clone(),

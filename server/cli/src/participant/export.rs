@@ -1,38 +1,31 @@
-//! `chefshat participant export`: writes a participant's data as JSON Lines, without what others
-//! did in the same games.
+//! `chefshat participant export`: writes a participant's data as JSON Lines.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1;
 use chefshat_record::atomic_file::AtomicFile;
-use chefshat_record::pseudonym::ParticipantSeats;
-use chefshat_record::replay::replay;
-use chefshat_record::summary::summary;
-use chefshat_tournament::Change;
+use chefshat_server::participants::Skipped;
 use clap::Args;
 use serde_json::{Value, json};
+use tokio::sync::mpsc;
 
+use super::super::admin::{refused, service};
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
-use super::stored::{Skipped, Who, records_with};
-use chefshat_room::ids::Id;
-use chefshat_server::convert;
-use chefshat_server::store::tournaments::TournamentEntry;
-use chefshat_server::store::{Part, SqliteStore, Store};
+use super::who::{Who, check};
+use crate::connect::ServerArg;
 
 const HELP: &str = "\
 The first line says whose data these are. Then, for each game that is over: a line `game` (when, the room, its rules, the seat, the \
 place), a line `decision` for each of the participant's decisions with its times and annotations, a line `expression` for each of its \
-expressions. Then a line `tournament` for each tournament it joined. docs/playing.md describes the fields. The server must be stopped.
+expressions. Then a line `tournament` for each tournament it joined, and for each study with a participant of this name a line `study`, with lines `answer` and \
+`trace`. docs/playing.md describes the fields. Name a running server with --server; without it, the server must be stopped.
 
 Examples:
+  chefshat participant export P07 --out p07.jsonl --server http://127.0.0.1:50051
   chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data
   chefshat participant export \"Rosa L.\" --out rosa.jsonl --json";
-
-/// Page size of the list of records.
-const AT_A_TIME: usize = 100;
 
 /// Export everything stored about a participant as JSON Lines.
 #[derive(Debug, Args)]
@@ -51,193 +44,136 @@ pub(super) struct Export {
     json: bool,
 }
 
-/// The lines to write, and their counts.
-#[derive(Default)]
+/// The file and the counts of its lines.
 struct Sheet {
-    lines: Vec<Value>,
+    file: AtomicFile,
     games: u64,
     tournaments: u64,
+    studies: u64,
     decisions: u64,
     expressions: u64,
-    skipped: Skipped,
+}
+
+impl Sheet {
+    fn add(&mut self, line: &str) -> Result<(), CommandError> {
+        self.file.write_all(line.as_bytes())?;
+        self.file.write_all(b"\n")?;
+        let line: Value = serde_json::from_str(line)?;
+        for (kind, count) in [
+            ("game", &mut self.games),
+            ("tournament", &mut self.tournaments),
+            ("study", &mut self.studies),
+            ("decision", &mut self.decisions),
+            ("expression", &mut self.expressions),
+        ] {
+            *count += u64::from(line.get(kind).is_some());
+        }
+        Ok(())
+    }
+
+    fn has_any(&self) -> bool {
+        self.games + self.tournaments + self.studies > 0
+    }
 }
 
 impl Export {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let data_dir = self.who.data_dir()?;
         if self.out.exists() && !self.force {
             let out = self.out.display();
             return Err(format!("{out} exists already; --force replaces it").into());
         }
-        let store = SqliteStore::open(&data_dir).await?;
-        let gathered = gather(&store, &data_dir, &self.who.name).await;
-        store.close().await;
-        let sheet = gathered?;
-        if sheet.games + sheet.tournaments == 0 {
-            sheet.skipped.check(&self.who.name)?;
-            let name = &self.who.name;
+        let name = &self.who.name;
+        let mut sheet = Sheet {
+            file: AtomicFile::create(&self.out)?,
+            games: 0,
+            tournaments: 0,
+            studies: 0,
+            decisions: 0,
+            expressions: 0,
+        };
+        let skipped = match self.who.server() {
+            Some(server) => from_server(&server, name, &mut sheet).await?,
+            None => from_folder(&self.who, &mut sheet).await?,
+        };
+        if !sheet.has_any() {
+            check(&skipped, name)?;
             return Err(format!(
                 "nothing is stored about {name:?} in {}: give the exact name the participant played under",
-                data_dir.display()
+                self.who.place()?
             )
             .into());
         }
-        let mut file = AtomicFile::create(&self.out)?;
-        let head = json!({ "participant": { "format_version": 1, "name": self.who.name, "server_version": env!("CARGO_PKG_VERSION") } });
-        for line in std::iter::once(&head).chain(&sheet.lines) {
-            file.write_all(line.to_string().as_bytes())?;
-            file.write_all(b"\n")?;
-        }
-        file.finish()?;
+        sheet.file.finish()?;
         if self.json {
             say(json!({
                 "out": self.out.display().to_string(),
                 "games": sheet.games,
                 "tournaments": sheet.tournaments,
+                "studies": sheet.studies,
                 "decisions": sheet.decisions,
                 "expressions": sheet.expressions,
             }))?;
         } else {
             say(format_args!(
-                "{}: {}, {}, {}, {}",
+                "{}: {}, {}, {}, {}, {}",
                 self.out.display(),
                 counted(sheet.games, "game"),
                 counted(sheet.decisions, "decision"),
                 counted(sheet.expressions, "expression"),
                 counted(sheet.tournaments, "tournament"),
+                match sheet.studies {
+                    1 => "1 study".to_owned(),
+                    count => format!("{count} studies"),
+                },
             ))?;
         }
-        sheet.skipped.check(&self.who.name)?;
+        check(&skipped, name)?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Everything stored about a name.
-async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Sheet, CommandError> {
-    let mut sheet = Sheet::default();
-    let mut known = BTreeSet::new();
-    let filter = v1::RecordFilter {
-        participant: name.to_owned(),
-        ..v1::RecordFilter::default()
+/// Lines that wait to be written.
+const LINES: usize = 64;
+
+async fn from_folder(who: &Who, sheet: &mut Sheet) -> Result<Skipped, CommandError> {
+    who.with_data(async |data| {
+        let (sender, mut lines) = mpsc::channel(LINES);
+        let exporting = async {
+            let exported = data.export(&who.name, &sender).await;
+            drop(sender);
+            exported
+        };
+        let sheet = &mut *sheet;
+        // The lines are dropped when writing fails, so that nothing more is gathered.
+        let writing = async move {
+            while let Some(line) = lines.recv().await {
+                sheet.add(&line)?;
+            }
+            Ok::<_, CommandError>(())
+        };
+        let (exported, written) = tokio::join!(exporting, writing);
+        written?;
+        Ok(exported?)
+    })
+    .await
+}
+
+async fn from_server(
+    server: &ServerArg,
+    name: &str,
+    sheet: &mut Sheet,
+) -> Result<Skipped, CommandError> {
+    let request = v1::ExportParticipantRequest {
+        name: name.to_owned(),
     };
-    let mut after = 0;
-    loop {
-        let found = store.list(&filter, Part::After(after), AT_A_TIME).await?;
-        let Some((last, _)) = found.last() else { break };
-        after = *last;
-        for (_, summary) in found {
-            if let Some(game) = Id::parse(&summary.game_id)
-                && let Some(stored) = store.finished(game).await?
-            {
-                sheet.add_game(&summary, &convert::lines_of(&stored), name);
-            }
-            known.insert(summary.game_id);
+    let exported = service(server).await?.export_participant(request).await;
+    let mut responses = exported.map_err(refused)?.into_inner();
+    let mut skipped = Skipped::default();
+    while let Some(mut response) = responses.message().await.map_err(refused)? {
+        if !response.line.is_empty() {
+            sheet.add(&response.line)?;
         }
+        skipped.named.append(&mut response.unread_files);
     }
-    // Imported records may exist as files only.
-    for candidate in records_with(data_dir, name)? {
-        let Some(lines) = sheet.skipped.read(&candidate) else {
-            continue;
-        };
-        let replayed = match replay(&lines) {
-            Ok(replayed) => replayed,
-            Err(error) => {
-                let why = format!("{}: {error}", candidate.path.display());
-                sheet.skipped.note(&candidate, why);
-                continue;
-            }
-        };
-        if let Some(summary) = summary(&lines, &replayed)
-            && known.insert(summary.game_id.clone())
-        {
-            sheet.add_game(&summary, &lines, name);
-        }
-    }
-    for tournament in store.tournaments(usize::MAX).await? {
-        for entry in &tournament.entries {
-            if let TournamentEntry::Change(
-                Change::Joined(entrant) | Change::Replaced { by: entrant, .. },
-            ) = entry
-                && entrant.built_in.is_none()
-                && entrant.name == name
-            {
-                sheet.tournaments += 1;
-                sheet.lines.push(json!({ "tournament": {
-                    "tournament_id": tournament.header.id.to_string(),
-                    "name": tournament.header.settings.name,
-                    "created_at_ms": tournament.header.created_at_ms,
-                    "stateless": entrant.stateless,
-                } }));
-            }
-        }
-    }
-    Ok(sheet)
-}
-
-impl Sheet {
-    /// Adds what the participant did in a game, if it took part.
-    fn add_game(&mut self, summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &str) {
-        let game_id = &summary.game_id;
-        let mut own = ParticipantSeats::at_start(lines, name);
-        let mut rest = Vec::new();
-        let (mut decisions, mut expressions) = (0, 0);
-        for line in lines.iter().filter_map(|line| line.line.as_ref()) {
-            match line {
-                Line::Decision(decision) if own.has(decision.seat) => {
-                    decisions += 1;
-                    rest.push(json!({ "decision": decision, "game_id": game_id }));
-                }
-                Line::PrivateExpression(private) if own.has(private.seat) => {
-                    expressions += 1;
-                    rest.push(expression(
-                        game_id,
-                        private.elapsed_ms,
-                        private.expression.as_ref(),
-                    ));
-                }
-                Line::Event(event) => {
-                    own.follow(event, name);
-                    if let Some(Kind::ExpressionShown(shown)) = &event.kind
-                        && own.has(shown.seat)
-                    {
-                        expressions += 1;
-                        rest.push(expression(
-                            game_id,
-                            event.elapsed_ms,
-                            shown.expression.as_ref(),
-                        ));
-                    }
-                }
-                _ => {}
-            }
-        }
-        let seats: Vec<&v1::Participant> = (summary.seats.iter())
-            .filter(|seat| seat.built_in_agent.is_empty() && seat.name == name)
-            .collect();
-        if seats.is_empty() && rest.is_empty() {
-            return;
-        }
-        let results: Vec<&v1::Standing> = (summary.standings.iter())
-            .filter(|standing| seats.iter().any(|seat| seat.seat == standing.seat))
-            .collect();
-        self.games += 1;
-        self.decisions += decisions;
-        self.expressions += expressions;
-        self.lines.push(json!({ "game": {
-            "game_id": game_id,
-            "room_name": summary.room_name,
-            "state": summary.state().as_str_name(),
-            "created_at_ms": summary.created_at_ms,
-            "ended_at_ms": summary.ended_at_ms,
-            "tournament_id": summary.tournament_id,
-            "rules": summary.rules,
-            "seats": seats,
-            "results": results,
-        } }));
-        self.lines.append(&mut rest);
-    }
-}
-
-fn expression(game_id: &str, elapsed_ms: u64, expression: Option<&v1::Expression>) -> Value {
-    json!({ "expression": expression, "elapsed_ms": elapsed_ms, "game_id": game_id })
+    Ok(skipped)
 }

@@ -1,9 +1,9 @@
-//! `chefshat participant`: exports or deletes a participant's data in a data directory. The server
-//! must be stopped. `chefshat-record` changes the records, [`chefshat_server::store`] the database.
+//! `chefshat participant`: exports or deletes a participant's data, in the data directory of a
+//! server that is stopped, or on a running one. [`chefshat_server::participants`] does it.
 
 mod delete;
 mod export;
-mod stored;
+mod who;
 
 use std::process::ExitCode;
 
@@ -14,7 +14,7 @@ use super::CommandError;
 /// Export or delete a participant's data.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data\n  \
+    after_help = "Examples:\n  chefshat participant export P07 --out p07.jsonl --server http://127.0.0.1:50051\n  \
                   chefshat participant delete P07 --data-dir ./chefshat-data"
 )]
 pub(super) struct ParticipantCommand {

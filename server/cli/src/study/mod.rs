@@ -1,5 +1,6 @@
-//! `chefshat study`: creates studies with people, adds participants, follows, exports and closes
-//! them, and deletes the data of participants. The server assigns conditions and runs the games.
+//! `chefshat study`: creates studies with people, adds participants, follows, exports, closes and
+//! deletes them, and deletes the data of participants. The server assigns conditions and runs the
+//! games.
 
 mod connection;
 mod file;
@@ -51,6 +52,8 @@ enum StudyAction {
     Remove(owner::Remove),
     /// Delete the data of a participant.
     DeleteParticipant(owner::DeleteParticipant),
+    /// Delete a study with all its data.
+    Delete(owner::Delete),
 }
 
 impl StudyCommand {
@@ -65,6 +68,7 @@ impl StudyCommand {
             StudyAction::Close(command) => command.close().await?,
             StudyAction::Remove(command) => command.run().await?,
             StudyAction::DeleteParticipant(command) => command.run().await?,
+            StudyAction::Delete(command) => command.run().await?,
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -11,6 +11,7 @@ use serde_json::json;
 
 use super::connection::{refused, service};
 use crate::connect::{OwnerArgs, ServerArg};
+use crate::numbers::counted;
 use crate::{CommandError, say};
 
 /// A study and the proof of ownership.
@@ -98,6 +99,46 @@ pub(super) struct DeleteParticipant {
     /// Number of the participant.
     #[arg(value_name = "NUMBER")]
     number: u32,
+}
+
+/// Delete a study with all its data: answers, traces, and games with their records. Export it
+/// first.
+#[derive(Debug, Args)]
+pub(super) struct Delete {
+    #[command(flatten)]
+    owned: Owned,
+    /// Remove participants who are in the middle of the study, and close their games.
+    #[arg(long)]
+    force: bool,
+    /// Confirm that the study is to be deleted. This cannot be undone.
+    #[arg(long)]
+    yes: bool,
+}
+
+impl Delete {
+    pub(super) async fn run(self) -> Result<(), CommandError> {
+        if !self.yes {
+            return Err("nothing was changed: confirm with --yes".into());
+        }
+        let owned = self.owned;
+        let mut service = service(&owned.server).await?;
+        let request = v1::DeleteStudyRequest {
+            study_id: owned.study_id.clone(),
+            owner_token: owned.owner.token()?,
+            force: self.force,
+        };
+        let deleted = service.delete_study(request).await.map_err(refused)?;
+        let deleted = deleted.into_inner();
+        match owned.json {
+            true => say(json!({"event": "deleted", "study": deleted})),
+            false => say(format_args!(
+                "study {} is deleted, with {} and {}",
+                owned.study_id,
+                counted(deleted.participants.into(), "participant"),
+                counted(deleted.games.into(), "game"),
+            )),
+        }
+    }
 }
 
 impl List {

@@ -1,5 +1,5 @@
-//! `chefshat participant` on the data folder of a server: exports, what remains after a deletion,
-//! and refusals.
+//! `chefshat participant` on the data folder of a server and on a running one: exports, what
+//! remains after a deletion, and refusals.
 
 use std::path::Path;
 
@@ -191,6 +191,86 @@ fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
 
     let again = participant(&["delete", NAME, "--yes"], &data_dir);
     again.assert_failed("nothing is stored");
+}
+
+#[test]
+fn a_participant_is_exported_and_deleted_while_the_server_runs() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().join("data");
+    let dir = data_dir.to_str().unwrap();
+    let token = chefshat(&["token", "create", "--role", "admin", "--data-dir", dir]);
+    let token = token.well().stdout.trim().to_owned();
+    let (server, url) = serve_with(&data_dir, &["--access", "open"]);
+    let on_server = |arguments: &[&str]| {
+        let place = ["--server", &url, "--token", &token];
+        chefshat(&[&["participant"], arguments, &place].concat())
+    };
+    let out = folder.path().join("out.jsonl");
+    let export = ["export", NAME, "--out", out.to_str().unwrap(), "--json"];
+    let delete = ["delete", NAME, "--yes", "--json"];
+    on_server(&export).assert_failed("nothing is stored under this name");
+    assert!(!out.exists());
+    let nothing = on_server(&delete);
+    assert_eq!(
+        (nothing.code, &nothing.json()["games"]),
+        (Some(1), &json!(0))
+    );
+
+    let (game_id, room_id) = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let game_id = play_game(&client).await;
+        play_tournament(&client).await;
+        let made = client.create_room(v1::CreateRoomRequest::default()).await;
+        let made = made.unwrap();
+        client.join_with_code(made.join_code, NAME).await.unwrap();
+        (game_id, made.room.unwrap().room_id)
+    });
+    on_server(&delete).assert_failed("a game that is not over; nothing was changed");
+    let close = [
+        "admin", "close", "room", &room_id, "--server", &url, "--token", &token,
+    ];
+    chefshat(&close).well();
+
+    let told = on_server(&export).well().json();
+    check_export(&std::fs::read_to_string(&out).unwrap(), &game_id, &told);
+    on_server(&["delete", NAME]).assert_refused("confirm with --yes");
+    let refused = ["participant", "delete", NAME, "--yes", "--server", &url];
+    chefshat(&refused).assert_failed("token");
+    let deleted = on_server(&delete).well().json();
+    let pseudonym = deleted["pseudonym"].as_str().unwrap();
+    assert_eq!(deleted["tournaments"], json!(1));
+    assert!(deleted["games"].as_u64() >= Some(2), "{deleted}");
+    assert_eq!(deleted["annotations"], exported_annotations(&out));
+
+    // Nothing that the server shows has the name any more.
+    in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let rooms = client.list_rooms(v1::ListRoomsRequest::default()).await;
+        let tournaments = client
+            .list_tournaments(v1::ListTournamentsRequest::default())
+            .await
+            .unwrap();
+        let id = tournaments.tournaments[0].tournament_id.clone();
+        let shown = [
+            format!("{:?}", rooms.unwrap()),
+            format!("{:?}", client.record(&game_id).await.unwrap()),
+            format!("{:?}", client.tournament(id.as_str()).await.unwrap()),
+        ];
+        for text in &shown {
+            assert!(!text.contains(NAME), "{text}");
+        }
+        assert!(shown[1].contains(pseudonym) && shown[2].contains(pseudonym));
+    });
+    let board = run(&url, "leaderboard --json").well();
+    assert!(!board.stdout.contains(NAME), "{}", board.stdout);
+    let nothing = on_server(&delete);
+    assert_eq!(
+        (nothing.code, &nothing.json()["games"]),
+        (Some(1), &json!(0))
+    );
+    drop(server);
+    assert!(assert_nowhere(&data_dir, NAME) > 2);
+    verify(&data_dir);
 }
 
 /// The export has all data of the participant and none of the other.

@@ -5,7 +5,7 @@ use chefshat_proto::v1;
 use super::rules::FieldProblem;
 
 /// The longest label, characters.
-const MAX_LABEL: usize = 128;
+pub(crate) const MAX_LABEL: usize = 128;
 /// How long after it was received a marker's moment may be, microseconds; and the millisecond to
 /// which the time of receiving is rounded.
 const MAX_AHEAD_US: u64 = 1_001_000;

@@ -16,6 +16,7 @@ pub use events::{By, event_from_proto, event_kind, final_table, special_to_proto
 pub(crate) use expression::LAST_MS;
 pub use expression::check_expression;
 pub use kind::{has_real_cards, kind_from_name, kind_name};
+pub(crate) use marker::MAX_LABEL;
 pub use marker::{check_label, check_marker};
 pub(crate) use numbers::action_id;
 pub use numbers::{cards_from_numbers, seat_cards, seat_from_number, seat_number};

@@ -15,7 +15,9 @@ use chefshat_engine::ActionId;
 use chefshat_proto::v1;
 use prost::Message as _;
 
-pub(super) use entry::{entries_to_bytes, put_entries, put_entry, read_entries};
+#[cfg(test)]
+pub(super) use entry::put_entry;
+pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes, stored_header};
 pub(super) use signed::{signed_from_bytes, signed_to_bytes};
 pub(super) use study::{

@@ -12,9 +12,11 @@ use sqlx::postgres::PgConnection;
 use sqlx::{Connection as _, Row as _};
 
 use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole};
+use super::forget::rewrite;
 use super::values::{Owned, integer, text};
 use super::writer::{Answers, Work, confirming};
 use crate::store::StoreError;
+use crate::store::forget::Rewrite;
 use crate::store::form::FORM;
 use chefshat_room::ids::Id;
 
@@ -55,6 +57,8 @@ pub(super) enum Command {
     RecordWritten { game_id: Id },
     /// Deletes finished games.
     Delete { games: Vec<Id> },
+    /// Removes a participant from games and tournaments that are over.
+    Rewrite(Rewrite),
     /// Creates a tournament with its first row.
     Tournament {
         id: Id,
@@ -135,6 +139,10 @@ impl Command {
                 return Ok(Ok(0));
             }
             Self::Delete { games } => return delete(connection, games).await.map(Ok),
+            Self::Rewrite(changes) => {
+                rewrite(connection, changes).await?;
+                return Ok(Ok(0));
+            }
             Self::Tournament { .. } => return self.create_tournament(connection, again).await,
             Self::TournamentEntries {
                 owned,

@@ -1,7 +1,7 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
-//! reads, `journals`, `appends`, `commands` and `ends` write through `writer`, `cluster`, `claims`,
-//! `handover` and `owned` are about nodes and what they own, `transfer` moves an SQLite database
-//! here, `form` (beside this folder) encodes; this file joins them into a store.
+//! reads, `journals`, `appends`, `commands`, `ends` and `forget` write through `writer`, `cluster`,
+//! `claims`, `handover` and `owned` are about nodes and what they own, `transfer` moves an SQLite
+//! database here, `form` (beside this folder) encodes; this file joins them into a store.
 
 mod appends;
 mod claims;
@@ -9,6 +9,7 @@ mod cluster;
 mod commands;
 mod ends;
 mod errors;
+mod forget;
 mod handover;
 mod journals;
 mod open;
@@ -27,6 +28,7 @@ use std::time::Duration;
 
 use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Pseudonym;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
@@ -42,7 +44,9 @@ use super::codec::Codec;
 use super::ephemeral::EphemeralJournal;
 use super::form;
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame};
+use super::{
+    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame,
+};
 use crate::metrics::StoreMetrics;
 use appends::Row;
 use chefshat_room::ids::Id;
@@ -345,6 +349,17 @@ impl Store for PostgresStore {
         async move {
             let delete = Command::Delete { games };
             self.commands.commit(Arc::new(delete)).await.map(drop)
+        }
+        .boxed()
+    }
+
+    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+        async move {
+            let rewrite = self.reader.forgetting(who).await?;
+            let forgotten = rewrite.forgotten.clone();
+            let rewrite = Command::Rewrite(rewrite);
+            self.commands.commit(Arc::new(rewrite)).await?;
+            Ok(forgotten)
         }
         .boxed()
     }

@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Pseudonym;
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
@@ -29,7 +30,6 @@ use tracing::error;
 pub use backup::{DatabaseCopy, check_copy, copy_database};
 pub(in crate::store) use contents::{Contents, GameRow, JournalRow, ParticipantRow, TournamentRow};
 pub use errors::FILE as DATABASE_FILE;
-pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::{LOCK_FILE, OpenError};
 
 use super::codec::Codec;
@@ -37,7 +37,9 @@ use super::ephemeral::EphemeralJournal;
 use super::form;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use super::{DiskUsage, Journal, Part, ResumableGame, Store, StoreError, StoredGame};
+use super::{
+    DiskUsage, ForgetError, Forgotten, Journal, Part, ResumableGame, Store, StoreError, StoredGame,
+};
 use crate::metrics::StoreMetrics;
 use crate::store::Keep;
 use chefshat_room::ids::Id;
@@ -244,6 +246,18 @@ impl Store for SqliteStore {
         self.commands.send(WriteCommand::Delete { games }).boxed()
     }
 
+    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+        async move {
+            let rewrite = self.reader.forgetting(who).await?;
+            let forgotten = rewrite.forgotten.clone();
+            self.commands
+                .send(WriteCommand::Rewrite(Box::new(rewrite)))
+                .await?;
+            Ok(forgotten)
+        }
+        .boxed()
+    }
+
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         self.reader.without_record_file().boxed()
     }
@@ -316,6 +330,12 @@ impl Store for SqliteStore {
         let row = study_row(study, 0, &changes);
         let rewritten = WriteCommand::StudyRewritten { row, forgotten };
         self.commands.send(rewritten).boxed()
+    }
+
+    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.commands
+            .send(WriteCommand::StudyDeleted(study))
+            .boxed()
     }
 
     fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {

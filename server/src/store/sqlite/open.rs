@@ -150,7 +150,9 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
         .create_if_missing(true)
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
-        .foreign_keys(true);
+        .foreign_keys(true)
+        // What is deleted, such as a participant's data, is overwritten.
+        .pragma("secure_delete", "on");
     let mut writer = SqliteConnection::connect_with(&options)
         .await
         .map_err(failed)?;

@@ -1,7 +1,6 @@
 //! The database returns what was stored. `opening` tests folders and files that cannot be used.
 
 mod damage;
-mod forget;
 mod opening;
 pub(in crate::store) mod tournaments;
 

@@ -15,10 +15,12 @@ use tokio::time::Instant;
 use tracing::{error, warn};
 
 use super::errors::explain;
+use super::forget::{empty_log, rewrite};
 use super::rows::with_own_rows;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
+use crate::store::forget::Rewrite;
 use crate::store::form::{self, FORM};
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
@@ -89,6 +91,8 @@ pub(super) enum WriteCommand {
     StudyChanges(StudyRow),
     /// Replaces the rows of a study by one and deletes the interface traces of a participant.
     StudyRewritten { row: StudyRow, forgotten: u32 },
+    /// Deletes a study.
+    StudyDeleted(Id),
     /// Adds interface traces.
     Traces {
         study: Id,
@@ -96,6 +100,8 @@ pub(super) enum WriteCommand {
         game: Id,
         traces: Vec<u8>,
     },
+    /// Removes a participant from games and tournaments that are over.
+    Rewrite(Box<Rewrite>),
     /// No command follows.
     Close,
 }
@@ -182,6 +188,15 @@ pub(super) async fn run(
         metrics.committed(pending.len(), began.elapsed());
         let deletes = |(order, _): &Pending| matches!(order, WriteCommand::Delete { .. });
         let frees_pages = committed.is_ok() && pending.iter().any(deletes);
+        let forgets = |(order, _): &Pending| {
+            matches!(
+                order,
+                WriteCommand::Rewrite(_)
+                    | WriteCommand::StudyRewritten { .. }
+                    | WriteCommand::StudyDeleted(_)
+            )
+        };
+        let forgotten = committed.is_ok() && pending.iter().any(forgets);
         for (index, (_, reply)) in pending.drain(..).enumerate() {
             let answer = match &committed {
                 Ok(taken) => taken
@@ -194,6 +209,9 @@ pub(super) async fn run(
         }
         if frees_pages {
             free_pages(&mut connection).await;
+        }
+        if forgotten {
+            empty_log(&mut connection).await;
         }
     }
     // The write-ahead log is as safe as the database: closing only tidies up.
@@ -360,6 +378,7 @@ async fn write(
                 forget_in_study(connection, row.id, *forgotten).await?;
                 change_study(connection, row).await?;
             }
+            WriteCommand::StudyDeleted(study) => delete_study(connection, *study).await?,
             WriteCommand::Traces {
                 study,
                 participant,
@@ -368,7 +387,7 @@ async fn write(
             } => {
                 sqlx::query(
                     "INSERT INTO study_traces (study, participant, game_id, traces)
-                     VALUES ((SELECT number FROM studies WHERE study_id = $1), $2, $3, $4)",
+                     SELECT number, $2, $3, $4 FROM studies WHERE study_id = $1",
                 )
                 .bind(study.0.as_slice())
                 .bind(*participant)
@@ -382,6 +401,7 @@ async fn write(
                     delete(connection, *game).await?;
                 }
             }
+            WriteCommand::Rewrite(changes) => rewrite(connection, changes).await?,
             WriteCommand::RecordWritten { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
                     .bind(game_id.0.as_slice())
@@ -502,7 +522,7 @@ async fn move_tournament(
 async fn change_study(connection: &mut SqliteConnection, row: &StudyRow) -> sqlx::Result<()> {
     sqlx::query(
         "INSERT INTO study_changes (study, position, changes)
-         VALUES ((SELECT number FROM studies WHERE study_id = $1), $2, $3)",
+         SELECT number, $2, $3 FROM studies WHERE study_id = $1",
     )
     .bind(row.id.0.as_slice())
     .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
@@ -510,6 +530,21 @@ async fn change_study(connection: &mut SqliteConnection, row: &StudyRow) -> sqlx
     .execute(connection)
     .await
     .map(drop)
+}
+
+/// Deletes a study. What is still added to it afterwards has no effect.
+async fn delete_study(connection: &mut SqliteConnection, study: Id) -> sqlx::Result<()> {
+    for text in [
+        "DELETE FROM study_traces WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
+        "DELETE FROM study_changes WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
+        "DELETE FROM studies WHERE study_id = $1",
+    ] {
+        sqlx::query(text)
+            .bind(study.0.as_slice())
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(())
 }
 
 /// Deletes the journal of a study, which is written again, and the interface traces of a

@@ -25,6 +25,7 @@ export const faults: Texts["faults"] = {
     CLIENT_HAS_SEAT: "Du hast in diesem Raum schon einen Platz, und alle dürfen nur einen nehmen.",
     GAME_STARTED: "Die Partie hat schon begonnen. Du kannst zuschauen.",
     GAME_OVER: "Die Partie ist zu Ende.",
+    SEAT_ASSIGNED: "Dieser Platz gehört zur Studie. Zurückziehen kannst du dich auf der Seite der Studie.",
     GAME_NOT_STARTED: "Die Partie hat noch nicht begonnen.",
     GAME_NOT_PHYSICAL: "Diese Partie wird nicht mit echten Karten gespielt.",
     NO_PHYSICAL_TABLES:
@@ -99,6 +100,7 @@ export const faults: Texts["faults"] = {
       "Die Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter.",
     STUDY_FULL: "Alle Plätze dieser Studie sind vergeben. Danke für dein Interesse.",
     STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für dein Interesse.",
+    STUDY_RUNNING: "Einige sind mitten in dieser Studie. Warte, bis sie fertig sind, oder entferne sie.",
     STUDY_UNKNOWN: "Diese Studie gibt es nicht, oder der Schlüssel gehört nicht zu ihr.",
     STUDIES_NOT_HOSTED:
       "Dieser Server kann keine Studien durchführen: Er ist Knoten eines Clusters, oder er speichert nichts.",

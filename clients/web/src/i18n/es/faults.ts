@@ -24,6 +24,7 @@ export const faults: Texts["faults"] = {
     CLIENT_HAS_SEAT: "Ya tienes un asiento en esta sala, y cada cual puede ocupar solo uno.",
     GAME_STARTED: "La partida ya ha empezado. Puedes verla.",
     GAME_OVER: "La partida ha terminado.",
+    SEAT_ASSIGNED: "Este asiento pertenece al estudio. Para retirarte, usa la página del estudio.",
     GAME_NOT_STARTED: "La partida todavía no ha empezado.",
     GAME_NOT_PHYSICAL: "Esta partida no se juega con cartas reales.",
     NO_PHYSICAL_TABLES:
@@ -96,6 +97,7 @@ export const faults: Texts["faults"] = {
     SESSION_SUPERSEDED: "El estudio se ha abierto en otra ventana o en otro dispositivo. Continúa allí.",
     STUDY_FULL: "Todas las plazas de este estudio están ocupadas. Gracias por tu interés.",
     STUDY_CLOSED: "Este estudio está cerrado. Gracias por tu interés.",
+    STUDY_RUNNING: "Hay participantes en mitad de este estudio. Espera a que terminen o quítalos.",
     STUDY_UNKNOWN: "Este estudio no existe, o la clave no le pertenece.",
     STUDIES_NOT_HOSTED: "Este servidor no puede alojar estudios: es un nodo de un clúster, o no guarda nada.",
     TOO_MANY_STUDIES: "En este servidor no se pueden crear más estudios.",

@@ -367,3 +367,131 @@ class PruneRecordsResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___PruneRecordsResponse: _TypeAlias = PruneRecordsResponse  # noqa: Y015
+
+@_typing.final
+class ExportParticipantRequest(_message.Message):
+    """Requests a participant's data."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """The exact name that the participant played under."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["name", b"name"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ExportParticipantRequest: _TypeAlias = ExportParticipantRequest  # noqa: Y015
+
+@_typing.final
+class ExportParticipantResponse(_message.Message):
+    """The next part of the data."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LINE_FIELD_NUMBER: _builtins.int
+    UNREAD_FILES_FIELD_NUMBER: _builtins.int
+    line: _builtins.str
+    """The next line, JSON without a line break; empty in the last message."""
+    @_builtins.property
+    def unread_files(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
+        """In the last message: files of records on the server that contain the name and cannot be read,
+        with the reasons.
+        """
+
+    def __init__(
+        self,
+        *,
+        line: _builtins.str = ...,
+        unread_files: _abc.Iterable[_builtins.str] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["line", b"line", "unread_files", b"unread_files"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ExportParticipantResponse: _TypeAlias = ExportParticipantResponse  # noqa: Y015
+
+@_typing.final
+class DeleteParticipantRequest(_message.Message):
+    """Requests the deletion of a participant's data."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """The exact name that the participant played under."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["name", b"name"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___DeleteParticipantRequest: _TypeAlias = DeleteParticipantRequest  # noqa: Y015
+
+@_typing.final
+class DeleteParticipantResponse(_message.Message):
+    """What was deleted; all counts are 0 if nothing was stored."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    PSEUDONYM_FIELD_NUMBER: _builtins.int
+    GAMES_FIELD_NUMBER: _builtins.int
+    TOURNAMENTS_FIELD_NUMBER: _builtins.int
+    STUDIES_FIELD_NUMBER: _builtins.int
+    RECORD_FILES_FIELD_NUMBER: _builtins.int
+    EXPRESSIONS_FIELD_NUMBER: _builtins.int
+    ANNOTATIONS_FIELD_NUMBER: _builtins.int
+    UNCHANGED_FILES_FIELD_NUMBER: _builtins.int
+    pseudonym: _builtins.str
+    """What stands for the name now."""
+    games: _builtins.int
+    """Number of games that contained the name."""
+    tournaments: _builtins.int
+    """Number of tournaments that contained the name."""
+    studies: _builtins.int
+    """Number of studies that have a participant of this name."""
+    record_files: _builtins.int
+    """Number of files of records that were written again."""
+    expressions: _builtins.int
+    """Number of expressions that were dropped."""
+    annotations: _builtins.int
+    """Number of annotations that were dropped."""
+    @_builtins.property
+    def unchanged_files(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
+        """Files of records on the server that contain the name and could not be read or written, with the
+        reasons.
+        """
+
+    def __init__(
+        self,
+        *,
+        pseudonym: _builtins.str = ...,
+        games: _builtins.int = ...,
+        tournaments: _builtins.int = ...,
+        studies: _builtins.int = ...,
+        record_files: _builtins.int = ...,
+        expressions: _builtins.int = ...,
+        annotations: _builtins.int = ...,
+        unchanged_files: _abc.Iterable[_builtins.str] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["annotations", b"annotations", "expressions", b"expressions", "games", b"games", "pseudonym", b"pseudonym", "record_files", b"record_files", "studies", b"studies", "tournaments", b"tournaments", "unchanged_files", b"unchanged_files"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___DeleteParticipantResponse: _TypeAlias = DeleteParticipantResponse  # noqa: Y015

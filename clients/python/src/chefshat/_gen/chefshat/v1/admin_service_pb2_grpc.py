@@ -26,8 +26,8 @@ if _version_not_supported:
 
 
 class AdminServiceStub(object):
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     def __init__(self, channel):
@@ -66,11 +66,21 @@ class AdminServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsResponse.FromString,
                 _registered_method=True)
+        self.ExportParticipant = channel.unary_stream(
+                '/chefshat.v1.AdminService/ExportParticipant',
+                request_serializer=chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantResponse.FromString,
+                _registered_method=True)
+        self.DeleteParticipant = channel.unary_unary(
+                '/chefshat.v1.AdminService/DeleteParticipant',
+                request_serializer=chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantResponse.FromString,
+                _registered_method=True)
 
 
 class AdminServiceServicer(object):
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     def ListClients(self, request, context):
@@ -118,6 +128,29 @@ class AdminServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def ExportParticipant(self, request, context):
+        """Streams all that is stored under a participant's name: its games that are over with its
+        decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
+        (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
+        (STORE_FAILED).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def DeleteParticipant(self, request, context):
+        """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
+        records, tournaments and ratings, and its expressions and annotations are dropped. In studies
+        it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
+        has a participant of this name. Repeating the call completes what was interrupted, and changes
+        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
+        (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
+        changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_AdminServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -151,6 +184,16 @@ def add_AdminServiceServicer_to_server(servicer, server):
                     request_deserializer=chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsResponse.SerializeToString,
             ),
+            'ExportParticipant': grpc.unary_stream_rpc_method_handler(
+                    servicer.ExportParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantResponse.SerializeToString,
+            ),
+            'DeleteParticipant': grpc.unary_unary_rpc_method_handler(
+                    servicer.DeleteParticipant,
+                    request_deserializer=chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantResponse.SerializeToString,
+            ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
             'chefshat.v1.AdminService', rpc_method_handlers)
@@ -160,8 +203,8 @@ def add_AdminServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class AdminService(object):
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     @staticmethod
@@ -316,6 +359,60 @@ class AdminService(object):
             '/chefshat.v1.AdminService/PruneRecords',
             chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsRequest.SerializeToString,
             chefshat_dot_v1_dot_admin__service__pb2.PruneRecordsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ExportParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/chefshat.v1.AdminService/ExportParticipant',
+            chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_admin__service__pb2.ExportParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def DeleteParticipant(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.AdminService/DeleteParticipant',
+            chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantRequest.SerializeToString,
+            chefshat_dot_v1_dot_admin__service__pb2.DeleteParticipantResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -27,8 +27,8 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class AdminServiceStub:
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     @_typing.overload
@@ -53,11 +53,26 @@ class AdminServiceStub:
     """Deletes finished games with their records, oldest first, and gives their disk space back. Never
     the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
     """
+    ExportParticipant: _grpc.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]
+    """Streams all that is stored under a participant's name: its games that are over with its
+    decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
+    (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
+    (STORE_FAILED).
+    """
+    DeleteParticipant: _grpc.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]
+    """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
+    records, tournaments and ratings, and its expressions and annotations are dropped. In studies
+    it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
+    has a participant of this name. Repeating the call completes what was interrupted, and changes
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
+    (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
+    changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    """
 
 @_typing.type_check_only
 class AdminServiceAsyncStub(AdminServiceStub):
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -79,10 +94,25 @@ class AdminServiceAsyncStub(AdminServiceStub):
     """Deletes finished games with their records, oldest first, and gives their disk space back. Never
     the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
     """
+    ExportParticipant: _aio.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]  # type: ignore[assignment]
+    """Streams all that is stored under a participant's name: its games that are over with its
+    decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
+    (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
+    (STORE_FAILED).
+    """
+    DeleteParticipant: _aio.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]  # type: ignore[assignment]
+    """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
+    records, tournaments and ratings, and its expressions and annotations are dropped. In studies
+    it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
+    has a participant of this name. Repeating the call completes what was interrupted, and changes
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
+    (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
+    changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    """
 
 class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
-    """Operates a server: its clients, what others created, and its storage. Every call needs the role
-    ADMIN.
+    """Operates a server: its clients, what others created, its storage, and participants' data. Every
+    call needs the role ADMIN.
     """
 
     @_abc_1.abstractmethod
@@ -137,6 +167,33 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_admin_service_pb2.PruneRecordsResponse, _abc.Awaitable[_admin_service_pb2.PruneRecordsResponse]]:
         """Deletes finished games with their records, oldest first, and gives their disk space back. Never
         the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+        """
+
+    @_abc_1.abstractmethod
+    def ExportParticipant(
+        self,
+        request: _admin_service_pb2.ExportParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_admin_service_pb2.ExportParticipantResponse], _abc.AsyncIterator[_admin_service_pb2.ExportParticipantResponse]]:
+        """Streams all that is stored under a participant's name: its games that are over with its
+        decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
+        (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
+        (STORE_FAILED).
+        """
+
+    @_abc_1.abstractmethod
+    def DeleteParticipant(
+        self,
+        request: _admin_service_pb2.DeleteParticipantRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_admin_service_pb2.DeleteParticipantResponse, _abc.Awaitable[_admin_service_pb2.DeleteParticipantResponse]]:
+        """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
+        records, tournaments and ratings, and its expressions and annotations are dropped. In studies
+        it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
+        has a participant of this name. Repeating the call completes what was interrupted, and changes
+        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
+        (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
+        changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """
 
 def add_AdminServiceServicer_to_server(servicer: AdminServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

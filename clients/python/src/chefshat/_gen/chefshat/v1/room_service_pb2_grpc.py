@@ -115,7 +115,8 @@ class RoomServiceServicer(object):
     def LeaveRoom(self, request, context):
         """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
         attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
-        FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
+        FAILED_PRECONDITION (GAME_STARTED, GAME_OVER; SEAT_ASSIGNED for the seat of a study's
+        participant, who withdraws from the study instead).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

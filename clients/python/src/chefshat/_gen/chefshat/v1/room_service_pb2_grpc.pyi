@@ -61,7 +61,8 @@ class RoomServiceStub:
     LeaveRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
     attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
-    FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
+    FAILED_PRECONDITION (GAME_STARTED, GAME_OVER; SEAT_ASSIGNED for the seat of a study's
+    participant, who withdraws from the study instead).
     """
     CloseRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]
     """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
@@ -101,7 +102,8 @@ class RoomServiceAsyncStub(RoomServiceStub):
     LeaveRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]  # type: ignore[assignment]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
     attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
-    FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
+    FAILED_PRECONDITION (GAME_STARTED, GAME_OVER; SEAT_ASSIGNED for the seat of a study's
+    participant, who withdraws from the study instead).
     """
     CloseRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]  # type: ignore[assignment]
     """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
@@ -168,7 +170,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.LeaveRoomResponse, _abc.Awaitable[_room_service_pb2.LeaveRoomResponse]]:
         """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
         attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
-        FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
+        FAILED_PRECONDITION (GAME_STARTED, GAME_OVER; SEAT_ASSIGNED for the seat of a study's
+        participant, who withdraws from the study instead).
         """
 
     @_abc_1.abstractmethod

@@ -582,6 +582,62 @@ class DeleteStudyParticipantResponse(_message.Message):
 Global___DeleteStudyParticipantResponse: _TypeAlias = DeleteStudyParticipantResponse  # noqa: Y015
 
 @_typing.final
+class DeleteStudyRequest(_message.Message):
+    """Requests to delete a study."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STUDY_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    FORCE_FIELD_NUMBER: _builtins.int
+    study_id: _builtins.str
+    """Identifies it."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateStudyResponse."""
+    force: _builtins.bool
+    """Whether to remove those who are in the middle of it; their running games are closed."""
+    def __init__(
+        self,
+        *,
+        study_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        force: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["force", b"force", "owner_token", b"owner_token", "study_id", b"study_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___DeleteStudyRequest: _TypeAlias = DeleteStudyRequest  # noqa: Y015
+
+@_typing.final
+class DeleteStudyResponse(_message.Message):
+    """The study was deleted."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    PARTICIPANTS_FIELD_NUMBER: _builtins.int
+    GAMES_FIELD_NUMBER: _builtins.int
+    participants: _builtins.int
+    """Number of its participants."""
+    games: _builtins.int
+    """Number of games that were deleted with their records."""
+    def __init__(
+        self,
+        *,
+        participants: _builtins.int = ...,
+        games: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["games", b"games", "participants", b"participants"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___DeleteStudyResponse: _TypeAlias = DeleteStudyResponse  # noqa: Y015
+
+@_typing.final
 class OpenStudyRequest(_message.Message):
     """Requests to open the study."""
 

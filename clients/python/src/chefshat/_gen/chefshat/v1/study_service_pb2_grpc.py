@@ -86,6 +86,11 @@ class StudyServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantResponse.FromString,
                 _registered_method=True)
+        self.DeleteStudy = channel.unary_unary(
+                '/chefshat.v1.StudyService/DeleteStudy',
+                request_serializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyResponse.FromString,
+                _registered_method=True)
 
 
 class StudyServiceServicer(object):
@@ -183,6 +188,16 @@ class StudyServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def DeleteStudy(self, request, context):
+        """Deletes a study with all its data: settings, participants, answers, interface traces, and games
+        with their records. Its links are unknown from then on. Returns when all is deleted. NOT_FOUND
+        (STUDY_UNKNOWN); FAILED_PRECONDITION (STUDY_RUNNING if somebody is in the middle of it, unless
+        `force` is set); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_StudyServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -235,6 +250,11 @@ def add_StudyServiceServicer_to_server(servicer, server):
                     servicer.DeleteStudyParticipant,
                     request_deserializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantResponse.SerializeToString,
+            ),
+            'DeleteStudy': grpc.unary_unary_rpc_method_handler(
+                    servicer.DeleteStudy,
+                    request_deserializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_study__service__pb2.DeleteStudyResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -509,6 +529,33 @@ class StudyService(object):
             '/chefshat.v1.StudyService/DeleteStudyParticipant',
             chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantRequest.SerializeToString,
             chefshat_dot_v1_dot_study__service__pb2.DeleteStudyParticipantResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def DeleteStudy(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.StudyService/DeleteStudy',
+            chefshat_dot_v1_dot_study__service__pb2.DeleteStudyRequest.SerializeToString,
+            chefshat_dot_v1_dot_study__service__pb2.DeleteStudyResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -83,6 +83,12 @@ class StudyServiceStub:
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
     """
+    DeleteStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]
+    """Deletes a study with all its data: settings, participants, answers, interface traces, and games
+    with their records. Its links are unknown from then on. Returns when all is deleted. NOT_FOUND
+    (STUDY_UNKNOWN); FAILED_PRECONDITION (STUDY_RUNNING if somebody is in the middle of it, unless
+    `force` is set); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    """
 
 @_typing.type_check_only
 class StudyServiceAsyncStub(StudyServiceStub):
@@ -138,6 +144,12 @@ class StudyServiceAsyncStub(StudyServiceStub):
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
+    """
+    DeleteStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]  # type: ignore[assignment]
+    """Deletes a study with all its data: settings, participants, answers, interface traces, and games
+    with their records. Its links are unknown from then on. Returns when all is deleted. NOT_FOUND
+    (STUDY_UNKNOWN); FAILED_PRECONDITION (STUDY_RUNNING if somebody is in the middle of it, unless
+    `force` is set); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
 
 class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -251,6 +263,18 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
         STORE_FAILED).
+        """
+
+    @_abc_1.abstractmethod
+    def DeleteStudy(
+        self,
+        request: _study_service_pb2.DeleteStudyRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_study_service_pb2.DeleteStudyResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyResponse]]:
+        """Deletes a study with all its data: settings, participants, answers, interface traces, and games
+        with their records. Its links are unknown from then on. Returns when all is deleted. NOT_FOUND
+        (STUDY_UNKNOWN); FAILED_PRECONDITION (STUDY_RUNNING if somebody is in the middle of it, unless
+        `force` is set); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
 
 def add_StudyServiceServicer_to_server(servicer: StudyServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

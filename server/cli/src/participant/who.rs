@@ -1,0 +1,104 @@
+//! Whose data, and where they are: in a data directory, or on a running server.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use chefshat_server::participants::{ParticipantData, Skipped};
+use chefshat_server::store::{SqliteStore, Store as _};
+use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
+
+use crate::connect::ServerArg;
+use crate::data_dir;
+use crate::error::CommandError;
+
+/// The participant, and the data directory or server.
+#[derive(Args)]
+pub(super) struct Who {
+    /// The exact name the participant played under.
+    #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    pub(super) name: String,
+    /// Data directory of a server that is stopped. Default: chefshat in the user's data directory.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Address of a running server, instead of a data directory; https:// for TLS. Needs a token
+    /// with the role admin.
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
+    /// Token of the server's operator, from `chefshat token create --role admin`. CHEFSHAT_TOKEN
+    /// does the same and does not show in lists of processes.
+    #[arg(long, env = "CHEFSHAT_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    /// PEM file of the certificate authorities to trust, instead of the system's.
+    #[arg(long, env = "CHEFSHAT_CA", value_name = "FILE")]
+    ca: Option<PathBuf>,
+}
+
+/// Leaves out the token.
+impl fmt::Debug for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = (&self.server, &self.data_dir);
+        f.debug_tuple("Who")
+            .field(&self.name)
+            .field(&place)
+            .finish()
+    }
+}
+
+impl Who {
+    /// The running server, if one was named.
+    pub(super) fn server(&self) -> Option<ServerArg> {
+        let server = self.server.clone()?;
+        Some(ServerArg::new(server, self.token.clone(), self.ca.clone()))
+    }
+
+    /// The data directory, which must exist.
+    pub(super) fn data_dir(&self) -> Result<PathBuf, CommandError> {
+        let folder = data_dir::name(self.data_dir.clone())?;
+        if folder.is_dir() {
+            Ok(folder)
+        } else {
+            let folder = folder.display();
+            Err(format!("there is no data directory {folder}; choose another with --data-dir, or a running server with --server").into())
+        }
+    }
+
+    /// Where the data are, in words.
+    pub(super) fn place(&self) -> Result<String, CommandError> {
+        match &self.server {
+            Some(server) => Ok(server.clone()),
+            None => Ok(self.data_dir()?.display().to_string()),
+        }
+    }
+
+    /// Opens the data directory, does something with its data, and closes it.
+    pub(super) async fn with_data<T>(
+        &self,
+        work: impl AsyncFnOnce(&ParticipantData) -> Result<T, CommandError>,
+    ) -> Result<T, CommandError> {
+        let data_dir = self.data_dir()?;
+        let store = Arc::new(SqliteStore::open(&data_dir).await?);
+        let data = ParticipantData::new(Arc::clone(&store) as _, Some(data_dir));
+        let done = work(&data).await;
+        drop(data);
+        store.close().await;
+        done
+    }
+}
+
+/// Fails if files with the name were left as they are; warns of others.
+pub(super) fn check(skipped: &Skipped, name: &str) -> Result<(), CommandError> {
+    for why in &skipped.other {
+        anstream::eprintln!("chefshat: warning: skipped a file that cannot be read: {why}");
+    }
+    if skipped.named.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "done, except for files that contain {name:?} but could not be read or written: {}; repair or remove them (`chefshat verify` \
+         shows what is wrong) and run the command again",
+        skipped.named.join("; ")
+    )
+    .into())
+}

@@ -1,0 +1,194 @@
+//! The data of a participant, known by its name: exports and deletes what is stored about it.
+//! [`ParticipantData`] does so with a store and a data directory; [`Participants`] also with what a
+//! running server has in memory.
+
+mod delete;
+mod export;
+mod files;
+mod stored_studies;
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use chefshat_record::pseudonym::Pseudonym;
+use tokio::sync::{Mutex, mpsc};
+use tracing::info;
+
+pub use delete::Deleted;
+pub use files::Skipped;
+
+use crate::rooms::Rooms;
+use crate::store::{ForgetError, Store, StoreError};
+use crate::studies::Studies;
+use crate::tournaments::Tournaments;
+
+/// Why a participant's data were not exported or deleted completely.
+#[derive(Debug, thiserror::Error)]
+pub enum DataError {
+    /// The store refuses or failed.
+    #[error(transparent)]
+    Forget(#[from] ForgetError),
+    /// The folder of records cannot be read or written.
+    #[error("the folder of records failed: {0}; check it and try again")]
+    Io(#[from] io::Error),
+    /// The server is shutting down.
+    #[error("the server is shutting down; try again when it is back")]
+    ShuttingDown,
+    /// Nobody receives the lines any more.
+    #[error("the client has gone")]
+    Gone,
+}
+
+impl From<StoreError> for DataError {
+    fn from(error: StoreError) -> Self {
+        Self::Forget(error.into())
+    }
+}
+
+/// What is stored about participants.
+pub struct ParticipantData {
+    store: Arc<dyn Store>,
+    /// Where files of records are; `None` if there are none.
+    data_dir: Option<PathBuf>,
+}
+
+impl ParticipantData {
+    /// For this store, and the files of records in this data directory.
+    pub fn new(store: Arc<dyn Store>, data_dir: Option<PathBuf>) -> Self {
+        Self { store, data_dir }
+    }
+}
+
+/// The participants of a running server.
+pub struct Participants {
+    data: ParticipantData,
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    studies: Arc<Studies>,
+    /// Locked while one is deleted.
+    deleting: Mutex<()>,
+}
+
+impl Participants {
+    /// Those of these rooms, tournaments and studies.
+    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>, studies: Arc<Studies>) -> Self {
+        let data_dir = rooms.record_writer().data_dir().map(PathBuf::from);
+        Self {
+            data: ParticipantData::new(Arc::clone(rooms.store()), data_dir),
+            rooms,
+            tournaments,
+            studies,
+            deleting: Mutex::default(),
+        }
+    }
+
+    /// See [`ParticipantData::export`].
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn export(
+        &self,
+        name: &str,
+        sender: &mpsc::Sender<String>,
+    ) -> Result<Skipped, DataError> {
+        self.data.export(name, sender).await
+    }
+
+    /// Deletes a participant's data from the store, the files and the memory of this server. Its
+    /// participation in studies ends, with their games.
+    ///
+    /// # Errors
+    /// A game or tournament with the name is not over, or the store or the folder of records
+    /// failed.
+    pub async fn delete(&self, name: &str) -> Result<Deleted, DataError> {
+        let _deleting = self.deleting.lock().await;
+        if self.plays(name).await {
+            return Err(ForgetError::GameRunning(name.to_owned()).into());
+        }
+        if self.tournaments.is_playing(name) {
+            return Err(ForgetError::TournamentRunning(name.to_owned()).into());
+        }
+        let mut studies = 0;
+        for study in self.studies.newest() {
+            let Some(number) = study.number_by_pseudonym(name) else {
+                continue;
+            };
+            let withdrawn = study.withdraw(number, true).await;
+            // Only an unknown participant is refused.
+            drop(withdrawn.map_err(|_| DataError::ShuttingDown)?);
+            studies += 1;
+        }
+        // No record that was read before is written after.
+        let writing = self.rooms.record_writer().pause().await;
+        let mut deleted = self.data.delete_from_games(name).await?;
+        drop(writing);
+        let who = Pseudonym {
+            name: name.to_owned(),
+            pseudonym: deleted.pseudonym.clone(),
+        };
+        let renamed = self.tournaments.forget(&who).await;
+        deleted.tournaments = deleted.tournaments.max(renamed);
+        deleted.studies = studies;
+        self.hide_rooms(name, &deleted).await;
+        self.rooms.count_forgotten();
+        info!(
+            games = deleted.games,
+            tournaments = deleted.tournaments,
+            studies,
+            "the data of a participant were deleted"
+        );
+        Ok(deleted)
+    }
+
+    /// Whether the participant has a seat in a room that is not over, other than those of studies.
+    async fn plays(&self, name: &str) -> bool {
+        for room in self.rooms.all(false) {
+            let header = self.rooms.header(room.id());
+            let is_of_study = header.is_some_and(|header| header.study.is_some());
+            if !is_of_study
+                && let Ok(room) = room.describe().await
+                && has_seat(&room, name)
+            {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Removes the rooms that are over and show the participant.
+    async fn hide_rooms(&self, name: &str, deleted: &Deleted) {
+        for handle in self.rooms.all(true) {
+            let header = self.rooms.header(handle.id());
+            let is_changed = header.is_some_and(|it| deleted.stored_games.contains(&it.game_id));
+            let shows = match handle.describe().await {
+                Ok(room) => has_seat(&room, name),
+                Err(_) => false,
+            };
+            if is_changed || shows {
+                self.rooms.forget(handle.id());
+            }
+        }
+    }
+}
+
+fn has_seat(room: &chefshat_proto::v1::Room, name: &str) -> bool {
+    let mut seats = room.seats.iter();
+    seats.any(|seat| seat.built_in_agent.is_empty() && seat.name == name)
+}
+
+impl std::fmt::Debug for Participants {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Participants")
+            .finish_non_exhaustive()
+    }
+}
+
+/// Runs work that reads files or decodes games on a thread of its own.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, StoreError> {
+    let working = tokio::task::spawn_blocking(work).await;
+    working.map_err(|error| StoreError::Failed(format!("reading stored data failed: {error}")))
+}

@@ -1,0 +1,159 @@
+//! A participant's data in stored studies. Deleting them while no server runs does what its
+//! withdrawal does while one runs.
+
+use chefshat_room::ids::Id;
+use chefshat_study::{Answer, Change, Study, Task};
+use serde_json::json;
+
+use super::export::Sheet;
+use super::{DataError, ParticipantData};
+use crate::clock::since_epoch_ms;
+use crate::convert;
+use crate::store::StoreError;
+use crate::store::studies::StoredStudy;
+
+impl ParticipantData {
+    /// Whether a participant of this name has a game of a study that is not over.
+    pub(super) async fn plays_in_studies(&self, name: &str) -> Result<bool, StoreError> {
+        for (stored, number) in self.in_studies(name).await? {
+            let mut is_playing = false;
+            for change in &stored.changes {
+                match change {
+                    Change::Placed { number: of, .. } if *of == number => is_playing = true,
+                    Change::GameEnded { number: of, .. } if *of == number => is_playing = false,
+                    _ => {}
+                }
+            }
+            if is_playing {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Deletes a participant's data from the studies. Returns from how many.
+    pub(super) async fn delete_from_studies(&self, name: &str) -> Result<u64, StoreError> {
+        let mut count = 0;
+        for (stored, number) in self.in_studies(name).await? {
+            let mut changes = stored.changes;
+            let games = games_of(&changes, number);
+            changes.push(Change::Withdrew {
+                number,
+                delete_data: true,
+                at_ms: since_epoch_ms(),
+            });
+            for change in &mut changes {
+                change.forget(number);
+            }
+            // A server completes what is interrupted between these two.
+            let id = stored.header.id;
+            self.store.rewrite_study(id, changes, number).await?;
+            self.store.delete(games).await?;
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Sends a participant's consent, answers and interface traces.
+    pub(super) async fn export_studies(
+        &self,
+        name: &str,
+        sheet: &mut Sheet<'_>,
+    ) -> Result<(), DataError> {
+        for (stored, number) in self.in_studies(name).await? {
+            let id = stored.header.id;
+            let Some(study) = folded(&stored) else {
+                continue;
+            };
+            let Some(participant) = study.participant(number) else {
+                continue;
+            };
+            let state = convert::participant_state(participant.status);
+            let consent = participant.consent.as_ref().map(|consent| {
+                json!({
+                    "at_ms": consent.at_ms,
+                    "version": consent.version,
+                    "language": consent.language,
+                    "text_sha256": hex::encode(consent.text_sha256),
+                })
+            });
+            let games = games_of(&stored.changes, number);
+            let games: Vec<String> = games.iter().map(Id::to_string).collect();
+            let mut lines = vec![json!({ "study": {
+                "study_id": id.to_string(),
+                "name": stored.header.settings.name,
+                "number": number,
+                "state": state.as_str_name(),
+                "consent": consent,
+                "reached_at_ms": participant.reached_at_ms,
+                "ended_at_ms": participant.ended_at_ms,
+                "game_ids": games,
+            } })];
+            let sequence = study.sequence_of(participant).unwrap_or_default();
+            let steps = study.settings().steps(sequence);
+            for (step, answers) in &participant.answers {
+                let Some(Task::Questionnaire(questionnaire)) = steps.get(*step).map(|it| it.task)
+                else {
+                    continue;
+                };
+                for answer in answers {
+                    let item = questionnaire.items.get(answer.item);
+                    let value = match &answer.value {
+                        Answer::Number(number) => json!(number),
+                        Answer::Options(options) => json!(options),
+                        Answer::Text(text) => json!(text),
+                    };
+                    lines.push(json!({ "answer": {
+                        "step": step,
+                        "questionnaire": questionnaire.id,
+                        "item": item.map(|item| &item.id),
+                        "value": value,
+                        "answered_after_ms": answer.answered_after_ms,
+                    }, "study_id": id.to_string() }));
+                }
+            }
+            sheet.send(lines).await?;
+            let all = self.store.traces(id).await?;
+            for traces in all.iter().filter(|traces| traces.number == number) {
+                let game = traces.game.to_string();
+                let lines = traces.traces.iter();
+                let lines = lines.map(|trace| json!({ "trace": trace, "game_id": game }));
+                sheet.send(lines.collect()).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The studies that have a participant of this name, with its number.
+    async fn in_studies(&self, name: &str) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
+        let mut found = Vec::new();
+        for id in self.store.studies().await? {
+            let Some(stored) = self.store.study(id).await? else {
+                continue;
+            };
+            let number = stored.changes.iter().find_map(|change| match change {
+                Change::Added { number, pseudonym } if pseudonym == name => Some(*number),
+                _ => None,
+            });
+            found.extend(number.map(|number| (stored, number)));
+        }
+        Ok(found)
+    }
+}
+
+/// The games of a participant.
+fn games_of(changes: &[Change], wanted: u32) -> Vec<Id> {
+    let games = changes.iter().filter_map(|change| match change {
+        Change::Placed { number, game } if *number == wanted => Some(Id(game.game)),
+        _ => None,
+    });
+    games.collect()
+}
+
+/// The state of a study; `None` if this version cannot read its settings.
+fn folded(stored: &StoredStudy) -> Option<Study> {
+    let plan = convert::study_plan(&stored.header.settings).ok()?;
+    let mut study = Study::new(plan.core).ok()?;
+    stored.changes.iter().for_each(|change| study.fold(change));
+    Some(study)
+}

@@ -1,0 +1,335 @@
+//! Removes a participant's name from stored games and tournaments: what becomes of each row. A
+//! store reads the rows and writes those that change; games and tournaments that are over change in
+//! no other way. Files of records and studies are not handled here.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use chefshat_record::convert::seat_number;
+use chefshat_record::pseudonym::{ParticipantSeats, Pseudonym, Redactions};
+use chefshat_tournament::Change as TournamentChange;
+use prost::Message as _;
+
+use super::form::{self, Unreadable};
+use super::tournaments::TournamentEntry;
+use super::{StoreError, StoredGame};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Entry, Fill, GameHeader};
+
+/// What was removed from a store.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Forgotten {
+    /// Games that contained the name.
+    pub games: Vec<Id>,
+    /// Those of them whose record was written to a file, which must be written again. Until they
+    /// are marked as written, the next start of the server does.
+    pub filed: Vec<Id>,
+    /// Number of tournaments that contained the name.
+    pub tournaments: u64,
+    /// The changes in the games.
+    pub redactions: Redactions,
+}
+
+/// Why a participant cannot be removed; nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub enum ForgetError {
+    /// A game with the name is not over.
+    #[error(
+        "{0:?} takes part in a game that is not over; nothing was changed: let the game end or close its room on the running server, and try again"
+    )]
+    GameRunning(String),
+    /// A tournament with the name is not over.
+    #[error(
+        "{0:?} takes part in a tournament that is not over; nothing was changed: let it end or close it on the running server, and try again"
+    )]
+    TournamentRunning(String),
+    /// Stored data cannot be read.
+    #[error("{what} cannot be read: {problem}; nothing was changed")]
+    Unreadable {
+        /// The data.
+        what: String,
+        /// The reason.
+        problem: String,
+    },
+    /// The store failed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+}
+
+/// The rows of a game that may contain the name.
+#[derive(Debug)]
+pub(super) struct GameRows {
+    pub(super) number: i64,
+    pub(super) id: Id,
+    pub(super) is_running: bool,
+    pub(super) is_filed: bool,
+    pub(super) header: Option<Vec<u8>>,
+    pub(super) summary: Option<Vec<u8>>,
+    /// The record of an imported game.
+    pub(super) record: Option<Vec<u8>>,
+    /// The rows of its journal by their keys, in order.
+    pub(super) journal: Vec<(i64, Vec<u8>)>,
+}
+
+/// The rows of a game that are written again.
+#[derive(Debug)]
+pub(super) struct GameRewrite {
+    pub(super) number: i64,
+    pub(super) header: Option<Vec<u8>>,
+    /// The summary, and the name of the room.
+    pub(super) summary: Option<(Vec<u8>, String)>,
+    pub(super) record: Option<Vec<u8>>,
+    pub(super) journal: Vec<(i64, Vec<u8>)>,
+}
+
+/// The rows of a tournament that are written again, by their positions.
+#[derive(Debug)]
+pub(super) struct TournamentRewrite {
+    pub(super) number: i64,
+    pub(super) rows: Vec<(i64, Vec<u8>)>,
+}
+
+/// What a store writes to remove a participant.
+#[derive(Debug)]
+pub(super) struct Rewrite {
+    pub(super) who: Pseudonym,
+    pub(super) games: Vec<GameRewrite>,
+    pub(super) tournaments: Vec<TournamentRewrite>,
+    pub(super) forgotten: Forgotten,
+}
+
+impl Rewrite {
+    /// Nothing yet.
+    pub(super) fn new(who: &Pseudonym) -> Self {
+        Self {
+            who: who.clone(),
+            games: Vec::new(),
+            tournaments: Vec::new(),
+            forgotten: Forgotten::default(),
+        }
+    }
+
+    /// Adds a game, if the participant is in it.
+    ///
+    /// # Errors
+    /// The game is not over, or cannot be read.
+    pub(super) fn with_game(mut self, rows: GameRows) -> Result<Self, ForgetError> {
+        let (id, is_filed, is_running) = (rows.id, rows.is_filed, rows.is_running);
+        let rewritten = rewrite_game(rows, &self.who).map_err(|problem| unreadable(id, problem))?;
+        let Some((game, redactions)) = rewritten else {
+            return Ok(self);
+        };
+        if is_running {
+            return Err(ForgetError::GameRunning(self.who.name));
+        }
+        self.games.push(game);
+        self.forgotten.add(id, is_filed, redactions);
+        Ok(self)
+    }
+
+    /// Adds the rows of a tournament, by their positions, if the participant is in it.
+    ///
+    /// # Errors
+    /// The tournament is not over, or cannot be read.
+    pub(super) fn with_tournament(
+        mut self,
+        number: i64,
+        rows: Vec<(i64, Vec<u8>)>,
+    ) -> Result<Self, ForgetError> {
+        let (mut changed, mut is_over) = (Vec::new(), false);
+        for (position, bytes) in rows {
+            let read = form::tournament_entries_from_bytes(&bytes);
+            let mut entries = read.map_err(|problem| ForgetError::Unreadable {
+                what: format!("tournament number {number}"),
+                problem: problem.to_string(),
+            })?;
+            is_over |= entries.iter().any(TournamentEntry::is_end);
+            if forget_entrant(&mut entries, &self.who) {
+                changed.push((position, form::tournament_entries_to_bytes(&entries)));
+            }
+        }
+        if changed.is_empty() {
+            return Ok(self);
+        }
+        if !is_over {
+            return Err(ForgetError::TournamentRunning(self.who.name));
+        }
+        self.forgotten.tournaments += 1;
+        let rows = changed;
+        self.tournaments.push(TournamentRewrite { number, rows });
+        Ok(self)
+    }
+}
+
+impl Forgotten {
+    pub(super) fn add(&mut self, game: Id, is_filed: bool, redactions: Redactions) {
+        self.games.push(game);
+        self.filed.extend(is_filed.then_some(game));
+        self.redactions += redactions;
+    }
+}
+
+fn unreadable(game: Id, problem: Unreadable) -> ForgetError {
+    ForgetError::Unreadable {
+        what: format!("game {game}"),
+        problem: problem.to_string(),
+    }
+}
+
+/// Removes a participant from a game in memory that is over, which loses its signature if it
+/// changes.
+pub(super) fn forget_stored(
+    stored: &mut StoredGame,
+    summary: &mut v1::RecordSummary,
+    who: &Pseudonym,
+) -> Redactions {
+    let redactions = match stored {
+        StoredGame::Hosted(header, entries, signed) => {
+            let mut changed = entries.to_vec();
+            let mut seats = ParticipantSeats::default();
+            let mut redactions = forget_entries(&mut changed, &mut seats, who);
+            if redactions != Redactions::default() {
+                redactions.names += forget_header(Arc::make_mut(header), who);
+                *entries = changed.into();
+                *signed = None;
+            }
+            redactions
+        }
+        StoredGame::Imported(lines) => {
+            let mut changed = lines.to_vec();
+            let redactions = who.redact(&mut changed);
+            *lines = changed.into();
+            redactions
+        }
+    };
+    if redactions != Redactions::default() {
+        forget_summary(summary, who);
+    }
+    redactions
+}
+
+/// Removes a participant from a game, which loses its signature if it changes; `None` if it does
+/// not.
+fn rewrite_game(
+    rows: GameRows,
+    who: &Pseudonym,
+) -> Result<Option<(GameRewrite, Redactions)>, Unreadable> {
+    let mut game = GameRewrite {
+        number: rows.number,
+        header: None,
+        summary: None,
+        record: None,
+        journal: Vec::new(),
+    };
+    let (mut own, mut redactions) = (ParticipantSeats::default(), Redactions::default());
+    // Row by row, because a long decoded game is much larger.
+    for (key, bytes) in rows.journal {
+        let mut entries = Vec::new();
+        form::read_entries(&bytes, &mut entries)?;
+        let of_row = forget_entries(&mut entries, &mut own, who);
+        if of_row != Redactions::default() {
+            redactions += of_row;
+            game.journal
+                .push((key, form::entries_to_bytes(&mut entries)));
+        }
+    }
+    if let Some(record) = rows.record {
+        let mut lines = form::lines_from_bytes(&record)?;
+        redactions += who.redact(&mut lines);
+        game.record = Some(form::lines_to_bytes(&lines));
+    }
+    if redactions == Redactions::default() {
+        return Ok(None);
+    }
+    if let Some(header) = rows.header {
+        let mut header = form::header_from_bytes(&header)?;
+        redactions.names += forget_header(&mut header, who);
+        game.header = Some(form::header_to_bytes(&header));
+    }
+    if let Some(summary) = rows.summary {
+        let mut summary = v1::RecordSummary::decode(summary.as_slice())?;
+        forget_summary(&mut summary, who);
+        game.summary = Some((summary.encode_to_vec(), summary.room_name));
+    }
+    Ok(Some((game, redactions)))
+}
+
+/// Removes a participant from the header of its game; returns the number of replacements.
+fn forget_header(header: &mut GameHeader, who: &Pseudonym) -> u64 {
+    let mut names = who.in_text(&mut header.name);
+    for (seat, name) in &mut header.display_names {
+        let is_at_table = matches!(header.fills.get(*seat), Some(Fill::AtTable(_)));
+        if is_at_table && *name == who.name {
+            name.clone_from(&who.pseudonym);
+            names += 1;
+        }
+    }
+    if let Some(study) = (header.study.as_mut()).filter(|it| it.participant == who.name) {
+        Arc::make_mut(study).participant.clone_from(&who.pseudonym);
+        names += 1;
+    }
+    names
+}
+
+fn forget_summary(summary: &mut v1::RecordSummary, who: &Pseudonym) {
+    who.in_seats(&mut summary.seats);
+    who.in_text(&mut summary.room_name);
+}
+
+/// Removes a participant from entries of a journal. `own` are its seats before them.
+fn forget_entries(
+    entries: &mut Vec<Entry>,
+    own: &mut ParticipantSeats,
+    who: &Pseudonym,
+) -> Redactions {
+    let mut out = Redactions::default();
+    entries.retain_mut(|entry| match &mut entry.change {
+        Change::Seated { seat, participant } => {
+            let is_own = participant.name == who.name;
+            own.seated(seat_number(*seat), is_own);
+            if is_own {
+                participant.name.clone_from(&who.pseudonym);
+                out.names += 1;
+            }
+            true
+        }
+        Change::Vacated(seat) => {
+            own.vacated(seat_number(*seat));
+            true
+        }
+        Change::Decided(decided) => {
+            if own.has(seat_number(decided.seat)) && decided.annotations.take().is_some() {
+                out.annotations += 1;
+            }
+            true
+        }
+        Change::Expressed { seat, .. } => {
+            let drop = own.has(seat_number(*seat));
+            out.expressions += u64::from(drop);
+            !drop
+        }
+        Change::Marked(marked) => {
+            out.names += who.in_label(&mut marked.label);
+            true
+        }
+        _ => true,
+    });
+    out
+}
+
+/// Renames a participant in entries of a tournament's journal. Returns whether it is in them.
+fn forget_entrant(entries: &mut [TournamentEntry], who: &Pseudonym) -> bool {
+    let mut changed = false;
+    for entry in entries {
+        if let TournamentEntry::Change(
+            TournamentChange::Joined(entrant) | TournamentChange::Replaced { by: entrant, .. },
+        ) = entry
+            && entrant.built_in.is_none()
+            && entrant.name == who.name
+        {
+            entrant.name.clone_from(&who.pseudonym);
+            changed = true;
+        }
+    }
+    changed
+}

@@ -1,0 +1,258 @@
+//! Removing a participant, from each store. The tests of the command line cover played games and
+//! their files.
+
+use chefshat_engine::{ActionId, Seat};
+use chefshat_record::pseudonym::Redactions;
+use chefshat_room::journal::{Decided, Marked, ParticipantKind, SeatedParticipant, Source};
+use chefshat_tournament::{Change as TournamentChange, Entrant};
+
+use super::*;
+use crate::store::sqlite::tests::tournaments::cup;
+use crate::store::tournaments::TournamentEntry;
+
+fn ana() -> Pseudonym {
+    Pseudonym {
+        name: "Ana".into(),
+        pseudonym: "deleted 1".into(),
+    }
+}
+
+fn at_once(change: Change) -> Entry {
+    Entry {
+        at: std::time::Duration::ZERO,
+        change,
+    }
+}
+
+fn seated(seat: usize, name: &str) -> Entry {
+    at_once(Change::Seated {
+        seat: Seat::new(seat),
+        participant: Box::new(SeatedParticipant {
+            name: name.into(),
+            kind: ParticipantKind::Human,
+            ticket: SecretHash::of(b"ticket"),
+        }),
+    })
+}
+
+fn expressed(seat: usize) -> Entry {
+    at_once(Change::Expressed {
+        seat: Seat::new(seat),
+        record_only: false,
+        expression: Box::from([]),
+    })
+}
+
+fn decided(seat: usize) -> Entry {
+    at_once(Change::Decided(Decided {
+        seat: Seat::new(seat),
+        action: ActionId::new(0),
+        source: Source::Agent,
+        time_us: 5,
+        bank_left_ms: 0,
+        annotations: Some(Box::from([])),
+    }))
+}
+
+fn marked(label: &str) -> Entry {
+    at_once(Change::Marked(Box::new(Marked {
+        label: label.into(),
+        moment: std::time::Duration::ZERO,
+    })))
+}
+
+/// Ana sat down, left, and came back to another seat; Bo is there, too.
+fn game(number: u8) -> (Arc<GameHeader>, [Vec<Entry>; 2]) {
+    let header = Arc::new(GameHeader {
+        name: "Ana’s table".into(),
+        ..GameHeader::clone(&header(number, Durability::Durable))
+    });
+    let begin = vec![
+        seated(0, "Ana"),
+        at_once(Change::Vacated(Seat::new(0))),
+        seated(1, "Ana"),
+        seated(0, "Bo"),
+    ];
+    let rest = vec![
+        expressed(0),
+        expressed(1),
+        decided(0),
+        decided(1),
+        marked("Ana laughs"),
+        marked("Anatole laughs"),
+    ];
+    (header, [begin, rest])
+}
+
+fn summary_of(header: &GameHeader) -> Box<v1::RecordSummary> {
+    let seat = |number: u32, name: &str, agent: &str| v1::Participant {
+        seat: number,
+        name: name.into(),
+        built_in_agent: agent.into(),
+        ..v1::Participant::default()
+    };
+    Box::new(v1::RecordSummary {
+        seats: vec![
+            seat(0, "Bo", ""),
+            seat(1, "Ana", ""),
+            // A built-in agent may have the same name.
+            seat(2, "Ana", "random"),
+        ],
+        ..*summary(header)
+    })
+}
+
+fn signed() -> Signed {
+    Signed {
+        server_version: "0.0.1".into(),
+        signature: v1::RecordSignature::default(),
+    }
+}
+
+#[tokio::test]
+async fn a_participant_is_removed_from_its_games_and_others_stay() {
+    with_each_store(async |store| {
+        let (header, [begin, rest]) = game(1);
+        let created = store.create(Arc::clone(&header), begin).await;
+        let mut journal = created.expect("a new game");
+        let mut rest = rest;
+        journal.append(&mut rest).await.expect("committed");
+        let ended = journal.finish(Some(summary_of(&header)), Some(signed()));
+        ended.await.expect("committed");
+        let mut other = created_of_others(store).await;
+        finish(&mut other, 2).await;
+        for game in [1, 2] {
+            let written = store.mark_record_written(Id([game; 16]));
+            written.await.expect("committed");
+        }
+
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [header.game_id]);
+        let has_files = store.outlives_server();
+        let filed: &[Id] = if has_files { &[header.game_id] } else { &[] };
+        assert_eq!(forgotten.filed, filed);
+        let redactions = Redactions {
+            names: 4,
+            expressions: 1,
+            annotations: 1,
+        };
+        assert_eq!(forgotten.redactions, redactions);
+        let unwritten = store.without_record_file().await.expect("readable");
+        assert_eq!(unwritten, filed);
+
+        let stored = store.finished(header.game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(header, entries, None)) = stored else {
+            panic!("signed, or not there: {stored:?}");
+        };
+        assert_eq!(header.name, "deleted 1’s table");
+        let expected = [
+            seated(0, "deleted 1"),
+            at_once(Change::Vacated(Seat::new(0))),
+            seated(1, "deleted 1"),
+            seated(0, "Bo"),
+            expressed(0),
+            decided(0),
+            match decided(1).change {
+                Change::Decided(decided) => at_once(Change::Decided(Decided {
+                    annotations: None,
+                    ..decided
+                })),
+                _ => unreachable!("it is a decision"),
+            },
+            marked("deleted 1 laughs"),
+            marked("Anatole laughs"),
+        ];
+        assert_eq!(format!("{entries:?}"), format!("{expected:?}"));
+        let named = |participant: &str| v1::RecordFilter {
+            participant: participant.into(),
+            ..v1::RecordFilter::default()
+        };
+        for (name, games) in [("Ana", 0), ("deleted 1", 1), ("Bo", 1), ("random", 1)] {
+            let found = store.list(&named(name), Part::FROM_OLDEST, 9).await;
+            assert_eq!(found.expect("readable").len(), games, "{name}");
+        }
+        let again = store.forget(&ana()).await.expect("nothing to do");
+        assert_eq!(again, Forgotten::default());
+    })
+    .await;
+}
+
+async fn created_of_others(store: &dyn Store) -> Box<dyn Journal> {
+    let created = store.create(header(2, Durability::Durable), vec![seated(0, "Bo")]);
+    created.await.expect("a new game")
+}
+
+#[tokio::test]
+async fn an_imported_record_is_changed_too() {
+    with_each_store(async |store| {
+        let header = header(1, Durability::Durable);
+        let record: Arc<[v1::RecordLine]> = Arc::from([v1::RecordLine {
+            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+                seats: summary_of(&header).seats,
+                ..v1::RecordHeader::default()
+            })),
+        }]);
+        let imported = store.import(header.game_id, *summary_of(&header), record);
+        assert_eq!(imported.await, Ok(true));
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [header.game_id]);
+        let stored = store.finished(header.game_id).await.expect("readable");
+        let Some(StoredGame::Imported(lines)) = stored else {
+            panic!("{stored:?}");
+        };
+        let Some(v1::record_line::Line::Header(header)) = &lines[0].line else {
+            panic!("{lines:?}");
+        };
+        let names: Vec<&str> = header.seats.iter().map(|seat| seat.name.as_str()).collect();
+        assert_eq!(names, ["Bo", "deleted 1", "Ana"]);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn what_is_not_over_prevents_it() {
+    with_each_database(async |store| {
+        let (header, [begin, _]) = game(1);
+        let created = store.create(Arc::clone(&header), begin).await;
+        let mut journal = created.expect("a new game");
+        let mut over = created_of_others(store).await;
+        over.append(&mut vec![seated(1, "Ana")])
+            .await
+            .expect("committed");
+        finish(&mut over, 2).await;
+        let refused = store.forget(&ana()).await;
+        assert!(matches!(refused, Err(ForgetError::GameRunning(name)) if name == "Ana"));
+        let stored = store.finished(Id([2; 16])).await.expect("readable");
+        assert!(format!("{stored:?}").contains("Ana"), "nothing was changed");
+        let ended = journal.finish(Some(summary_of(&header)), None);
+        ended.await.expect("committed");
+
+        let entrant = Entrant {
+            name: "Ana".into(),
+            kind: chefshat_tournament::ParticipantKind::Human,
+            built_in: None,
+            filler: false,
+            stateless: false,
+            max_games: 1,
+            at_table: false,
+        };
+        let tournament = Arc::new(cup(7));
+        let joined = vec![TournamentEntry::Change(TournamentChange::Joined(entrant))];
+        let made = store.create_tournament(Arc::clone(&tournament), joined);
+        made.await.expect("committed");
+        let refused = store.forget(&ana()).await;
+        assert!(matches!(refused, Err(ForgetError::TournamentRunning(_))));
+        let closed = vec![TournamentEntry::Change(TournamentChange::Closed)];
+        let closing = store.append_tournament(tournament.id, 1, closed);
+        closing.await.expect("committed");
+        let forgotten = store.forget(&ana()).await.expect("all is over");
+        assert_eq!((forgotten.games.len(), forgotten.tournaments), (2, 1));
+        let stored = store.tournaments(9).await.expect("readable");
+        let stored = format!("{:?}", stored[0].entries);
+        assert!(
+            stored.contains("deleted 1") && !stored.contains("Ana"),
+            "{stored}"
+        );
+    })
+    .await;
+}

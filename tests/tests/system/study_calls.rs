@@ -1,0 +1,346 @@
+//! What a researcher does with a running study besides reading its data: follows it, deletes a
+//! participant by its name or the whole study. And what a participant cannot do to its room.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use chefshat_client::{Client, ConnectOptions, Connection};
+use chefshat_proto::v1::admin_service_client::AdminServiceClient;
+use chefshat_proto::v1::study_service_client::StudyServiceClient;
+use chefshat_proto::v1::{self, study_view::Content};
+use chefshat_room::ids::Id;
+use chefshat_server::access::{Mode, NewToken, Role, TokenFile};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::host::Host;
+use chefshat_server::participants::ParticipantData;
+use chefshat_server::store::{SqliteStore, Store as _};
+use chefshat_tests::patiently;
+use tonic::transport::Channel;
+use tonic::{Code, Streaming};
+
+use crate::records::reason;
+use crate::studies::{Lab, Person, Tap, address, host, playable, settings};
+
+/// The first step with a game.
+const GAMES: u32 = 2;
+
+/// A study on a server, with participants of these names.
+struct Running {
+    lab: Lab,
+    tap: Tap,
+    links: Vec<String>,
+}
+
+async fn running(host: &Host, names: &[&str]) -> Running {
+    let channel = Channel::from_shared(host.url().to_owned()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let request = v1::CreateStudyRequest {
+        settings: Some(settings()),
+        request_id: Vec::new(),
+    };
+    let mut service = StudyServiceClient::new(channel);
+    let created = service.create_study(request).await.expect("valid");
+    let created = created.into_inner();
+    let study = created.study.expect("a study");
+    let mut lab = Lab::connect(host, (study.study_id, created.owner_token)).await;
+    let names = names.iter().map(|name| (*name).to_owned()).collect();
+    Running {
+        links: lab.links(names).await,
+        lab,
+        tap: Tap::new(address(host)).await,
+    }
+}
+
+/// A participant who has come to a game that has a room.
+async fn at_a_game(tap: &Tap, link: &str) -> (Person, v1::StudyShownGame) {
+    let (mut person, view) = Person::new(tap, link).await;
+    person.go_on(view, GAMES).await;
+    let view = person.until(|content| playable(content).is_some()).await;
+    let game = view.content.as_ref().and_then(playable).expect("a game");
+    let game = game.clone();
+    (person, game)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_participant_keeps_its_seat_until_it_withdraws() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = host(folder.path()).await;
+    let study = running(&host, &["Ana"]).await;
+    let (mut person, game) = at_a_game(&study.tap, &study.links[0]).await;
+    let client = Client::connect(host.url()).await.expect("it listens");
+    let left = client.leave_room(game.ticket.as_str()).await;
+    let refused = left.expect_err("the study has assigned the seat");
+    assert_eq!(refused.reason(), Some("SEAT_ASSIGNED"));
+    // The same game is still there to be played.
+    let view = person.open().await.expect("the link is valid");
+    assert_eq!(view.content.as_ref().and_then(playable), Some(&game));
+    let (view, tickets) = person.go_on(view, GAMES + 1).await;
+    assert_eq!(tickets, [game.ticket]);
+    assert_eq!(view.step, GAMES + 1);
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+}
+
+/// What a follower knows of a study.
+#[derive(Default)]
+struct Followed {
+    study: Option<v1::Study>,
+    participants: BTreeMap<u32, v1::StudyParticipant>,
+}
+
+impl Followed {
+    /// Reads updates until the participants are as wanted; `false` if the stream ends before.
+    async fn until(
+        &mut self,
+        updates: &mut Streaming<v1::FollowStudyResponse>,
+        wanted: impl Fn(&BTreeMap<u32, v1::StudyParticipant>) -> bool,
+    ) -> bool {
+        let reading = async {
+            while !wanted(&self.participants) {
+                let Some(update) = updates.message().await.expect("it ends well") else {
+                    return false;
+                };
+                if self.study.is_none() {
+                    assert!(update.study.is_some(), "the first message has the study");
+                }
+                self.study = update.study.or(self.study.take());
+                let changed = update.participants.into_iter();
+                self.participants.extend(changed.map(|it| (it.number, it)));
+            }
+            true
+        };
+        patiently("the next update", reading).await
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_study_is_followed_until_it_is_over_and_deleted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = host(folder.path()).await;
+    let Running {
+        mut lab,
+        tap,
+        links,
+    } = running(&host, &["Ana", "Bo"]).await;
+    let request = v1::FollowStudyRequest {
+        study_id: lab.study_id.clone(),
+        owner_token: "wrong".into(),
+    };
+    let refused = lab.service.follow_study(request.clone()).await;
+    assert_eq!(reason(&refused.expect_err("wrong")), "STUDY_UNKNOWN");
+    let request = v1::FollowStudyRequest {
+        owner_token: lab.owner_token.clone(),
+        ..request
+    };
+    let followed = lab.service.follow_study(request).await;
+    let mut updates = followed.expect("its owner").into_inner();
+    let mut known = Followed::default();
+    assert!(known.until(&mut updates, |all| all.len() == 2).await);
+    let invited = v1::StudyParticipantState::Invited;
+    assert!(known.participants.values().all(|it| it.state() == invited));
+
+    // Each change of a participant arrives: it begins, comes to a game, and the game has a room.
+    let (_ana, game) = at_a_game(&tap, &links[0]).await;
+    let plays = |it: &v1::StudyParticipant| it.games.iter().any(|it| it.game_id == game.game_id);
+    assert!(known.until(&mut updates, |all| plays(&all[&1])).await);
+    let ana = &known.participants[&1];
+    assert_eq!(
+        (ana.state(), ana.step),
+        (v1::StudyParticipantState::Active, GAMES)
+    );
+    assert_eq!(known.participants[&2].state(), invited);
+
+    let delete = |lab: &Lab, force| v1::DeleteStudyRequest {
+        study_id: lab.study_id.clone(),
+        owner_token: lab.owner_token.clone(),
+        force,
+    };
+    let refused = lab.service.delete_study(delete(&lab, false)).await;
+    assert_eq!(reason(&refused.expect_err("Ana plays")), "STUDY_RUNNING");
+    let deleted = lab.service.delete_study(delete(&lab, true)).await;
+    let deleted = deleted.expect("forced").into_inner();
+    assert_eq!((deleted.participants, deleted.games), (2, 1));
+    // The follower sees the end, or at least that there is nothing more.
+    assert!(!known.until(&mut updates, |_| false).await);
+    let removed = v1::StudyParticipantState::Removed;
+    assert_eq!(known.participants[&1].state(), removed);
+    let again = lab.service.delete_study(delete(&lab, true)).await;
+    assert_eq!(reason(&again.expect_err("it is gone")), "STUDY_UNKNOWN");
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    assert_eq!(store.studies().await, Ok(Vec::new()));
+    let game = Id::parse(&game.game_id).expect("an id");
+    assert!(store.finished(game).await.expect("readable").is_none());
+    store.close().await;
+}
+
+/// A server open to all on a folder, and what its operator calls.
+async fn operated(folder: &Path) -> (Host, AdminServiceClient<Connection>) {
+    let new = NewToken {
+        role: Role::Admin,
+        label: String::new(),
+        lifetime: None,
+        scope: None,
+    };
+    let token = TokenFile::of(folder).create(new).expect("a token");
+    let store = SqliteStore::open(folder).await.expect("a store");
+    let mut config = ServerConfig {
+        data_dir: Some(PathBuf::from(folder)),
+        grace: std::time::Duration::ZERO,
+        ..ServerConfig::default()
+    };
+    config.access.mode = Some(Mode::Open);
+    let host = Host::start(config, Arc::new(store)).await;
+    let host = host.expect("a free port");
+    let options = ConnectOptions {
+        token: Some(token.to_text()),
+        ca: None,
+    };
+    let client = Client::connect_with(host.url(), &options).await;
+    let operator = AdminServiceClient::new(client.expect("it listens").channel());
+    (host, operator)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_participant_is_known_by_its_name_to_the_operator() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (host, mut operator) = operated(folder.path()).await;
+    let mut study = running(&host, &["Pseudonym-of-Ana", "Pseudonym-of-Bo"]).await;
+    let (mut person, _) = at_a_game(&study.tap, &study.links[0]).await;
+    let name = || "Pseudonym-of-Ana".to_owned();
+    let request = v1::ExportParticipantRequest { name: name() };
+    let exported = operator.export_participant(request).await;
+    let mut lines = exported.expect("allowed").into_inner();
+    let mut kinds: BTreeMap<&str, u32> = BTreeMap::new();
+    while let Some(response) = lines.message().await.expect("it ends well") {
+        assert_eq!(response.unread_files, [""; 0]);
+        for kind in ["participant", "study", "answer", "decision"] {
+            let starts = format!("{{\"{kind}\":");
+            *kinds.entry(kind).or_default() += u32::from(response.line.starts_with(&starts));
+        }
+    }
+    // The six items of NASA-TLX; its game is not over.
+    let expected = [
+        ("participant", 1),
+        ("study", 1),
+        ("answer", 6),
+        ("decision", 0),
+    ];
+    assert_eq!(kinds, expected.into());
+
+    // Its game is closed, and its data in the study are deleted.
+    let request = v1::DeleteParticipantRequest { name: name() };
+    let deleted = operator.delete_participant(request.clone()).await;
+    let deleted = deleted.expect("all can be closed").into_inner();
+    assert_eq!((deleted.studies, deleted.games), (1, 0));
+    let view = person.open().await.expect("the link is valid");
+    let Some(Content::End(end)) = view.content else {
+        panic!("it is the end");
+    };
+    assert_eq!(end.reason(), v1::StudyEndReason::DataDeleted);
+    let participants = study.lab.participants().await;
+    assert!(participants[0].data_deleted && !participants[1].data_deleted);
+    let again = operator
+        .delete_participant(request)
+        .await
+        .expect("the same");
+    assert_eq!(again.into_inner().studies, 0);
+    let request = v1::ExportParticipantRequest { name: name() };
+    let exported = operator.export_participant(request).await;
+    let unknown = exported.expect("allowed").into_inner().message().await;
+    assert_eq!(
+        reason(&unknown.expect_err("nothing is left")),
+        "PARTICIPANT_UNKNOWN"
+    );
+    let empty = v1::DeleteParticipantRequest::default();
+    let refused = operator.delete_participant(empty).await;
+    assert_eq!(reason(&refused.expect_err("no name")), "NAME_REFUSED");
+    drop((person, study));
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    let studies = store.studies().await.expect("readable");
+    let stored = store.study(studies[0]).await.expect("readable");
+    let stored = format!("{:?}", stored.expect("it exists").changes);
+    assert!(!stored.contains(&name()) && stored.contains("Pseudonym-of-Bo"));
+    store.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = host(folder.path()).await;
+    let name = "Pseudonym-of-Ana";
+    let study = running(&host, &[name]).await;
+    let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
+    let (view, _) = person.go_on(view, GAMES).await;
+    let game = person.until(|content| playable(content).is_some()).await;
+    let game = game
+        .content
+        .as_ref()
+        .and_then(playable)
+        .expect("a game")
+        .clone();
+    let stop = async |host: Host| {
+        let stopping = patiently("the server to stop", host.stop());
+        stopping.await.expect("a clean end");
+    };
+    stop(host).await;
+    let with_data = async || {
+        let store = Arc::new(SqliteStore::open(folder.path()).await.expect("a store"));
+        let data = ParticipantData::new(Arc::clone(&store) as _, Some(folder.path().into()));
+        (store, data)
+    };
+    let (store, data) = with_data().await;
+    let refused = data.delete(name).await.expect_err("its game is not over");
+    assert!(
+        refused.to_string().contains("a game that is not over"),
+        "{refused}"
+    );
+    store.close().await;
+    drop((store, data));
+
+    let host = crate::studies::host(folder.path()).await;
+    *study.tap.target.lock().expect("not poisoned") = address(&host);
+    let view = patiently("the study to be back", async {
+        loop {
+            match person.open().await {
+                Ok(view) => return view,
+                Err(status) if status.code() == Code::Unavailable => {
+                    tokio::task::yield_now().await;
+                }
+                Err(status) => panic!("{status}, at {view:?}"),
+            }
+        }
+    });
+    let view = view.await;
+    let (view, tickets) = person.go_on(view, GAMES + 1).await;
+    assert_eq!((view.step, tickets), (GAMES + 1, vec![game.ticket]));
+    stop(host).await;
+
+    let (store, data) = with_data().await;
+    let deleted = data.delete(name).await.expect("its game is over");
+    assert_eq!(deleted.studies, 1);
+    let id = store.studies().await.expect("readable")[0];
+    let stored = store.study(id).await.expect("readable").expect("stored");
+    assert!(!format!("{:?}", stored.changes).contains(name));
+    assert_eq!(store.traces(id).await, Ok(Vec::new()));
+    let game = Id::parse(&game.game_id).expect("an id");
+    assert!(store.finished(game).await.expect("readable").is_none());
+    let again = data.delete(name).await.expect("nothing to do");
+    assert!(!again.found_any(), "{again:?}");
+    store.close().await;
+    drop((store, data));
+
+    // The study resumes, and knows that the participant has withdrawn.
+    let host = crate::studies::host(folder.path()).await;
+    let owner = (study.lab.study_id, study.lab.owner_token);
+    let mut lab = Lab::connect(&host, owner).await;
+    let participants = lab.participants().await;
+    let withdrawn = v1::StudyParticipantState::Withdrawn;
+    assert_eq!(participants[0].state(), withdrawn);
+    assert!(participants[0].data_deleted);
+    stop(host).await;
+}
