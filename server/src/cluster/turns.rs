@@ -30,8 +30,15 @@ impl Turns {
 
     /// Whether nothing is being done with a unit.
     pub(super) fn is_idle(&mut self, unit: Id) -> bool {
-        let latest = self.0.get_mut(&unit);
-        latest.is_none_or(|ended| ended.try_recv() != Err(TryRecvError::Empty))
+        let Some(latest) = self.0.get_mut(&unit) else {
+            return true;
+        };
+        if latest.try_recv() == Err(TryRecvError::Empty) {
+            return false;
+        }
+        // A receiver that has seen the end cannot be awaited again: the next place must not get it.
+        self.0.remove(&unit);
+        true
     }
 
     /// Forgets the units with which nothing is done any more.
@@ -74,6 +81,9 @@ mod tests {
         assert!(turns.0.keys().eq([&unit]), "the second remains");
         drop(second);
         assert!(turns.is_idle(unit));
+        let mut third = turns.take(unit);
+        assert_eq!(third.comes().now_or_never(), Some(()));
+        drop(third);
         turns.forget_ended();
         assert!(turns.0.is_empty());
     }
