@@ -10,8 +10,8 @@ use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use chefshat_record::{jsonl, samples};
 use chefshat_room::ids::Id;
 
+use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Candidate, Skipped, records_with};
-use super::{DataError, ParticipantData, blocking};
 use crate::convert;
 use crate::store::{ForgetError, StoreError};
 

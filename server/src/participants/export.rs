@@ -12,8 +12,8 @@ use chefshat_tournament::Change;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Skipped, records_with};
-use super::{DataError, ParticipantData, blocking};
 use crate::convert;
 use crate::store::Part;
 use crate::store::tournaments::TournamentEntry;

@@ -2,12 +2,12 @@
 //! [`ParticipantData`] does so with a store and a data directory; [`Participants`] also with what a
 //! running server has in memory.
 
+mod data;
 mod delete;
 mod export;
 mod files;
 mod stored_studies;
 
-use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -15,50 +15,14 @@ use chefshat_record::pseudonym::Pseudonym;
 use tokio::sync::{Mutex, mpsc};
 use tracing::info;
 
+pub use data::{DataError, ParticipantData};
 pub use delete::Deleted;
 pub use files::Skipped;
 
 use crate::rooms::Rooms;
-use crate::store::{ForgetError, Store, StoreError};
+use crate::store::ForgetError;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
-
-/// Why a participant's data were not exported or deleted completely.
-#[derive(Debug, thiserror::Error)]
-pub enum DataError {
-    /// The store refuses or failed.
-    #[error(transparent)]
-    Forget(#[from] ForgetError),
-    /// The folder of records cannot be read or written.
-    #[error("the folder of records failed: {0}; check it and try again")]
-    Io(#[from] io::Error),
-    /// The server is shutting down.
-    #[error("the server is shutting down; try again when it is back")]
-    ShuttingDown,
-    /// Nobody receives the lines any more.
-    #[error("the client has gone")]
-    Gone,
-}
-
-impl From<StoreError> for DataError {
-    fn from(error: StoreError) -> Self {
-        Self::Forget(error.into())
-    }
-}
-
-/// What is stored about participants.
-pub struct ParticipantData {
-    store: Arc<dyn Store>,
-    /// Where files of records are; `None` if there are none.
-    data_dir: Option<PathBuf>,
-}
-
-impl ParticipantData {
-    /// For this store, and the files of records in this data directory.
-    pub fn new(store: Arc<dyn Store>, data_dir: Option<PathBuf>) -> Self {
-        Self { store, data_dir }
-    }
-}
 
 /// The participants of a running server.
 pub struct Participants {
@@ -183,12 +147,4 @@ impl std::fmt::Debug for Participants {
             .debug_struct("Participants")
             .finish_non_exhaustive()
     }
-}
-
-/// Runs work that reads files or decodes games on a thread of its own.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, StoreError> {
-    let working = tokio::task::spawn_blocking(work).await;
-    working.map_err(|error| StoreError::Failed(format!("reading stored data failed: {error}")))
 }

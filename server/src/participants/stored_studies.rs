@@ -5,8 +5,8 @@ use chefshat_room::ids::Id;
 use chefshat_study::{Answer, Change, Study, Task};
 use serde_json::json;
 
+use super::data::{DataError, ParticipantData};
 use super::export::Sheet;
-use super::{DataError, ParticipantData};
 use crate::clock::since_epoch_ms;
 use crate::convert;
 use crate::store::StoreError;

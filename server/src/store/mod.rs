@@ -24,7 +24,6 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
 pub use failing::FailingStore;
-pub use forget::{ForgetError, Forgotten};
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{
     DatabaseError, PostgresOptions, PostgresStore, TransferError, Transferred, migrate, transfer,
@@ -127,6 +126,46 @@ pub struct DiskUsage {
     pub bytes: u64,
     /// Bytes that are free.
     pub free_bytes: u64,
+}
+
+/// What was removed from a store.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Forgotten {
+    /// Games that contained the name.
+    pub games: Vec<Id>,
+    /// Those of them whose record was written to a file, which must be written again. Until they
+    /// are marked as written, the next start of the server does.
+    pub filed: Vec<Id>,
+    /// Number of tournaments that contained the name.
+    pub tournaments: u64,
+    /// The changes in the games.
+    pub redactions: Redactions,
+}
+
+/// Why a participant cannot be removed; nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub enum ForgetError {
+    /// A game with the name is not over.
+    #[error(
+        "{0:?} takes part in a game that is not over; nothing was changed: let the game end or close its room on the running server, and try again"
+    )]
+    GameRunning(String),
+    /// A tournament with the name is not over.
+    #[error(
+        "{0:?} takes part in a tournament that is not over; nothing was changed: let it end or close it on the running server, and try again"
+    )]
+    TournamentRunning(String),
+    /// Stored data cannot be read.
+    #[error("{what} cannot be read: {problem}; nothing was changed")]
+    Unreadable {
+        /// The data.
+        what: String,
+        /// The reason.
+        problem: String,
+    },
+    /// The store failed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
 }
 
 /// Stores games.

@@ -190,7 +190,7 @@ fn only_a_dataset_is_replaced() {
     let notes = stage.path("out/notes.txt");
     std::fs::write(&notes, "kept").unwrap();
     let before = contents(&stage.path("out"));
-    assert_eq!(before.len(), 6);
+    assert_eq!(before.len(), 7);
     let ended = stage.export("--force");
     ended.assert_failed(
         "it is not only a dataset: it contains notes.txt, which SHA256SUMS does not list",

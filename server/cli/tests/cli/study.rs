@@ -18,7 +18,7 @@ fn a_study_is_created_and_deleted() {
     let create = ["study", "create", EXAMPLE, "--json", "--server", &url];
     let owner_file = ["--owner-file", owner.to_str().unwrap()];
     let created = chefshat(&[&create[..], &owner_file].concat()).well().json();
-    let id = created["study"]["study_id"].as_str().unwrap();
+    let id = created["study"]["studyId"].as_str().unwrap();
     let owned = |command: &str| {
         let owner = owner.to_str().unwrap();
         run(&url, &format!("study {command} {id} --owner-file {owner}"))

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgConnection};
-use sqlx::{Connection as _, SqlSafeStr as _};
+use sqlx::{ConnectOptions as _, Connection as _, SqlSafeStr as _};
 use tokio::time::timeout;
 
 use super::errors::explain;
@@ -173,7 +173,9 @@ pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseErro
 /// # Errors
 /// The database cannot be reached, is another program's, or is newer than this version.
 pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
-    let mut connection = connect(&address(url)?).await?;
+    // Its statements may take long.
+    let address = address(url)?.disable_statement_logging();
+    let mut connection = connect(&address).await?;
     let before = match schema(&mut connection).await? {
         Schema::Empty => 0,
         Schema::Ours { version, .. } if version > NEWEST => return Err(DatabaseError::Newer),

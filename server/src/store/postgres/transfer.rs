@@ -5,7 +5,7 @@ use std::path::Path;
 
 use futures::TryStreamExt as _;
 use sqlx::postgres::PgConnection;
-use sqlx::{AssertSqlSafe, Connection as _};
+use sqlx::{AssertSqlSafe, ConnectOptions as _, Connection as _};
 use tracing::error;
 
 use super::errors::failure;
@@ -81,7 +81,8 @@ pub async fn transfer(
     if !data_dir.join(DATABASE_FILE).exists() {
         return Err(TransferError::Missing(data_dir.display().to_string()));
     }
-    let address = open::address(url)?;
+    // Its statements may take long.
+    let address = open::address(url)?.disable_statement_logging();
     let contents = Contents::open(data_dir).await?;
     let studies = contents.studies().await?;
     if studies > 0 {

@@ -4,13 +4,11 @@
 use std::path::Path;
 
 use chefshat_record::pseudonym::Pseudonym;
-use sqlx::Row as _;
-use sqlx::sqlite::{SqliteConnection, SqlitePool, SqliteRow};
-use sqlx::{AssertSqlSafe, Connection as _, Executor as _};
-use tracing::warn;
+use sqlx::sqlite::{SqlitePool, SqliteRow};
+use sqlx::{Connection as _, Row as _};
 
 use super::SqliteStore;
-use super::errors::{BUSY_LIMIT, explain, failure};
+use super::errors::{explain, failure};
 use super::open::{self, OpenError};
 use super::reader::Reader;
 use super::rows::with_own_rows;
@@ -135,81 +133,4 @@ async fn journal_of(
     .await
     .map_err(failure)?;
     Ok(rows.iter().map(|row| (row.get(0), row.get(1))).collect())
-}
-
-/// Writes what changes. The records of the games count as not written to files.
-pub(super) async fn rewrite(
-    connection: &mut SqliteConnection,
-    rewrite: &Rewrite,
-) -> sqlx::Result<()> {
-    for game in &rewrite.games {
-        for (row, entries) in &game.journal {
-            sqlx::query("UPDATE journal SET entries = $2 WHERE row = $1")
-                .bind(*row)
-                .bind(entries.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        }
-        if let Some(record) = &game.record {
-            sqlx::query("UPDATE added_records SET record = $2 WHERE game = $1")
-                .bind(game.number)
-                .bind(record.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        }
-        if let Some(header) = &game.header {
-            sqlx::query("UPDATE games SET header = $2 WHERE number = $1")
-                .bind(game.number)
-                .bind(header.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        }
-        if let Some((summary, room_name)) = &game.summary {
-            sqlx::query(
-                "UPDATE games SET summary = $2, room_name = $3, filed = 0, signature = NULL
-                 WHERE number = $1",
-            )
-            .bind(game.number)
-            .bind(summary.as_slice())
-            .bind(room_name.as_str())
-            .execute(&mut *connection)
-            .await?;
-        }
-        sqlx::query(
-            "UPDATE participants SET name = $3 WHERE game = $1 AND name = $2 AND agent = ''",
-        )
-        .bind(game.number)
-        .bind(rewrite.who.name.as_str())
-        .bind(rewrite.who.pseudonym.as_str())
-        .execute(&mut *connection)
-        .await?;
-    }
-    for tournament in &rewrite.tournaments {
-        for (position, entries) in &tournament.rows {
-            sqlx::query(
-                "UPDATE tournament_entries SET entries = $3 WHERE tournament = $1 AND position = $2",
-            )
-            .bind(tournament.number)
-            .bind(*position)
-            .bind(entries.as_slice())
-            .execute(&mut *connection)
-            .await?;
-        }
-    }
-    Ok(())
-}
-
-/// Empties the write-ahead log, which still has what was overwritten, unless a reader needs it:
-/// then the log is emptied later.
-pub(super) async fn empty_log(connection: &mut SqliteConnection) {
-    let limit = format!("PRAGMA busy_timeout = {}", BUSY_LIMIT.as_millis());
-    for text in [
-        "PRAGMA busy_timeout = 0".to_owned(),
-        "PRAGMA wal_checkpoint(TRUNCATE)".to_owned(),
-        limit,
-    ] {
-        if let Err(cause) = connection.execute(AssertSqlSafe(text)).await {
-            warn!(%cause, "the log of the database was not emptied");
-        }
-    }
 }

@@ -8,6 +8,7 @@ mod forget;
 mod journals;
 mod open;
 mod reader;
+mod rewriting;
 mod rows;
 #[cfg(test)]
 pub(super) mod tests;

@@ -15,7 +15,7 @@ use tokio::time::Instant;
 use tracing::{error, warn};
 
 use super::errors::explain;
-use super::forget::{empty_log, rewrite};
+use super::rewriting::{empty_log, rewrite};
 use super::rows::with_own_rows;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
