@@ -9,11 +9,12 @@ use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
-use super::forget::{ForgetError, Forgotten, forget_stored};
+use super::forget::forget_stored;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    Journal, Keep, Part, ResumableGame, Signed, Store, StoreError, StoredGame, matches_filter,
+    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Signed, Store, StoreError,
+    StoredGame, matches_filter,
 };
 use crate::clock::since_epoch_ms;
 use chefshat_room::ids::Id;

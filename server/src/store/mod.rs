@@ -18,7 +18,7 @@ pub mod tournaments;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use chefshat_record::pseudonym::Pseudonym;
+use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};

@@ -8,8 +8,9 @@ use sqlx::postgres::{PgConnection, PgRow};
 
 use super::reader::Reader;
 use super::values::text;
+use crate::store::ForgetError;
 use crate::store::StoreError;
-use crate::store::forget::{ForgetError, GameRows, Rewrite};
+use crate::store::forget::{GameRows, Rewrite};
 use chefshat_room::ids::Id;
 
 /// Games whose journals are searched for a name in one read.

@@ -12,8 +12,8 @@ use super::errors::{explain, failure};
 use super::open::{self, OpenError};
 use super::reader::Reader;
 use super::rows::with_own_rows;
-use crate::store::StoreError;
-use crate::store::forget::{ForgetError, GameRows, Rewrite};
+use crate::store::forget::{GameRows, Rewrite};
+use crate::store::{ForgetError, StoreError};
 use chefshat_room::ids::Id;
 
 impl SqliteStore {

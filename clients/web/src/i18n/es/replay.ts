@@ -24,6 +24,7 @@ export const replay: Texts["replay"] = {
   answered: (name, answer) => `${name}: ${answer}`,
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `estimación ${value.toFixed(2).replace(".", ",")}`,
+  hints: (count) => (count === 1 ? "tras una pista" : `tras ${count} pistas`),
   noTable: "Esta decisión no es un turno y no tiene tabla.",
   analysis: {
     title: "Análisis",
