@@ -12,7 +12,7 @@ use prost::Message as _;
 
 use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
-use super::{ForgetError, Forgotten, StoreError, StoredGame};
+use super::{ForgetError, Forgotten, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader};
 
