@@ -114,7 +114,7 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     plan, hyper = training.plan, training.plan.hyper
     opponents = [opponent.name for opponent in plan.opponents]
     club = next((opponent for opponent in plan.opponents if opponent.name.startswith(CLUB)), Opponent(""))
-    fixed = {"opponents": opponents, "club_python": club.python, "club_arguments": club.arguments}
+    fixed: dict[str, object] = {"opponents": opponents, "club_python": club.python, "club_arguments": club.arguments}
     fixed |= {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
     runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
     if "rules" in options.given:
