@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path("chefshat.pdf"), metavar="FILE", help="the PDF (default: %(default)s)")
     parser.add_argument("--paper", choices=PAPERS, default="a4", help="the paper (default: %(default)s)")
     parser.add_argument(
-        "--deck", type=int, choices=range(DECKS), default=0, help="number of the deck, so that several can be distinguished (default: 0)"
+        "--deck", type=int, choices=range(DECKS), default=0, help="number of the deck, to have several different ones (default: 0)"
     )
     parser.add_argument(
         "--only",
