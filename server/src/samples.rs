@@ -50,8 +50,12 @@ pub enum SampleError {
 #[derive(Debug, Default)]
 pub struct Samples {
     data_dir: Option<PathBuf>,
-    files: Mutex<HashMap<(Id, usize), Arc<Mutex<Option<SeatFile>>>>>,
+    /// By game and seat.
+    files: Mutex<HashMap<(Id, usize), SharedFile>>,
 }
+
+/// The file of a seat; `None` while it is not open.
+type SharedFile = Arc<Mutex<Option<SeatFile>>>;
 
 /// The open file of a seat.
 #[derive(Debug)]
