@@ -1,7 +1,7 @@
 // Listens for the keys of the table wherever the focus is, unless somebody types a text, a dialog is
 // open, or a part of the page has handled the key. They can be switched off in the settings.
 
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { isOn } from "../../preferences";
 
 /** Elements that type. */
@@ -14,7 +14,8 @@ export function useShortcuts(press: (key: string) => boolean): void {
   const latest = useRef(press);
   latest.current = press;
   const on = isOn("keys");
-  useEffect(() => {
+  // With the first picture: a key pressed at once counts.
+  useLayoutEffect(() => {
     if (!on) return;
     const listen = (event: KeyboardEvent) => {
       const { key, target } = event;
