@@ -16,20 +16,15 @@ impl ParticipantData {
     /// Whether a participant of this name has a game of a study that is not over.
     pub(super) async fn plays_in_studies(&self, name: &str) -> Result<bool, StoreError> {
         for (stored, number) in self.in_studies(name).await? {
-            let mut playing = None;
+            let mut is_playing = false;
             for change in &stored.changes {
                 match change {
-                    Change::Placed { number: of, game } if *of == number => {
-                        playing = Some(Id(game.game));
-                    }
-                    Change::GameEnded { number: of, .. } if *of == number => playing = None,
+                    Change::Placed { number: of, .. } if *of == number => is_playing = true,
+                    Change::GameEnded { number: of, .. } if *of == number => is_playing = false,
                     _ => {}
                 }
             }
-            // A server that stops may have noted the end of a game, but not yet in the study.
-            if let Some(game) = playing
-                && self.store.finished(game).await?.is_none()
-            {
+            if is_playing {
                 return Ok(true);
             }
         }
