@@ -2,12 +2,11 @@
 //! operator's request or on a schedule, and gives their disk space back. A crash in between leaves
 //! nothing behind that the next run does not delete.
 
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_record::jsonl;
+use chefshat_record::{atomic_file, jsonl};
 use chefshat_room::ids::Id;
 use tracing::{error, info};
 
@@ -114,27 +113,25 @@ impl Retention {
             let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
             let Some((last, _)) = found.last() else { break };
             after = *last;
-            let games: Vec<_> = (found.into_iter())
-                .filter(|(_, game)| !self.tournaments.needs(*game) && !of_studies.contains(game))
+            let games: Vec<Id> = (found.into_iter())
+                .map(|(_, game)| game)
+                .filter(|game| !self.tournaments.needs(*game) && !of_studies.contains(game))
                 .collect();
             if games.is_empty() {
                 continue;
             }
-            let ids: Vec<Id> = games.into_iter().map(|(_, game)| game).collect();
             // Files before the games: after a crash in between, the next run deletes them.
             if let Some(data_dir) = self.rooms.record_writer().data_dir() {
-                let paths: Vec<_> = (ids.iter())
+                let paths: Vec<_> = (games.iter())
                     .map(|game| jsonl::path_of(data_dir, &game.to_string()))
                     .collect();
-                let deleting = move || paths.iter().try_for_each(|path| remove(path));
+                let deleting = move || paths.iter().try_for_each(|path| atomic_file::remove(path));
                 (tokio::task::spawn_blocking(deleting).await)
                     .map_err(|error| StoreError::Failed(error.to_string()))?
                     .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
             }
-            let deleting = self.rooms.samples().delete(ids.clone()).await;
-            deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
-            pruned.games += ids.len() as u64;
-            store.delete(ids).await?;
+            pruned.games += games.len() as u64;
+            self.rooms.delete_games(games).await?;
             tokio::time::sleep(PAUSE).await;
         }
         let after = self.usage().await?;
@@ -171,12 +168,4 @@ fn size_of(folder: &Path) -> (u64, u64) {
         .fold((0, 0), |(bytes, files), about| {
             (bytes + about.len(), files + 1)
         })
-}
-
-/// Deletes a file that may be missing.
-fn remove(path: &Path) -> io::Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
 }

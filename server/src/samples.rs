@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use chefshat_engine::{MAX_SEATS, Seat};
+use chefshat_engine::Seat;
 use chefshat_proto::v1::SampleChunk;
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::samples;
@@ -27,7 +27,7 @@ const MAX_IDLE_FILES: usize = 256;
 /// Why samples are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum SampleError {
-    /// There is no data directory for them.
+    /// The server has no data directory for them.
     #[error(
         "this server does not record samples: it has no data directory, or shares its games with other servers"
     )]
@@ -79,11 +79,6 @@ impl Samples {
             data_dir,
             files: Mutex::default(),
         }
-    }
-
-    /// Whether samples are recorded.
-    pub fn is_on(&self) -> bool {
-        self.data_dir.is_some()
     }
 
     /// Adds samples of a seat, in a thread that may block. Returns how many were new.
@@ -143,15 +138,8 @@ impl Samples {
             files.retain(|(of, _), _| !games.contains(of));
         }
         let deleting = move || {
-            let seats = games
-                .iter()
-                .flat_map(|game| (0..MAX_SEATS).map(move |seat| (game, seat)));
-            let mut paths =
-                seats.map(|(game, seat)| samples::path_of(&data_dir, &game.to_string(), seat));
-            paths.try_for_each(|path| match std::fs::remove_file(path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-                _ => Ok(()),
-            })
+            let mut games = games.iter();
+            games.try_for_each(|game| samples::delete(&data_dir, &game.to_string()))
         };
         let deleted = tokio::task::spawn_blocking(deleting).await;
         deleted.map_err(io::Error::other)?

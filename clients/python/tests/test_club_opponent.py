@@ -53,7 +53,7 @@ def test_a_player_that_fails_is_named() -> None:
     with pytest.raises(AgentError, match="club_players:NoSuchPlayer"):
         club("NoSuchPlayer")
     with club("Rarest") as opponent, pytest.raises(ChefsHatError, match="only plays games of 4 players, 11 faces"):
-        VectorEnv(None, 2, client_seats=[0], opponents=opponent, rules={"faces": 5})
+        VectorEnv(None, 16, client_seats=[0], opponents=opponent, rules={"faces": 5}, seed=1)
 
 
 def test_a_training_against_a_player_resumes(

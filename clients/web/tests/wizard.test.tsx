@@ -96,7 +96,7 @@ test("a line is said by its button, or by Alt and its digit", async () => {
   expect(shown.said.map(words)).toEqual(["Ciao!", "Two words"]);
 });
 
-test("what a robot shows and says is no report of a person", async () => {
+test("what a robot shows and says is not recorded as reported by a person", async () => {
   const shown = await show(undefined);
   for (const face of all('[data-part="wizard-face"]')) face.click();
   all("[data-line]")[0]?.click();

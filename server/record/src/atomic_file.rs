@@ -118,6 +118,17 @@ fn folder_of(path: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
+/// Deletes a file that may be missing.
+///
+/// # Errors
+/// The file system failed.
+pub fn remove(path: &Path) -> io::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
 /// Makes the entry of a file or folder in its parent folder durable.
 ///
 /// # Errors

@@ -6,9 +6,11 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
+use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1::SampleChunk;
 use prost::Message as _;
 
+use crate::atomic_file;
 use crate::convert::FieldProblem;
 
 /// Most samples of a chunk.
@@ -36,6 +38,14 @@ pub fn path_of(data_dir: &Path, game_id: &str, seat: usize) -> PathBuf {
 pub fn beside(record: &Path, game_id: &str, seat: usize) -> Option<PathBuf> {
     let data_dir = record.parent()?.parent()?;
     Some(path_of(data_dir, game_id, seat))
+}
+
+/// Deletes the samples of all seats of a game in a data directory.
+///
+/// # Errors
+/// The file system failed.
+pub fn delete(data_dir: &Path, game_id: &str) -> io::Result<()> {
+    (0..MAX_SEATS).try_for_each(|seat| atomic_file::remove(&path_of(data_dir, game_id, seat)))
 }
 
 /// Checks a chunk.

@@ -227,16 +227,7 @@ impl AdminService for AdminCalls {
             store_failed()
         })?;
         let deleted = deleted.map_err(data_failed)?;
-        Ok(Response::new(v1::DeleteParticipantResponse {
-            pseudonym: deleted.pseudonym,
-            games: deleted.games,
-            tournaments: deleted.tournaments,
-            studies: deleted.studies,
-            record_files: deleted.files,
-            expressions: deleted.redactions.expressions,
-            annotations: deleted.redactions.annotations,
-            unchanged_files: deleted.skipped.named,
-        }))
+        Ok(Response::new(deleted.into()))
     }
 }
 

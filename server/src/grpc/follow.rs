@@ -45,8 +45,8 @@ pub(super) async fn follow(
     }
 }
 
-/// Tells a client why the stream ends. Waits until the status is received or the client has gone.
-pub(super) async fn end(sender: &Sender, followed: Result<(), Status>) {
+/// Ends a stream, with the reason if there is one. Waits until the client receives it or has gone.
+pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, followed: Result<(), Status>) {
     if let Err(status) = followed {
         // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
@@ -67,7 +67,14 @@ fn is_over(message: &FollowTournamentResponse) -> bool {
     )
 }
 
-async fn send(sender: &Sender, message: FollowTournamentResponse) -> Result<(), Status> {
+/// Sends an update to a follower.
+///
+/// # Errors
+/// It is not received in time, or the follower has gone.
+pub(super) async fn send<M>(
+    sender: &mpsc::Sender<Result<M, Status>>,
+    message: M,
+) -> Result<(), Status> {
     let sent = sender.send_timeout(Ok(message), FOLLOW_SEND_TIMEOUT);
     sent.await.map_err(|_| {
         let seconds = FOLLOW_SEND_TIMEOUT.as_secs();

@@ -288,11 +288,7 @@ pub(super) fn with_heartbeats(
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
 
-    use chefshat_engine::RuleSetSpec;
-    use chefshat_room::journal::{Fill, GameStart};
-    use chefshat_room::policy::Policy;
     use tokio_util::task::TaskTracker;
 
     use super::*;
@@ -306,21 +302,7 @@ mod tests {
         let store = Arc::new(MemoryStore::default());
         let rooms =
             Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-        let created = rooms.create(NewRoom {
-            name: "hints".into(),
-            rules: RuleSetSpec::default().validate().expect("the standard"),
-            policy: Policy::default(),
-            fills: vec![Fill::Open { reserved_for: None }; 4],
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            game_seed: None,
-            physical: false,
-            seating: None,
-            request: None,
-            charged: Key::Local,
-        });
+        let created = rooms.create(NewRoom::for_tests());
         let room = created.await.expect("a room").handle.id();
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let play = Play::new(rooms, tournaments, CancellationToken::new());

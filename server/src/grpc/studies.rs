@@ -18,6 +18,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
+use super::follow::{end, send};
 use super::limits::charged;
 use super::status::{
     Refusal, disk_nearly_full, field, read_failed, request_id, request_id_used, shutting_down,
@@ -202,10 +203,7 @@ impl StudyService for StudyCalls {
         let counted = studies.rooms().metrics().stream(StreamKind::Follow);
         let following = async move {
             let (_place, _counted) = (place, counted);
-            if let Err(status) = follow(&handle, &studies, &sender).await {
-                // It fails only if the client has gone.
-                let _ = sender.send(Err(status)).await;
-            }
+            end(&sender, follow(&handle, &studies, &sender).await).await;
         };
         let closing = self.closing.clone();
         tokio::spawn(closing.run_until_cancelled_owned(following));
@@ -318,6 +316,10 @@ async fn follow(
     studies: &Studies,
     sender: &mpsc::Sender<Result<v1::FollowStudyResponse, Status>>,
 ) -> Result<(), Status> {
+    let response = |study, participants| v1::FollowStudyResponse {
+        study,
+        participants,
+    };
     let mut changes = handle.changes();
     let mut sent_study = None;
     let mut sent: BTreeMap<u32, v1::StudyParticipant> = BTreeMap::new();
@@ -336,40 +338,19 @@ async fn follow(
         let first = parts.next().unwrap_or_default().to_vec();
         if study.is_some() || !first.is_empty() {
             sent_study = study.clone().or(sent_study);
-            send(sender, study, first).await?;
+            send(sender, response(study, first)).await?;
         }
         for part in parts {
-            send(sender, None, part.to_vec()).await?;
+            send(sender, response(None, part.to_vec())).await?;
         }
         if over {
             return Ok(());
         }
         sleep_until(began + FOLLOW_INTERVAL).await;
         while timeout(HEARTBEAT, changes.changed()).await.is_err() {
-            send(sender, None, Vec::new()).await?;
+            send(sender, v1::FollowStudyResponse::default()).await?;
         }
     }
-}
-
-async fn send(
-    sender: &mpsc::Sender<Result<v1::FollowStudyResponse, Status>>,
-    study: Option<v1::Study>,
-    participants: Vec<v1::StudyParticipant>,
-) -> Result<(), Status> {
-    let message = v1::FollowStudyResponse {
-        study,
-        participants,
-    };
-    let sent = sender.send_timeout(Ok(message), FOLLOW_SEND_TIMEOUT);
-    sent.await.map_err(|_| {
-        let seconds = FOLLOW_SEND_TIMEOUT.as_secs();
-        status(
-            Code::ResourceExhausted,
-            "FOLLOWER_TOO_SLOW",
-            format!("an update was not received within {seconds} s; follow again"),
-            [],
-        )
-    })
 }
 
 /// The content of a request to create a study, encoded in one way only.

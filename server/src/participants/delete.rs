@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
-use chefshat_record::{jsonl, samples};
+use chefshat_record::{atomic_file, jsonl, samples};
 use chefshat_room::ids::Id;
 
 use super::data::{DataError, ParticipantData, blocking};
@@ -45,6 +45,21 @@ impl Deleted {
     /// Whether anything was stored about the participant.
     pub fn found_any(&self) -> bool {
         self.games + self.tournaments + self.studies > 0
+    }
+}
+
+impl From<Deleted> for v1::DeleteParticipantResponse {
+    fn from(deleted: Deleted) -> Self {
+        Self {
+            pseudonym: deleted.pseudonym,
+            games: deleted.games,
+            tournaments: deleted.tournaments,
+            studies: deleted.studies,
+            record_files: deleted.files,
+            expressions: deleted.redactions.expressions,
+            annotations: deleted.redactions.annotations,
+            unchanged_files: deleted.skipped.named,
+        }
     }
 }
 
@@ -192,10 +207,8 @@ fn remove_samples(record: &Candidate, lines: &[v1::RecordLine], name: &str) -> i
         if seat.name != name || !seat.built_in_agent.is_empty() {
             return Ok(());
         }
-        match samples::beside(&record.path, &header.game_id, number).map(std::fs::remove_file) {
-            Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => Err(error),
-            _ => Ok(()),
-        }
+        let path = samples::beside(&record.path, &header.game_id, number);
+        path.map_or(Ok(()), |path| atomic_file::remove(&path))
     })
 }
 

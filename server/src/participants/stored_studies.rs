@@ -9,6 +9,7 @@ use super::data::{DataError, ParticipantData};
 use super::export::Sheet;
 use crate::clock::since_epoch_ms;
 use crate::convert;
+use crate::samples::Samples;
 use crate::store::StoreError;
 use crate::store::studies::StoredStudy;
 
@@ -32,7 +33,7 @@ impl ParticipantData {
     }
 
     /// Deletes a participant's data from the studies. Returns from how many.
-    pub(super) async fn delete_from_studies(&self, name: &str) -> Result<u64, StoreError> {
+    pub(super) async fn delete_from_studies(&self, name: &str) -> Result<u64, DataError> {
         let mut count = 0;
         for (stored, number) in self.in_studies(name).await? {
             let mut changes = stored.changes;
@@ -48,6 +49,8 @@ impl ParticipantData {
             // A server completes what is interrupted between these two.
             let id = stored.header.id;
             self.store.rewrite_study(id, changes, number).await?;
+            let samples = Samples::new(self.data_dir.clone());
+            samples.delete(games.clone()).await?;
             self.store.delete(games).await?;
             count += 1;
         }

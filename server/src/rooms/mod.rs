@@ -78,6 +78,30 @@ pub struct NewRoom {
     pub charged: Key,
 }
 
+#[cfg(test)]
+impl NewRoom {
+    /// A room of the standard rules with four open seats, for tests.
+    pub(crate) fn for_tests() -> Self {
+        Self {
+            name: "a room".into(),
+            rules: chefshat_engine::RuleSetSpec::default()
+                .validate()
+                .expect("the standard"),
+            policy: Policy::default(),
+            fills: vec![Fill::Open { reserved_for: None }; 4],
+            wizards: BTreeSet::new(),
+            display_names: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: None,
+            physical: false,
+            seating: None,
+            request: None,
+            charged: Key::Local,
+        }
+    }
+}
+
 /// The part of a room's settings that a tournament or study decides.
 #[derive(Debug)]
 pub struct Seating {
@@ -224,6 +248,16 @@ impl Rooms {
             shares: config.shares,
             samples,
         }))
+    }
+
+    /// Deletes finished games from the store, with the samples of their seats.
+    ///
+    /// # Errors
+    /// The store or the file system failed; doing it again completes it.
+    pub async fn delete_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
+        let deleting = self.samples.delete(games.clone()).await;
+        deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
+        self.context.store.delete(games).await
     }
 
     /// The samples of seats.

@@ -1,7 +1,5 @@
 //! Creation of rooms.
 
-use chefshat_engine::RuleSetSpec;
-
 use super::*;
 use crate::store::{FailingStore, MemoryStore, ResumableGame};
 use chefshat_room::ids::SecretHash;
@@ -22,17 +20,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
     };
     let made = rooms.create(NewRoom {
         name: "a game of a tournament".into(),
-        rules: RuleSetSpec::default().validate().expect("the standard"),
-        policy: Policy::default(),
         fills: vec![fill; 4],
-        display_names: BTreeMap::new(),
-        wizards: std::collections::BTreeSet::new(),
-        recorded: BTreeMap::new(),
-        start: GameStart::default(),
-        game_seed: None,
-        physical: false,
-        request: None,
-        charged: Key::Local,
         seating: Some(Seating {
             part_of: PartOf::Tournament(TournamentGame {
                 tournament: Id([1; 16]),
@@ -43,6 +31,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
             participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
             server_seed: None,
         }),
+        ..NewRoom::for_tests()
     });
     let made = made.await.expect("the first commit succeeds");
     let room = made.handle.describe().await.expect("the room exists");
@@ -59,21 +48,7 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
         TaskTracker::new(),
     );
     let rooms = rooms.expect("threads");
-    let made = rooms.create(NewRoom {
-        name: "open".into(),
-        rules: RuleSetSpec::default().validate().expect("the standard"),
-        policy: Policy::default(),
-        fills: vec![Fill::Open { reserved_for: None }; 4],
-        display_names: BTreeMap::new(),
-        wizards: std::collections::BTreeSet::new(),
-        recorded: BTreeMap::new(),
-        start: GameStart::default(),
-        game_seed: None,
-        physical: false,
-        request: None,
-        charged: Key::Local,
-        seating: None,
-    });
+    let made = rooms.create(NewRoom::for_tests());
     let open = made.await.expect("a room").handle.id();
     let header = rooms.header(open).expect("it exists");
     // Its code was that of a room that another node had.

@@ -317,8 +317,8 @@ impl StudyHandle {
         closed.await.map(drop)
     }
 
-    /// Deletes the study, and returns the number of its games once all is deleted. Whoever is in
-    /// the middle of it is removed if `force` is set.
+    /// Deletes the study, and returns the number of its games once all is deleted. Participants
+    /// in the middle of it are removed if `force` is set.
     ///
     /// # Errors
     /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how

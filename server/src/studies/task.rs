@@ -306,19 +306,12 @@ impl Task {
                 self.rooms.forget(Id(game.placed.room));
             }
             let count = ids.len();
-            self.delete_games(ids).await?;
+            self.rooms.delete_games(ids).await?;
             handle.lock_deleting().remove(&number);
             info!(study = %handle.id(), number, games = count, "the data of a participant were deleted");
             any = true;
         }
         Ok(any)
-    }
-
-    /// Deletes games with their samples.
-    async fn delete_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
-        let deleting = self.rooms.samples().delete(games.clone()).await;
-        deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
-        self.rooms.store().delete(games).await
     }
 
     /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
@@ -335,7 +328,7 @@ impl Task {
         let count = games.len();
         let store = self.rooms.store();
         // The games first: a repetition completes what was interrupted in between.
-        self.delete_games(games).await?;
+        self.rooms.delete_games(games).await?;
         store.delete_study(self.handle.id()).await?;
         info!(study = %self.handle.id(), games = count, "a study was deleted");
         if let Some(reply) = self.deletion.take() {

@@ -433,7 +433,7 @@ async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
     assert_eq!(former(0), 2);
     let other = replace(1, built_in("random", "", 2)).await;
     assert_eq!(other, Err(ByHandRefusal::RequestIdUsed));
-    // At a physical table there is no ticket either.
+    // Nor does a physical table return a ticket.
     for _ in 0..2 {
         assert_eq!(replace(at_table, cem(4)).await, Ok(None));
         assert_eq!(former(at_table), 1);

@@ -100,7 +100,7 @@ async fn the_offset_is_known_to_half_the_round_trip() {
     let clock = client.clock().await.expect("a clock");
     assert_eq!(clock.room_at(Instant::now()), None);
     assert_eq!(clock.instant_of(0), None);
-    // The server is in this process: there is no offset.
+    // The server is in this process, so the offset is zero.
     let error = clock.round_trip() / 2 + Duration::from_micros(2);
     assert!(u128::from(clock.offset_us().unsigned_abs()) <= error.as_micros());
     let refused = client.room_clock("ab".repeat(16)).await;

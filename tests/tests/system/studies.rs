@@ -301,6 +301,22 @@ impl Person {
             .expect("a view")
     }
 
+    /// Opens the link when the server that was restarted has the study.
+    pub(crate) async fn back(&mut self) -> v1::StudyView {
+        let opened = async {
+            loop {
+                match self.open().await {
+                    Ok(view) => return view,
+                    Err(status) if status.code() == Code::Unavailable => {
+                        tokio::task::yield_now().await;
+                    }
+                    Err(status) => panic!("{status}"),
+                }
+            }
+        };
+        patiently("the study to be back", opened).await
+    }
+
     async fn trace(&mut self, game_id: &str) {
         let request = v1::RecordTracesRequest {
             session: self.session.clone(),
@@ -553,18 +569,7 @@ async fn a_study_from_its_links_to_its_data() {
     let gone = [people.remove(4), people.remove(2)];
     let mut everybody = Vec::new();
     for mut person in people {
-        let view = patiently("the study to be back", async {
-            loop {
-                match person.open().await {
-                    Ok(view) => return view,
-                    Err(status) if status.code() == Code::Unavailable => {
-                        tokio::task::yield_now().await;
-                    }
-                    Err(status) => panic!("{status}"),
-                }
-            }
-        });
-        let view = view.await;
+        let view = person.back().await;
         everybody.push((person, view));
     }
     let shown = everybody[0].1.content.as_ref().and_then(playable);

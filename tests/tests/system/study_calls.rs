@@ -9,6 +9,7 @@ use chefshat_client::{Client, ConnectOptions, Connection};
 use chefshat_proto::v1::admin_service_client::AdminServiceClient;
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
 use chefshat_proto::v1::{self, study_view::Content};
+use chefshat_record::samples;
 use chefshat_room::ids::Id;
 use chefshat_server::access::{Mode, NewToken, Role, TokenFile};
 use chefshat_server::config::ServerConfig;
@@ -16,8 +17,8 @@ use chefshat_server::host::Host;
 use chefshat_server::participants::ParticipantData;
 use chefshat_server::store::{SqliteStore, Store as _};
 use chefshat_tests::patiently;
+use tonic::Streaming;
 use tonic::transport::Channel;
-use tonic::{Code, Streaming};
 
 use crate::records::reason;
 use crate::studies::{Lab, Person, Tap, address, host, playable, settings};
@@ -275,7 +276,7 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     let name = "Pseudonym-of-Ana";
     let study = running(&host, &[name]).await;
     let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
-    let (view, _) = person.go_on(view, GAMES).await;
+    person.go_on(view, GAMES).await;
     let game = person.until(|content| playable(content).is_some()).await;
     let game = game
         .content
@@ -304,23 +305,15 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
 
     let host = crate::studies::host(folder.path()).await;
     *study.tap.target.lock().expect("not poisoned") = address(&host);
-    let view = patiently("the study to be back", async {
-        loop {
-            match person.open().await {
-                Ok(view) => return view,
-                Err(status) if status.code() == Code::Unavailable => {
-                    tokio::task::yield_now().await;
-                }
-                Err(status) => panic!("{status}, at {view:?}"),
-            }
-        }
-    });
-    let view = view.await;
+    let view = person.back().await;
     // Before the last step, the next game has a room as soon as one is over.
     let last = view.steps - 1;
     let (view, tickets) = person.go_on(view, last).await;
     assert_eq!((view.step, &tickets[0]), (last, &game.ticket));
     stop(host).await;
+    let samples = samples::path_of(folder.path(), &game.game_id, 0);
+    std::fs::create_dir(samples::folder_of(folder.path())).expect("a new folder");
+    std::fs::write(&samples, []).expect("written");
 
     let (store, data) = with_data().await;
     let deleted = data.delete(name).await.expect("its games are over");
@@ -331,6 +324,7 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     assert_eq!(store.traces(id).await, Ok(Vec::new()));
     let game = Id::parse(&game.game_id).expect("an id");
     assert!(store.finished(game).await.expect("readable").is_none());
+    assert!(!samples.exists());
     let again = data.delete(name).await.expect("nothing to do");
     assert!(!again.found_any(), "{again:?}");
     store.close().await;

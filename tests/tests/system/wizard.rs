@@ -56,7 +56,7 @@ async fn a_person_who_plays_as_a_robot_is_one_until_the_record() {
         ("Ada", ParticipantKind::Human),
         ("Bo", ParticipantKind::Human),
         ("Cem", ParticipantKind::Human),
-        // It is no seat for people.
+        // People cannot take this seat.
         ("Dia", ParticipantKind::Human),
         ("Robbie", ParticipantKind::Robot),
     ] {

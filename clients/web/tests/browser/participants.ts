@@ -95,7 +95,7 @@ export async function consent(page: Page): Promise<void> {
   await page.locator("[data-decision]").waitFor();
 }
 
-/** Plays at most so many decisions, and continues once the game is over. Returns their number. */
+/** Takes decisions up to a number, and continues once the game is over. Returns how many it took. */
 export async function playGame(page: Page, most = Number.POSITIVE_INFINITY): Promise<number> {
   const onward = page.locator('[data-part~="study-game"]').getByRole("button", { name: "Continue" });
   const decision = page.locator("[data-decision]");

@@ -103,17 +103,8 @@ impl Delete {
         });
         let deleted = deleting.await?;
         SqliteStore::purge(&self.who.data_dir()?).await?;
-        let response = v1::DeleteParticipantResponse {
-            pseudonym: deleted.pseudonym,
-            games: deleted.games,
-            tournaments: deleted.tournaments,
-            studies: deleted.studies,
-            record_files: deleted.files,
-            expressions: deleted.redactions.expressions,
-            annotations: deleted.redactions.annotations,
-            unchanged_files: Vec::new(),
-        };
-        Ok((response, deleted.skipped))
+        let skipped = deleted.skipped.clone();
+        Ok((deleted.into(), skipped))
     }
 
     /// Asks for confirmation.

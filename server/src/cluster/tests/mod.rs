@@ -3,14 +3,12 @@
 
 mod fake;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Fill, GameStart, ParticipantKind};
+use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{Durability, Policy};
 use futures::FutureExt as _;
 use tokio::time::{Instant, sleep, timeout};
@@ -87,22 +85,11 @@ impl TestNode {
 
     async fn create(&self, durability: Durability) -> Handle {
         let made = self.rooms.create(NewRoom {
-            name: "a room".into(),
-            rules: RuleSetSpec::default().validate().expect("the standard"),
             policy: Policy {
                 durability,
                 ..Policy::default()
             },
-            fills: vec![Fill::Open { reserved_for: None }; 4],
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            game_seed: None,
-            physical: false,
-            request: None,
-            charged: Key::Local,
-            seating: None,
+            ..NewRoom::for_tests()
         });
         made.await.expect("a room").handle
     }

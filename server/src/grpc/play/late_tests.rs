@@ -1,9 +1,7 @@
 //! Attachments that come late: the newer stream of a client keeps its seats and participants.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1::{self, seat_command::Command};
 use futures::{FutureExt as _, StreamExt as _};
 use tokio::time::Instant;
@@ -22,8 +20,7 @@ use crate::tournaments::{Call, Entry, Tournaments};
 use crate::wire::Received;
 use crate::wire::peer::{PlayInput, PlayRequest, play_input::Input};
 use chefshat_room::ids::Token;
-use chefshat_room::journal::{Fill, GameStart, ParticipantKind};
-use chefshat_room::policy::Policy;
+use chefshat_room::journal::ParticipantKind;
 
 struct Server {
     rooms: Arc<Rooms>,
@@ -62,21 +59,7 @@ impl Server {
 
     /// The ticket of a seat in a room that waits for others.
     async fn seat(&self) -> v1::Attach {
-        let created = self.rooms.create(NewRoom {
-            name: "a room".into(),
-            rules: RuleSetSpec::default().validate().expect("the standard"),
-            policy: Policy::default(),
-            fills: vec![Fill::Open { reserved_for: None }; 4],
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            game_seed: None,
-            physical: false,
-            request: None,
-            charged: Key::Local,
-            seating: None,
-        });
+        let created = self.rooms.create(NewRoom::for_tests());
         let room = created.await.expect("a room").handle;
         let joined = room.join(JoinRequest {
             name: "Ada".into(),

@@ -1,10 +1,9 @@
 //! Attachments whose rooms change hands: the other seats of their streams play on.
 
-use std::collections::BTreeMap;
 use std::future::poll_fn;
 use std::sync::{Arc, Mutex};
 
-use chefshat_engine::{RuleSetSpec, Seat};
+use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
 use futures::future::{BoxFuture, ready};
 use futures::{FutureExt as _, StreamExt as _};
@@ -27,8 +26,7 @@ use crate::rooms::{NewRoom, Rooms};
 use crate::store::{MemoryStore, ResumableGame};
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::{Id, Token};
-use chefshat_room::journal::{Change, Entry, Fill, GameStart, ParticipantKind, SeatedParticipant};
-use chefshat_room::policy::Policy;
+use chefshat_room::journal::{Change, Entry, ParticipantKind, SeatedParticipant};
 
 /// Says the same about everything that this node does not have, until the test changes it.
 struct Says {
@@ -131,21 +129,7 @@ impl Node {
 
     /// The ticket of a seat in a new room.
     async fn seat(&self) -> v1::Attach {
-        let created = self.rooms.create(NewRoom {
-            name: "a room".into(),
-            rules: RuleSetSpec::default().validate().expect("the standard"),
-            policy: Policy::default(),
-            fills: vec![Fill::Open { reserved_for: None }; 4],
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            game_seed: None,
-            physical: false,
-            request: None,
-            charged: Key::Local,
-            seating: None,
-        });
+        let created = self.rooms.create(NewRoom::for_tests());
         let room = created.await.expect("a room").handle;
         let joined = room.join(JoinRequest {
             name: "Ada".into(),

@@ -14,6 +14,7 @@ use tonic::{Code, Request, Response, Status};
 use super::{Responses, StudyCalls, refused, stopped};
 use crate::config::{FOLLOW_SEND_TIMEOUT, HEARTBEAT};
 use crate::convert;
+use crate::grpc::follow::end;
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
 use crate::limits::{Key, Refused};
@@ -121,9 +122,7 @@ impl ParticipationService for StudyCalls {
                 followed = following => followed,
                 () = sender.closed() => Ok(()),
             };
-            if let Err(status) = followed {
-                let _ = sender.send(Err(status)).await;
-            }
+            end(&sender, followed).await;
         };
         let closing = self.closing.clone();
         tokio::spawn(closing.run_until_cancelled_owned(following));

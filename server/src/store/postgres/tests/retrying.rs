@@ -342,7 +342,7 @@ async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
         _ = given_up => unreachable!("it never ends"),
         sent = is_sent => sent.expect("it is sent"),
     }
-    // Over the same connection: there is no place for another.
+    // The pool has one connection, so this uses the same.
     let transaction = || {
         store.beats.read(|connection| {
             sqlx::query_scalar::<_, String>("SELECT pg_current_xact_id()::text")
