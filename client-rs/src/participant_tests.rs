@@ -125,6 +125,22 @@ fn played(cup: Cup) -> Result<Vec<String>, String> {
 }
 
 #[test]
+fn a_seat_that_is_attached_twice_is_played_under_its_newest_handle() {
+    let mut cup = Cup::entered();
+    cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1))]);
+    assert_eq!(cup.attach(), ["ticket of a from 1", "cup from 0"]);
+    // The server attaches it with the participant, before it gets to what the client asked for.
+    let sent = cup.receive(vec![
+        (1, entered()),
+        (FIRST_HANDLE, seated(0, "a", 0, 1)),
+        (0, seated(FIRST_SEAT, "a", 0, 1)),
+        (FIRST_HANDLE, detached(v1::DetachReason::Superseded)),
+        (0, decision(4)),
+    ]);
+    assert_eq!(sent, ["0:4=10"]);
+}
+
+#[test]
 fn every_game_has_its_own_agent() {
     let mut cup = Cup::entered();
     let sent = cup.receive(vec![

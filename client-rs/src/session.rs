@@ -163,6 +163,8 @@ impl<'a, A: Agent> Session<'a, A> {
         match update {
             Update::Attached(attached) => {
                 if let Some(number) = self.seat_attached(&attached) {
+                    // The newest handle of a seat replaces older ones, whose updates are ignored.
+                    self.by_handle.retain(|_, other| *other != number);
                     self.by_handle.insert(handle, number);
                     if let Some(seat) = self.seats.get_mut(&number) {
                         seat.attached(attached);
@@ -206,8 +208,6 @@ impl<'a, A: Agent> Session<'a, A> {
         let mut seats = self.seats.iter();
         let known = seats.find(|(_, seat)| seat.game_id() == attached.game_id);
         if let Some((&number, _)) = known {
-            // The newest handle of a seat replaces older ones, whose updates are ignored.
-            self.by_handle.retain(|_, other| *other != number);
             return Some(number);
         }
         let seat = participant.seated(attached);

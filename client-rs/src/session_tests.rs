@@ -518,7 +518,7 @@ fn unknown_handles_and_numbers_are_ignored() {
     let sent = harness.receive(vec![
         (u32::MAX, decision(1)),
         (7, detached(v1::DetachReason::Superseded)),
-        (u32::MAX, stray(1)),
+        (u32::MAX, stray(2)),
         (0, stray(0)),
         (0, stray(u32::MAX)),
         (0, refused(0)),

@@ -121,6 +121,21 @@ def test_a_seat_attached_twice_is_one_seat() -> None:
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
 
 
+def test_a_seat_that_the_server_attached_first_is_played_under_its_newest_handle() -> None:
+    cup = Cup()
+    cup.receive(seated(FIRST_HANDLE, "a"), events(1, handle=FIRST_HANDLE))
+    cup.session.lost()
+    cup.connect()
+    (ask,) = cup.receive(
+        entered(1),
+        seated(FIRST_HANDLE, "a"),
+        seated(0, "a", request_id=1, next_sequence=2),
+        detached("SUPERSEDED", handle=FIRST_HANDLE),
+        decision(4, 0),
+    )
+    assert ask.agent is cup.scribes["a"]
+
+
 def test_a_game_that_ended_is_not_played_again() -> None:
     cup = Cup()
     cup.receive(seated(FIRST_HANDLE, "a"), ended(1, handle=FIRST_HANDLE))

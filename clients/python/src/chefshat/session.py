@@ -263,9 +263,6 @@ class PlaySession:
         """Returns the session of a participant's seat, which may be new."""
         for seat in self._seats.values():
             if seat.info is not None and seat.info.game_id == attached.game_id:
-                # The newest handle of a seat replaces an older one.
-                if seat.handle is not None:
-                    self._by_handle.pop(seat.handle, None)
                 return seat
         return self._add_seat(participant, attached, attached.ticket)
 
@@ -292,6 +289,9 @@ class PlaySession:
             participant.end()
         if seat is None:
             return
+        # The newest handle of a seat replaces an older one.
+        if seat.handle is not None:
+            self._by_handle.pop(seat.handle, None)
         seat.handle = handle
         seat.live_from = attached.next_sequence
         seat.attachments += 1

@@ -137,6 +137,9 @@ impl Reader {
             return;
         }
         for (handle, in_scope) in found {
+            if self.waits_for_seats(handle, &in_scope) {
+                continue;
+            }
             let Some(mut parked) = (self.parked.as_mut()).and_then(|it| it.take(handle)) else {
                 continue;
             };
@@ -159,6 +162,24 @@ impl Reader {
         if !waits(&self.rooms) || (parking.is_overdue() && !self.has_live_seats()) {
             self.outbox.end(StreamEnd::RoomGone);
         }
+    }
+
+    /// Whether a parked attachment that has been found is that of a participant one of whose seats,
+    /// which its client attaches first, is not attached yet. The tournament would attach that seat
+    /// itself, and it would then be lost to the client's own attachment.
+    fn waits_for_seats(&self, handle: u32, in_scope: &Result<(), Status>) -> bool {
+        let Some(parking) = &self.parked else {
+            return false;
+        };
+        let token = (parking.get(handle)).and_then(|parked| Token::parse(&parked.attach.ticket));
+        let to = (in_scope.as_ref().err())
+            .and_then(is_elsewhere)
+            .map(|it| &it.peer);
+        token.is_some_and(|Token { secret, .. }| {
+            let remote = self.remote.as_ref();
+            parking.has_before(handle, &secret)
+                || remote.is_some_and(|it| it.has_before(handle, &secret, to))
+        })
     }
 
     /// The commands that are read until a seat is attached, if it waits for something.

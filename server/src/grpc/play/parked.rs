@@ -40,6 +40,11 @@ impl Parked {
     pub(super) fn is_overdue(&self) -> bool {
         self.since.elapsed() >= PATIENCE
     }
+
+    /// Whether it has this secret, as a participant of a tournament and its seats have the same.
+    pub(super) fn has_secret(&self, secret: &[u8; 32]) -> bool {
+        Token::parse(&self.attach.ticket).is_some_and(|token| token.secret == *secret)
+    }
 }
 
 /// What a search has found: the handle of an attachment, and whether this node has its room or
@@ -81,6 +86,10 @@ impl Parking {
         self.waiting.values().map(|parked| &parked.attach)
     }
 
+    pub(super) fn get(&self, handle: u32) -> Option<&Parked> {
+        self.waiting.get(&handle)
+    }
+
     pub(super) fn get_mut(&mut self, handle: u32) -> Option<&mut Parked> {
         self.waiting.get_mut(&handle)
     }
@@ -103,6 +112,12 @@ impl Parking {
     pub(super) fn take(&mut self, handle: u32) -> Option<Parked> {
         self.fresh.remove(&handle);
         self.waiting.remove(&handle)
+    }
+
+    /// Whether an attachment with this secret was parked before this handle.
+    pub(super) fn has_before(&self, handle: u32, secret: &[u8; 32]) -> bool {
+        let mut before = self.waiting.range(..handle);
+        before.any(|(_, parked)| parked.has_secret(secret))
     }
 
     /// Whether an attachment has waited for so long that its client should rather try another node.

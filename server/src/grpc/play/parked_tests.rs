@@ -18,7 +18,7 @@ use crate::access::Caller;
 use crate::cluster::{Directory, FoundBy, Location, NodeLease, Peer, PeerPort};
 use crate::config::ServerConfig;
 use crate::grpc::forward::ForwardLayer;
-use crate::grpc::status::owner_unreachable;
+use crate::grpc::status::{owner_unreachable, ticket_unknown};
 use crate::limits::{CallLimits, Key, Shares};
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::{JoinRequest, Joined};
@@ -336,4 +336,49 @@ async fn what_changes_hands_together_is_found_in_its_order() {
         let handles: Vec<u32> = found.into_iter().map(|(handle, _)| handle).collect();
         assert_eq!(handles, [4, 6]);
     }
+}
+
+#[tokio::test]
+async fn a_participant_waits_for_the_seats_that_its_client_attached_before() {
+    let node = Node::start(&Says::only(Location::Unknown));
+    let mut stream = node.stream();
+    let seat = Token::random(Id([1; 16]));
+    let participant = Token {
+        room: Id([2; 16]),
+        ..seat
+    };
+    stream.read(0, Command::Attach(attachment(&seat)));
+    stream.read(1, Command::Attach(attachment(&participant)));
+    stream.read(2, Command::Attach(elsewhere()));
+    let found = |handle| (handle, Err(ticket_unknown()));
+    stream.reader.attach_parked(vec![found(1), found(2)]).await;
+    assert_eq!(stream.received(), Ok(vec![(2, "refused")]));
+    stream.reader.attach_parked(vec![found(0), found(1)]).await;
+    let in_order = vec![(0, "refused"), (1, "refused")];
+    assert_eq!(stream.received(), Ok(in_order));
+}
+
+#[tokio::test]
+async fn a_participant_waits_for_a_seat_on_its_way_to_a_node_that_has_died() {
+    let directory = Says::first(unreachable_node().await, Location::Nowhere);
+    let node = Node::start(&directory);
+    let mut stream = stream_of_gateway(&node, &directory).await;
+    let seat = Token::random(Id([1; 16]));
+    let participant = Token {
+        room: Id([2; 16]),
+        ..seat
+    };
+    stream.read(0, Command::Attach(attachment(&seat)));
+    stream.search().await;
+    stream.read(1, Command::Attach(attachment(&participant)));
+    let found = || vec![(1, Err(ticket_unknown()))];
+    stream.reader.attach_parked(found()).await;
+    assert_eq!(stream.received(), Ok(vec![]), "its seat is not attached");
+    // It is given back, and found nowhere.
+    let mut received = Vec::new();
+    while received.len() < 2 {
+        stream.search().await;
+        received.extend(stream.received().expect("open"));
+    }
+    assert_eq!(received, [(0, "refused"), (1, "refused")]);
 }

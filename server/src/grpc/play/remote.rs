@@ -21,7 +21,7 @@ use tonic::{Request, Status};
 use tracing::debug;
 
 use super::parked::Parked;
-use crate::cluster::{Directory, Elsewhere, FoundBy};
+use crate::cluster::{Directory, Elsewhere, FoundBy, Peer};
 
 use crate::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
 use crate::grpc::forward::Gateway;
@@ -172,6 +172,19 @@ impl RemoteSeats {
     pub(super) fn has_attached(&self) -> bool {
         let attached = |stream: &PeerStream| stream.shared.has_attached();
         self.streams.iter().any(attached)
+    }
+
+    /// Whether an attachment with this secret, made before this handle, is on its way to another node
+    /// than `to`. What goes to one node arrives there in its order.
+    pub(super) fn has_before(&self, handle: u32, secret: &[u8; 32], to: Option<&Peer>) -> bool {
+        let elsewhere = |it: &&PeerStream| to.is_none_or(|to| it.endpoint != to.endpoint);
+        self.streams.iter().filter(elsewhere).any(|stream| {
+            let seats = stream.shared.seats();
+            let mut before = seats
+                .range(..handle)
+                .filter_map(|(_, seat)| seat.parked.as_ref());
+            before.any(|parked| parked.has_secret(secret))
+        })
     }
 
     /// Attaches a seat or participant of another node. If that node turns out to be gone, and the
