@@ -313,13 +313,20 @@ impl Client {
         ticket: impl Into<String>,
         decision_id: u64,
     ) -> Result<v1::Hint, Error> {
-        let mut service = PlayServiceClient::new(self.channel());
+        let mut ask = v1::AskHint {
+            decision_id,
+            ..v1::AskHint::default()
+        };
+        identify(&mut ask.request_id);
         let request = v1::ActRequest {
             ticket: ticket.into(),
-            command: Some(Command::Hint(v1::AskHint { decision_id })),
+            command: Some(Command::Hint(ask)),
         };
-        let response = service.act(request).await?.into_inner();
-        Ok(response.hint.unwrap_or_default())
+        let response = repeated(|| {
+            let (channel, request) = (self.channel(), request.clone());
+            async move { PlayServiceClient::new(channel).act(request).await }
+        });
+        Ok(response.await?.hint.unwrap_or_default())
     }
 
     /// Watches a room from an event number on; 0 and 1 are the first event. Connects when the first

@@ -73,6 +73,24 @@ def test_a_request_whose_response_was_lost_is_repeated_with_its_id(*, asynchrono
     assert len(method.ids[0]) == requests.REQUEST_ID_BYTES
 
 
+def test_a_request_for_a_hint_is_repeated_with_its_id_other_commands_are_not() -> None:
+    ids: list[bytes] = []
+
+    def method(request: pb.ActRequest) -> str:
+        ids.append(request.hint.request_id)
+        if len(ids) == 1:
+            raise Lost
+        return "a hint"
+
+    assert requests.called(method, pb.ActRequest(hint=pb.AskHint(decision_id=7))) == "a hint"
+    assert len(ids) == 2
+    assert len(set(ids)) == 1
+    assert len(ids[0]) == requests.REQUEST_ID_BYTES
+    ids.clear()
+    with pytest.raises(ChefsHatError):
+        requests.called(method, pb.ActRequest(answer=pb.Answer(decision_id=7)))
+
+
 @pytest.mark.parametrize("errors", [[Lost(grpc.StatusCode.FAILED_PRECONDITION)], [Lost()] * 4])
 def test_a_refusal_and_the_last_attempt_are_raised(errors: list[grpc.RpcError]) -> None:
     method = Method(*errors)

@@ -4,6 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError, type UnaryRequest, type UnaryResponse } from "@connectrpc/connect";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { REQUEST_ID_BYTES, repeat } from "../src/api/repeat";
+import { ActRequestSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { GetRoomRequestSchema, JoinRoomRequestSchema } from "../src/gen/chefshat/v1/room_service_pb";
 
 beforeEach(() => void vi.useFakeTimers());
@@ -14,7 +15,11 @@ async function send(message: unknown, errors: ConnectError[]) {
   const ids: unknown[] = [];
   const answered = {} as UnaryResponse;
   const next = repeat(async (request) => {
-    ids.push((request.message as { requestId?: unknown }).requestId);
+    const { requestId, command } = request.message as {
+      requestId?: unknown;
+      command?: { value?: { requestId?: unknown } };
+    };
+    ids.push(requestId ?? command?.value?.requestId);
     const error = errors[ids.length - 1];
     if (error) throw error;
     return answered;
@@ -30,6 +35,17 @@ async function send(message: unknown, errors: ConnectError[]) {
 
 const lost = new ConnectError("connection lost", Code.Unavailable);
 const refused = new ConnectError("the room is full", Code.FailedPrecondition);
+
+test("a request for a hint is repeated with its id, other commands are not", async () => {
+  const hint = create(ActRequestSchema, { command: { case: "hint", value: { decisionId: 7n } } });
+  const { done, ids } = await send(hint, [lost]);
+  expect(done).toBe(true);
+  expect(ids).toHaveLength(2);
+  expect(ids[0]).toHaveLength(REQUEST_ID_BYTES);
+  expect(new Set(ids).size).toBe(1);
+  const answer = create(ActRequestSchema, { command: { case: "answer", value: { decisionId: 7n } } });
+  expect(await send(answer, [lost])).toEqual({ done: false, ids: [undefined] });
+});
 
 test("a request whose response was lost is repeated with its id", async () => {
   const { done, ids } = await send(create(JoinRoomRequestSchema), [lost, lost]);

@@ -15,5 +15,5 @@ pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, show_nothing,
 pub use evaluate::{Allocation, Estimate, Method, evaluate, evaluate_watched, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
-pub use rollout::RolloutPolicy;
+pub use rollout::{RolloutPolicy, Worth, rollout};
 pub use sampler::{Chance, Sampler};

@@ -30,10 +30,11 @@ impl RolloutPolicy {
 
 /// What a Shift was worth to a seat.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
-pub(crate) struct Worth {
-    pub(crate) points: u32,
-    /// From 1.
-    pub(crate) place: u8,
+pub struct Worth {
+    /// Points of the Shift.
+    pub points: u32,
+    /// Place in the Shift, from 1.
+    pub place: u8,
 }
 
 /// Applies an action to a game that ends with its Shift, then lets agents play all seats
@@ -41,7 +42,7 @@ pub(crate) struct Worth {
 ///
 /// # Panics
 /// If the action is not legal.
-pub(crate) fn rollout(
+pub fn rollout(
     mut game: Game,
     action: ActionId,
     seat: Seat,

@@ -27,7 +27,7 @@ use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
 use super::limits::Arrived;
 use super::reach::Reach;
-use super::status::{Refusal, field, stream_ended, ticket_unknown};
+use super::status::{Refusal, field, request_id, stream_ended, ticket_unknown};
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
@@ -216,7 +216,8 @@ impl PlayService for Play {
                 if let Some(executing) = executing {
                     executing.give_back();
                 }
-                let hint = room.hint(token.secret, ask.decision_id).await;
+                let request_id = request_id(&ask.request_id)?;
+                let hint = room.hint(token.secret, ask.decision_id, request_id).await;
                 let hint = hint
                     .map_err(Refusal::from)?
                     .ok_or_else(ticket_unknown)?
@@ -322,7 +323,10 @@ mod tests {
 
     #[tokio::test]
     async fn a_hint_makes_way_for_answers() {
-        let hint = act_request::Command::Hint(v1::AskHint { decision_id: 1 });
+        let hint = act_request::Command::Hint(v1::AskHint {
+            decision_id: 1,
+            ..v1::AskHint::default()
+        });
         assert!(makes_way(hint).await);
         let answer = act_request::Command::Answer(v1::Answer::default());
         assert!(!makes_way(answer).await);

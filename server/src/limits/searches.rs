@@ -128,7 +128,7 @@ impl Searches {
 }
 
 /// A hint.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Hint {
     /// The action that it suggests.
     pub suggested: ActionId,

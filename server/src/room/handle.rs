@@ -194,12 +194,18 @@ impl Handle {
             .await
     }
 
-    /// Asks for a hint for a decision; `None` if the room has no such ticket.
+    /// Asks for a hint for a decision; `None` if the room has no such ticket. The same `request_id`
+    /// again gets the same hint.
     ///
     /// # Errors
     /// The room is gone, or (inner result) there is no hint.
-    pub async fn hint(&self, secret: [u8; 32], decision: u64) -> Result<Option<Hinted>, RoomGone> {
-        self.ask(|reply| Message::Hint(secret, decision, reply))
+    pub async fn hint(
+        &self,
+        secret: [u8; 32],
+        decision: u64,
+        request_id: Option<[u8; 32]>,
+    ) -> Result<Option<Hinted>, RoomGone> {
+        self.ask(|reply| Message::Hint(secret, decision, request_id, reply))
             .await
     }
 

@@ -208,8 +208,14 @@ pub(super) enum Message {
         Instant,
         oneshot::Sender<Option<Acted>>,
     ),
-    /// Asks for a hint for a decision, with the secret of the seat's ticket.
-    Hint([u8; 32], u64, oneshot::Sender<Option<Hinted>>),
+    /// Asks for a hint for a decision, with the secret of the seat's ticket and the id of the request,
+    /// if it has one.
+    Hint(
+        [u8; 32],
+        u64,
+        Option<[u8; 32]>,
+        oneshot::Sender<Option<Hinted>>,
+    ),
     Spectate(
         Box<SpectateRequest>,
         oneshot::Sender<Result<(), SpectateError>>,

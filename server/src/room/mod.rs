@@ -2,10 +2,11 @@
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
 //! which sends it the messages in `message`, or handles an answer in place through `resting`;
 //! `clients` are those that took seats; `observed` counts and traces; `table_view` is what those who
-//! attend to a physical table see, `markers` what the owner follows.
+//! attend to a physical table see, `markers` what the owner follows, `hints` the latest hint.
 
 mod clients;
 mod handle;
+mod hints;
 #[cfg(test)]
 mod label_tests;
 mod markers;

@@ -28,11 +28,12 @@ use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tracing::{Instrument as _, debug, error, info, warn};
 
 use super::clients::Clients;
+use super::hints::{HintReply, HintRequest, LatestHint};
 use super::markers::MarkerLog;
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, MarkOutcome,
-    MarkRequest, Message, NotAttached, NotifySpace, ReportRefusal, Ruled, SeatAction,
-    SpectateError, SpectateRequest, Watching,
+    Acted, AttachRequest, AttachedSeat, Following, JoinRequest, Joined, MarkOutcome, MarkRequest,
+    Message, NotAttached, NotifySpace, ReportRefusal, Ruled, SeatAction, SpectateError,
+    SpectateRequest, Watching,
 };
 use super::observed::Observed;
 use super::resting::Resting;
@@ -133,6 +134,7 @@ pub(super) fn spawn(
         on_space: Arc::new(NotifySpace(mailbox.downgrade())),
         releases: Vec::new(),
         hints: FuturesUnordered::new(),
+        latest_hint: LatestHint::default(),
         public: PublicEvents::default(),
         delivered: 0,
         always_visit: vec![false; seats],
@@ -181,7 +183,7 @@ enum Release {
     ),
     Reported(oneshot::Sender<Option<Ruled>>, ReportOutcome),
     WatchTable(oneshot::Sender<Option<Watching>>),
-    Hint(oneshot::Sender<Option<Hinted>>, Hint),
+    Hint(HintReply, Hint),
     /// The marker with this number.
     Marked(oneshot::Sender<Option<MarkOutcome>>, usize),
     FollowMarkers(usize, oneshot::Sender<Option<Following>>),
@@ -200,7 +202,8 @@ pub(super) struct Room {
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
     /// The hints that are being computed.
-    hints: FuturesUnordered<BoxFuture<'static, Option<HintEnded>>>,
+    hints: FuturesUnordered<BoxFuture<'static, HintEnded>>,
+    latest_hint: LatestHint,
     public: PublicEvents,
     /// Length of the log at the last delivery.
     delivered: usize,
@@ -231,8 +234,8 @@ pub(super) struct Room {
 /// The seat and number of a decision, and how the search for it ended.
 type Found = (Seat, u64, Searched);
 
-/// A hint for a decision of a seat, and who asked for it.
-type HintEnded = (Seat, u64, Hint, oneshot::Sender<Option<Hinted>>);
+/// A hint and the request for it; `None` if computing it panicked.
+type HintEnded = (HintRequest, Option<Hint>);
 
 /// What the task of a room does next.
 enum Next {
@@ -242,8 +245,8 @@ enum Next {
     Turn(Turn),
     /// Takes the result of a search.
     Searched(Found),
-    /// Gives a hint; `None` if computing it panicked.
-    Hint(Option<HintEnded>),
+    /// Gives a hint.
+    Hint(HintEnded),
     /// Does what is due.
     Timer,
 }
@@ -336,7 +339,7 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
                 search = None;
                 room.core.searched(seat, decision, found);
             }
-            Next::Hint(Some(hint)) => room.give_hint(hint),
+            Next::Hint(hint) => room.give_hint(hint),
             _ => {}
         }
         for message in messages.drain(..) {
@@ -419,32 +422,44 @@ impl Room {
     }
 
     /// Starts to compute a hint.
-    fn start_hint(&mut self, secret: &[u8], decision: u64, reply: oneshot::Sender<Option<Hinted>>) {
+    fn start_hint(&mut self, secret: &[u8], decision: u64, id: Option<[u8; 32]>, reply: HintReply) {
         let Some(seat) = self.core.seat_of_ticket(secret) else {
             return answer(reply, None);
+        };
+        let request = HintRequest { seat, decision, id };
+        let reply = match self.latest_hint.repeat(request, reply) {
+            Err(reply) => reply,
+            Ok(given) => {
+                let given = given.map(|(reply, hint)| Release::Hint(reply, hint));
+                return self.releases.extend(given);
+            }
         };
         let plays = MonteCarlo {
             budget: Budget::Time(HINT_TIME),
             ..MonteCarlo::default()
         };
         match self.core.start_hint(seat, decision, plays) {
-            Ok(request) => {
+            Ok(search) => {
                 let searches = Arc::clone(&self.context.searches);
                 let rules = self.core.header().rules;
-                let hint = spawned(searches.hint(self.context.owner, rules, request));
-                let ended = hint.map(move |hint| Some((seat, decision, hint?, reply)));
-                self.hints.push(ended.boxed());
+                let hint = spawned(searches.hint(self.context.owner, rules, search));
+                self.latest_hint.started(request, reply);
+                self.hints
+                    .push(hint.map(move |hint| (request, hint)).boxed());
             }
             Err(error) => answer(reply, Some(Err(error))),
         }
     }
 
     /// Gives a hint once it is recorded.
-    fn give_hint(&mut self, (seat, decision, hint, reply): HintEnded) {
-        match self.core.hinted(self.now, seat, decision) {
-            Ok(()) => self.releases.push(Release::Hint(reply, hint)),
-            Err(error) => answer(reply, Some(Err(error))),
-        }
+    fn give_hint(&mut self, (request, hint): HintEnded) {
+        let given = match hint {
+            Some(_) => (self.core).hinted(self.now, request.seat, request.decision),
+            None => Ok(()),
+        };
+        let waiting = self.latest_hint.ended(request, hint, given);
+        let release = waiting.map(|(reply, hint)| Release::Hint(reply, hint));
+        self.releases.extend(release);
     }
 
     /// Plays a slice of a game that nobody plays, and returns the number of decisions.
@@ -505,7 +520,9 @@ impl Room {
                     None => answer(reply, None),
                 }
             }
-            Message::Hint(secret, decision, reply) => self.start_hint(&secret, decision, reply),
+            Message::Hint(secret, decision, id, reply) => {
+                self.start_hint(&secret, decision, id, reply);
+            }
             Message::Spectate(request, reply) => {
                 self.releases.push(Release::Spectate(request, reply));
             }

@@ -1,6 +1,8 @@
 //! Built-in agents that search: in rooms, after a crash of the server, in tournaments.
 
 use chefshat_client::Client;
+use chefshat_proto::v1::act_request::Command;
+use chefshat_proto::v1::play_service_client::PlayServiceClient;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_update::Update};
 use chefshat_record::replay::replay;
@@ -198,7 +200,18 @@ async fn a_seat_is_given_hints_and_the_record_says_so() {
         refused.expect_err("another seat").reason(),
         Some("DECISION_CLOSED")
     );
-    for _ in 0..3 {
+    let repeated = v1::ActRequest {
+        ticket: own.clone(),
+        command: Some(Command::Hint(v1::AskHint {
+            decision_id: decision.decision_id,
+            request_id: vec![7; 32],
+        })),
+    };
+    let mut service = PlayServiceClient::new(client.channel());
+    let first = service.act(repeated.clone()).await.expect("a hint");
+    let again = service.act(repeated).await.expect("the same hint");
+    assert_eq!(first.into_inner(), again.into_inner());
+    for _ in 0..2 {
         let hint = client
             .hint(own, decision.decision_id)
             .await

@@ -242,6 +242,10 @@ def _pauses(request: object) -> dict[str, Iterator[float]]:
         request.report_id = request.report_id or secrets.token_hex(REQUEST_ID_BYTES)
     elif isinstance(request, pb.ReplaceParticipantRequest) and request.built_in_agent:
         return {}  # Its id would be for the ticket, and a built-in agent has none.
+    elif isinstance(request, pb.ActRequest):
+        if not request.HasField("hint"):
+            return {}
+        request.hint.request_id = request.hint.request_id or secrets.token_bytes(REQUEST_ID_BYTES)
     elif isinstance(request, REPEATABLE):
         request.request_id = request.request_id or secrets.token_bytes(REQUEST_ID_BYTES)
     elif not isinstance(request, READING):

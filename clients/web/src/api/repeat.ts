@@ -1,5 +1,6 @@
-// Repeats a request to create or to join whose response was lost. Its request id tells the server
-// that it is the same request, so that it answers with the same place and the same secrets.
+// Repeats a request to create or to join, or for a hint, whose response was lost. Its request id
+// tells the server that it is the same request, so that it answers with the same place, the same
+// secrets or the same hint.
 
 import type { Interceptor } from "@connectrpc/connect";
 import { Code } from "@connectrpc/connect";
@@ -12,12 +13,17 @@ const PAUSES_MS = [100, 200, 400];
 /** Codes of a call that ended without an answer. */
 const LOST: Code[] = [Code.Unavailable, Code.Unknown, Code.Internal];
 
+interface Identified {
+  requestId?: unknown;
+}
+
 /** Gives requests that can be repeated an id and repeats them when the connection is lost. */
 export const repeat: Interceptor = (next) => async (request) => {
-  const message = request.message as { requestId?: unknown };
-  if (request.stream || !(message.requestId instanceof Uint8Array)) return next(request);
-  if (message.requestId.length === 0) {
-    message.requestId = crypto.getRandomValues(new Uint8Array(REQUEST_ID_BYTES));
+  const message = request.message as Identified & { command?: { case?: string; value?: Identified } };
+  const identified = message.command?.case === "hint" ? message.command.value : message;
+  if (request.stream || !(identified?.requestId instanceof Uint8Array)) return next(request);
+  if (identified.requestId.length === 0) {
+    identified.requestId = crypto.getRandomValues(new Uint8Array(REQUEST_ID_BYTES));
   }
   for (const pause of PAUSES_MS) {
     try {

@@ -30,6 +30,15 @@ pub(crate) fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
     lines
 }
 
+/// The line of a decision for which the seat was given hints, before the line of the decision.
+pub(crate) fn after_hints(seat: u32, hints: u32) -> Line {
+    let words = match hints {
+        1 => "gets a hint".to_owned(),
+        hints => format!("gets {hints} hints"),
+    };
+    about(seat, words)
+}
+
 /// The lines of an event, from the state before it.
 fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
     let line = match kind {

@@ -38,7 +38,11 @@ pub(crate) struct Log {
 impl Log {
     /// Applies an event to the table and adds its lines.
     pub(crate) fn follow(&mut self, table: &mut GameView, event: &v1::GameEvent) {
-        let lines = story::advance(table, event);
+        self.add(story::advance(table, event));
+    }
+
+    /// Adds lines.
+    pub(crate) fn add(&mut self, lines: Vec<story::Line>) {
         self.count += lines.len();
         self.lines.extend(lines);
         while self.lines.len() > MAX_LINES {

@@ -30,6 +30,8 @@ pub(super) enum Input {
     Key(Key),
     /// An update from the server.
     Update(Box<Update>),
+    /// The hint for a decision, or why there is none.
+    Hint(u64, Result<v1::Hint, String>),
     /// The connection was lost, with the reason; it is being restored.
     Lost(String),
     /// The connection ended for good; with the reason if the game has not ended.
@@ -46,6 +48,12 @@ pub(super) enum Do {
         took_ms: u64,
     },
     Express(usize),
+    /// Ask for a hint for a decision. `ticket` is that of a game of a tournament; `None`: the person's
+    /// own.
+    AskHint {
+        ticket: Option<String>,
+        decision_id: u64,
+    },
     /// Take the seat back from a substitute.
     Resume,
     /// Leave the table and quit.
@@ -77,6 +85,17 @@ pub(super) struct Open {
     pub(super) since_ms: u64,
     /// The answer has been sent.
     pub(super) sent: bool,
+    pub(super) hint: Hint,
+}
+
+/// The hint for an open decision.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Hint {
+    NotAsked,
+    /// The server computes it.
+    Asked,
+    /// In words.
+    Given(String),
 }
 
 /// A game in the terminal.
@@ -84,6 +103,8 @@ pub(super) struct Open {
 pub(super) struct App {
     pub(super) table: GameView,
     pub(super) me: Option<u32>,
+    /// The ticket of the seat in a game of a tournament.
+    ticket: Option<String>,
     pub(super) open: Option<Open>,
     /// Whom of the others the game waits for.
     pub(super) awaited: Option<AwaitedSeat>,
@@ -121,6 +142,7 @@ impl App {
         Self {
             table,
             me,
+            ticket: None,
             open: None,
             awaited: None,
             dialog: None,
@@ -140,6 +162,10 @@ impl App {
         match input {
             Input::Key(key) => self.key(key, now_ms),
             Input::Update(update) => self.update(*update, now_ms),
+            Input::Hint(decision_id, hint) => {
+                self.hinted(decision_id, hint);
+                None
+            }
             Input::Lost(why) => {
                 self.link = Link::Lost(why);
                 self.open = None;
@@ -187,6 +213,7 @@ impl App {
         match update {
             Update::Attached(attached) => {
                 self.me = Some(attached.seat);
+                self.ticket = Some(attached.ticket).filter(|ticket| !ticket.is_empty());
                 self.link = Link::Live;
                 self.notice.clear();
                 self.open = None;
@@ -273,9 +300,28 @@ impl App {
             decision,
             since_ms: now_ms,
             sent: false,
+            hint: Hint::NotAsked,
         });
         self.table.turn = self.me;
         None
+    }
+
+    /// Selects what a hint suggests for the open decision.
+    fn hinted(&mut self, decision_id: u64, hint: Result<v1::Hint, String>) {
+        let asked = |open: &&mut Open| open.decision.request.decision_id == decision_id;
+        let Some(open) = self.open.as_mut().filter(asked) else {
+            return;
+        };
+        match hint {
+            Ok(hint) => {
+                open.decision.pick_action(hint.action);
+                open.hint = Hint::Given(open.decision.hint_words(&hint));
+            }
+            Err(why) => {
+                open.hint = Hint::NotAsked;
+                self.notice = crate::narration::clean(&why, 76);
+            }
+        }
     }
 
     fn result(&mut self, result: &v1::AnswerResult) {
@@ -375,6 +421,16 @@ impl App {
                     None => self.notice = not_held(key),
                 }
                 return None;
+            }
+            KeyCode::Char('h') => {
+                if open.hint == Hint::Asked {
+                    return None;
+                }
+                open.hint = Hint::Asked;
+                return Some(Do::AskHint {
+                    ticket: self.ticket.clone(),
+                    decision_id: decision.request.decision_id,
+                });
             }
             KeyCode::Char('p') => match decision.pass_objection() {
                 None => decision.pass(),

@@ -58,6 +58,7 @@ pub(super) async fn own_table(
             policy: Some(v1::RoomPolicy {
                 decision_time_ms: Some(OWN_DECISION_MS),
                 pace_ms: Some(pace_ms),
+                hints: true,
                 ..v1::RoomPolicy::default()
             }),
             ..v1::CreateRoomRequest::default()

@@ -1,7 +1,7 @@
 //! Keys that select cards, scroll the log, leave, send expressions, or take the seat back.
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_engine::RuleSetSpec;
+use chefshat_engine::{ActionId, RuleSetSpec};
 use ratatui::crossterm::event::KeyCode;
 
 use super::app::{Dialog, Do, Input};
@@ -151,6 +151,61 @@ fn leaving_asks_for_confirmation() {
     let mut session = GameSession::new(&shifts(1), 3);
     let interrupted = session.app.take(Input::Key(Key::Interrupt), 0);
     assert_eq!(interrupted, Some(Do::Leave));
+}
+
+#[test]
+fn a_hint_selects_the_suggested_action() {
+    let mut session = GameSession::new(&shifts(1), 3);
+    assert_eq!(session.press(KeyCode::Char('h')), None);
+    assert!(session.until_asked());
+    let decision = session.app.open.as_ref().unwrap().decision.clone();
+    let (id, legal) = (
+        decision.request.decision_id,
+        session.dealt.game.legal_actions(),
+    );
+    let asked = Do::AskHint {
+        ticket: None,
+        decision_id: id,
+    };
+    assert_eq!(session.press(KeyCode::Char('h')), Some(asked));
+    assert!(session.screen().contains("The hint is being computed."));
+    assert_eq!(session.press(KeyCode::Char('h')), None, "one at a time");
+    let plays: Vec<ActionId> = (legal.iter()).filter(|it| *it != decision.pass()).collect();
+    assert!(plays.len() > 2, "{plays:?}");
+    for action in plays {
+        let hint = v1::Hint {
+            action: action.index().into(),
+            actions: [(action, 2.5), (decision.pass(), 3.0)]
+                .map(|(action, points)| v1::ActionEstimate {
+                    action: action.index().into(),
+                    points,
+                    ..v1::ActionEstimate::default()
+                })
+                .into(),
+        };
+        session.app.take(Input::Hint(id, Ok(hint)), 0);
+        let open = session.app.open.as_ref().unwrap();
+        assert_eq!(open.decision.picked(), Some(action));
+        let words = format!(
+            "Hint, with expected points: {} 2.5 · pass 3.0",
+            open.decision.words()
+        );
+        assert!(session.screen().contains(&words), "{}", session.screen());
+    }
+
+    // Another decision's, one without estimates, and none.
+    let unestimated = || v1::Hint {
+        action: decision.pass().index().into(),
+        actions: Vec::new(),
+    };
+    session.app.take(Input::Hint(id + 1, Ok(unestimated())), 0);
+    assert!(session.screen().contains("Hint, with"));
+    session.app.take(Input::Hint(id, Ok(unestimated())), 0);
+    assert!(session.screen().contains("Hint: pass."));
+    session.press(KeyCode::Char('h'));
+    let refused = Err("this room gives no hints".to_owned());
+    session.app.take(Input::Hint(id, refused), 0);
+    assert!(session.screen().contains("! this room gives no hints"));
 }
 
 #[test]

@@ -35,6 +35,8 @@ pub(super) enum PartInput {
     Seated(v1::Attached, Option<Box<v1::Room>>),
     /// An update for the seat of a game.
     Update(String, Box<Update>),
+    /// The hint for a decision of a game, or why there is none.
+    Hint(String, u64, Result<v1::Hint, String>),
     /// A game is lost before its end, with the reason.
     Gone(String, String),
     /// The connection was lost, with the reason; it is being restored.
@@ -121,6 +123,9 @@ impl Part {
                 }
             }
             PartInput::Seated(attached, room) => self.seated(attached, room, now_ms),
+            PartInput::Hint(game, decision_id, hint) => {
+                self.in_game(&game, Input::Hint(decision_id, hint), now_ms);
+            }
             PartInput::Gone(game, why) => {
                 self.in_game(&game, Input::Over(Some(why)), now_ms);
             }

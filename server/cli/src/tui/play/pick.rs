@@ -9,6 +9,9 @@ use crate::narration::hand::{Hand, Stack};
 use crate::numbers::counted;
 use crate::tui::view::play_words;
 
+/// Actions that a hint names: those that fit in a line.
+const MAX_HINTED: usize = 3;
+
 /// An open decision and the selection for it.
 #[derive(Debug, Clone)]
 pub(super) struct Decision {
@@ -240,6 +243,52 @@ impl Decision {
                 let (quantity, jokers) = (self.quantity.into(), self.jokers.into());
                 format!("play {}", play_words(stack.face, quantity, jokers, faces))
             }
+        }
+    }
+
+    /// Selects an action, if it is legal and not a pass.
+    pub(super) fn pick_action(&mut self, action: u32) {
+        let legal = u16::try_from(action).ok().map(ActionId::new);
+        let Some(action) = legal.filter(|action| self.is_legal(*action)) else {
+            return;
+        };
+        if self.kind() == v1::DecisionKind::SpecialAction {
+            self.at = usize::from(action != self.space.declare());
+            return;
+        }
+        for at in 0..self.stacks.len() {
+            for (quantity, jokers) in self.legal_with(at).collect::<Vec<_>>() {
+                let before = (self.at, self.quantity, self.jokers);
+                (self.at, self.quantity, self.jokers) = (at, quantity, jokers);
+                if self.picked() == Some(action) {
+                    return;
+                }
+                (self.at, self.quantity, self.jokers) = before;
+            }
+        }
+    }
+
+    /// A hint in words: the suggestion, and what the best actions are worth.
+    pub(super) fn hint_words(&self, hint: &v1::Hint) -> String {
+        let named = |action: u32| {
+            let action = ActionId::new(u16::try_from(action).unwrap_or(u16::MAX));
+            let mut like = self.clone();
+            like.pick_action(u32::from(action.index()));
+            match like.picked() == Some(action) {
+                true => like.words(),
+                false => "pass".to_owned(),
+            }
+        };
+        let suggested = named(hint.action);
+        let mut worth: Vec<&v1::ActionEstimate> = hint.actions.iter().collect();
+        worth.sort_by(|a, b| b.points.total_cmp(&a.points));
+        // The suggestion first.
+        worth.sort_by_key(|it| it.action != hint.action);
+        let values = worth.iter().take(MAX_HINTED);
+        let values = values.map(|it| format!("{} {:.1}", named(it.action), it.points));
+        match values.collect::<Vec<_>>() {
+            values if values.is_empty() => format!("Hint: {suggested}."),
+            values => format!("Hint, with expected points: {}", values.join(" · ")),
         }
     }
 

@@ -49,6 +49,7 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
     let (sender, mut heard) = mpsc::channel(HEARD);
     let (orders, for_server) = mpsc::channel(ORDERS);
     let entropy = random_entropy();
+    let own_ticket = ticket.clone();
     let connection = Connection::new(client.clone(), ticket, entropy);
     let mut serving = tokio::spawn(connection.serve(for_server, sender.clone()));
 
@@ -80,6 +81,21 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
         let Some((game, what)) = part.take(what, screen.now_ms()) else {
             continue;
         };
+        if let Do::AskHint {
+            ticket: of_game,
+            decision_id,
+        } = what
+        {
+            let ticket = of_game.unwrap_or_else(|| own_ticket.clone());
+            tokio::spawn(ask_hint(
+                client.clone(),
+                ticket,
+                game,
+                decision_id,
+                sender.clone(),
+            ));
+            continue;
+        }
         // A command without a connection is dropped: the server sends the decision again.
         if let Some(command) = command(what, times) {
             let order: Order = (game, command);
@@ -98,11 +114,25 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
     Ok(part)
 }
 
+/// Asks the server for a hint and passes it on.
+async fn ask_hint(
+    client: Client,
+    ticket: String,
+    game: String,
+    decision_id: u64,
+    heard: mpsc::Sender<PartInput>,
+) {
+    let hint = client.hint(ticket, decision_id).await;
+    let hint = hint.map_err(|error| error.message().to_owned());
+    // The receiver may be gone.
+    let _ = heard.send(PartInput::Hint(game, decision_id, hint)).await;
+}
+
 fn random_entropy() -> Vec<u8> {
     chefshat_room::ids::random_bytes::<ENTROPY_BYTES>().to_vec()
 }
 
-/// The command for the server. The time a decision was on screen is sent only with `times`.
+/// The command for the stream of the seat. The time a decision was on screen is sent only with `times`.
 pub(super) fn command(what: Do, times: bool) -> Option<Command> {
     match what {
         Do::Answer {
@@ -130,6 +160,6 @@ pub(super) fn command(what: Do, times: bool) -> Option<Command> {
                 ..v1::Expression::default()
             }))
         }
-        Do::Leave => None,
+        Do::AskHint { .. } | Do::Leave => None,
     }
 }

@@ -7,7 +7,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::app::{App, Dialog, EXPRESSIONS, Link, Open};
+use super::app::{App, Dialog, EXPRESSIONS, Hint, Link, Open};
 use super::keys::key_of;
 use super::lobby_view;
 use super::part::Part;
@@ -45,7 +45,7 @@ const HELP: [&str; 18] = [
     "Enter     play (or give) what is picked",
     "p         pass",
     "d, n      declare a special action, or do not",
-    "e         show a feeling to the table",
+    "h         a hint, if the room gives them   e   show a feeling",
     "PgUp      earlier events, PgDn later ones",
     "s         in a tournament: the standings",
     "r         take your seat back from a substitute",
@@ -188,9 +188,11 @@ fn draw_asked(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64, area:
     }
     let second = match &app.open {
         _ if !app.notice.is_empty() => Span::styled(format!(" ! {}", app.notice), theme.warning()),
-        Some(open) if !open.sent => match open.decision.objection() {
-            Some(why) => Span::styled(format!(" ✕ {why}"), theme.dim()),
-            None => Span::raw(hint(open, app.table.faces())),
+        Some(open) if !open.sent => match (&open.hint, open.decision.objection()) {
+            (Hint::Asked, _) => Span::raw(" The hint is being computed."),
+            (Hint::Given(words), _) => Span::raw(format!(" {words}")),
+            (Hint::NotAsked, Some(why)) => Span::styled(format!(" ✕ {why}"), theme.dim()),
+            (Hint::NotAsked, None) => Span::raw(what_enter_does(open, app.table.faces())),
         },
         _ => Span::raw(""),
     };
@@ -259,7 +261,7 @@ fn awaits_hand(app: &App) -> bool {
 }
 
 /// What Enter does.
-fn hint(open: &Open, faces: u32) -> String {
+fn what_enter_does(open: &Open, faces: u32) -> String {
     let decision = &open.decision;
     if decision.kind() == v1::DecisionKind::SpecialAction {
         let [declare, decline] = match decision.at {

@@ -6,6 +6,7 @@ mod reel;
 mod tests;
 mod view;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -19,6 +20,7 @@ use tokio::sync::mpsc;
 
 use crate::CommandError;
 use crate::connect::{PATIENCE, SecretArgs, ServerArg};
+use crate::narration::story;
 use crate::narration::view::GameView;
 use crate::tui::screen::{Screen, Wake, missing};
 use crate::tui::theme::Theme;
@@ -111,6 +113,7 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
     replay(&lines)?;
     let mut table = GameView::default();
     let mut events = Vec::new();
+    let mut hints: BTreeMap<usize, Vec<story::Line>> = BTreeMap::new();
     for line in lines {
         match line.line {
             Some(record_line::Line::Header(header)) => {
@@ -122,10 +125,14 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
                 });
             }
             Some(record_line::Line::Event(event)) => events.push(event),
+            Some(record_line::Line::Decision(decision)) if decision.hints > 0 => {
+                let line = story::after_hints(decision.seat, decision.hints);
+                hints.entry(events.len()).or_default().push(line);
+            }
             _ => {}
         }
     }
-    Ok(Reel::recorded(table, events))
+    Ok(Reel::recorded(table, events, hints))
 }
 
 /// Shows the reel until the person quits.

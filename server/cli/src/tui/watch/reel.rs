@@ -1,10 +1,13 @@
 //! Steps through the events of a game, forwards and back: position, speed, visible hands. Takes
 //! events, keys and the time; `view` draws it.
 
+use std::collections::BTreeMap;
+
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
 
 use crate::narration::awaited::AwaitedSeat;
+use crate::narration::story;
 use crate::narration::view::GameView;
 use crate::tui::log::Log;
 use crate::tui::screen::Key;
@@ -20,6 +23,8 @@ pub(super) struct Reel {
     /// The state before the first event.
     start: GameView,
     events: Vec<v1::GameEvent>,
+    /// What the log says about hints, by the number of events before it.
+    hints: BTreeMap<usize, Vec<story::Line>>,
     /// Number of events applied.
     pub(super) at: usize,
     pub(super) table: GameView,
@@ -43,9 +48,14 @@ pub(super) struct Reel {
 
 impl Reel {
     /// A finished game, running from its first deal.
-    pub(super) fn recorded(start: GameView, events: Vec<v1::GameEvent>) -> Self {
+    pub(super) fn recorded(
+        start: GameView,
+        events: Vec<v1::GameEvent>,
+        hints: BTreeMap<usize, Vec<story::Line>>,
+    ) -> Self {
         let first = events.iter().position(is_deal).map_or(0, |at| at + 1);
         let mut reel = Self::new(start, events, false);
+        reel.hints = hints;
         reel.wind_to(first);
         reel
     }
@@ -60,6 +70,7 @@ impl Reel {
             table: start.clone(),
             start,
             events,
+            hints: BTreeMap::new(),
             at: 0,
             running: true,
             pace: STANDARD_PACE,
@@ -199,7 +210,9 @@ impl Reel {
             self.log = Log::default();
             self.at = 0;
         }
-        for event in &self.events[self.at..at] {
+        for (before, event) in (self.at..).zip(&self.events[self.at..at]) {
+            self.log
+                .add(self.hints.get(&before).cloned().unwrap_or_default());
             self.log.follow(&mut self.table, event);
         }
         self.at = at;

@@ -1,5 +1,7 @@
 //! Moving through a recorded game by keys.
 
+use std::collections::BTreeMap;
+
 use chefshat_client::v1::{self, game_event::Kind, record_line};
 use ratatui::crossterm::event::KeyCode;
 
@@ -11,7 +13,8 @@ use crate::tui::testing::{assert_screens, lines, recorded, text};
 use crate::tui::theme::Theme;
 
 fn reel() -> Reel {
-    Reel::recorded(GameView::default(), recorded("fixed.jsonl"))
+    let hints = BTreeMap::default();
+    Reel::recorded(GameView::default(), recorded("fixed.jsonl"), hints)
 }
 
 fn press(reel: &mut Reel, code: KeyCode) {
@@ -37,6 +40,28 @@ fn every_moment_is_the_same_forwards_and_back() {
         assert_eq!(&format!("{:?}", forth.table), moment);
     }
     assert_eq!(forth.at, 0);
+}
+
+#[test]
+fn a_record_with_hints_says_so() {
+    let mut lines = lines("fixed.jsonl");
+    let hinted = lines.iter_mut().find_map(|line| match &mut line.line {
+        Some(record_line::Line::Decision(decision)) => Some(decision),
+        _ => None,
+    });
+    hinted.expect("a decision").hints = 2;
+    if let Some(record_line::Line::Header(header)) = &mut lines[0].line {
+        header.policy.get_or_insert_default().hints = true;
+    }
+    let mut reel = of_record(lines).expect("a record");
+    press(&mut reel, KeyCode::Home);
+    let shown = |reel: &Reel| screen(reel).contains(" gets 2 hints");
+    while !shown(&reel) {
+        assert!(reel.at < reel.len(), "never shown");
+        press(&mut reel, KeyCode::Right);
+    }
+    press(&mut reel, KeyCode::Left);
+    assert!(!shown(&reel));
 }
 
 #[test]

@@ -709,16 +709,23 @@ class AskHint(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     DECISION_ID_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
     decision_id: _builtins.int
     """The decision."""
+    request_id: _builtins.bytes
+    """Empty, or 32 random bytes. A repeated call with the same id, after a lost response, gets the same
+    hint, which counts once, until the room gives another or moves to another server. Another length:
+    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """
     def __init__(
         self,
         *,
         decision_id: _builtins.int = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_id", b"decision_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_id", b"decision_id", "request_id", b"request_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -50,8 +50,9 @@ class PlayServiceStub:
     """
     Act: _grpc.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
-    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER,
-    HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS, TOO_MANY_HINTS).
+    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
+    (GAME_OVER, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
+    TOO_MANY_HINTS).
     """
 
 @_typing.type_check_only
@@ -76,8 +77,9 @@ class PlayServiceAsyncStub(PlayServiceStub):
     """
     Act: _aio.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]  # type: ignore[assignment]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
-    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER,
-    HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS, TOO_MANY_HINTS).
+    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
+    (GAME_OVER, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
+    TOO_MANY_HINTS).
     """
 
 class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -117,8 +119,9 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_play_service_pb2.ActResponse, _abc.Awaitable[_play_service_pb2.ActResponse]]:
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
-        INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER,
-        HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS, TOO_MANY_HINTS).
+        INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
+        (GAME_OVER, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
+        TOO_MANY_HINTS).
         """
 
 def add_PlayServiceServicer_to_server(servicer: PlayServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
