@@ -1,9 +1,13 @@
 //! Creation of rooms.
 
+use std::collections::BTreeMap;
+
 use super::*;
 use crate::store::{FailingStore, MemoryStore, ResumableGame};
-use chefshat_room::ids::SecretHash;
-use chefshat_room::journal::{AbortReason, Change, Entry, ParticipantKind};
+use chefshat_room::ids::{SecretHash, Token};
+use chefshat_room::journal::{
+    AbortReason, Change, Entry, Fill, ParticipantKind, SeatedParticipant,
+};
 
 #[tokio::test]
 async fn participants_of_a_tournament_are_committed_with_their_room() {
