@@ -2,6 +2,7 @@
 //! operator's request or on a schedule, and gives their disk space back. A crash in between leaves
 //! nothing behind that the next run does not delete.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -106,7 +107,7 @@ impl Retention {
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
         let mut pruned = Pruned::default();
-        let of_studies = self.studies.games();
+        let of_studies = self.games_of_studies().await?;
         let mut after = 0;
         loop {
             let store = self.rooms.store();
@@ -145,6 +146,21 @@ impl Retention {
             );
         }
         Ok(pruned)
+    }
+
+    /// The games of all studies, those of other nodes of a cluster as well.
+    async fn games_of_studies(&self) -> Result<BTreeSet<Id>, StoreError> {
+        let mut games = self.studies.games();
+        if self.rooms.lease().is_none() {
+            return Ok(games);
+        }
+        let store = self.rooms.store();
+        for id in store.studies().await? {
+            if let Some(stored) = store.study(id).await? {
+                games.extend(stored.games());
+            }
+        }
+        Ok(games)
     }
 
     /// Deletes games on a schedule, until the future is dropped.

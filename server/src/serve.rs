@@ -174,7 +174,7 @@ impl Server {
             grace,
             store,
             Arc::clone(&server.rooms),
-            Arc::clone(&server.tournaments),
+            (Arc::clone(&server.tournaments), Arc::clone(&server.studies)),
         ));
         Ok(server)
     }
@@ -530,8 +530,12 @@ fn routes(
         Arc::clone(tournaments),
         Arc::clone(studies),
     );
-    let study_calls =
-        grpc::StudyCalls::new(Arc::clone(studies), Arc::clone(calls), closing.clone());
+    let study_calls = grpc::StudyCalls::new(
+        Arc::clone(studies),
+        reach.clone(),
+        Arc::clone(calls),
+        closing.clone(),
+    );
     let participants = Participants::new(
         Arc::clone(rooms),
         Arc::clone(tournaments),

@@ -48,7 +48,7 @@ pub(super) struct ClusterCommand {
 enum Subcommands {
     /// Show the nodes: version, last beat, lease, and what they own.
     Status(Status),
-    /// Make a node hand over all rooms and tournaments to the others, and stop.
+    /// Make a node hand over all rooms, tournaments and studies to the others, and stop.
     Drain(Drain),
 }
 
@@ -65,7 +65,7 @@ struct Status {
     json: bool,
 }
 
-/// Make a node hand over all rooms and tournaments to the others, and stop.
+/// Make a node hand over all rooms, tournaments and studies to the others, and stop.
 #[derive(Debug, Args)]
 #[command(
     after_help = "The node stops once it owns nothing; a supervisor that restarts it makes it a new node. SIGTERM does the same.\n\n\
@@ -108,9 +108,10 @@ impl Status {
             "last beat",
             "rooms",
             "tournaments",
+            "studies",
             "peers",
         ];
-        table(&mut text, &header, &[1, 2, 3, 7], nodes.iter().map(as_row));
+        table(&mut text, &header, &[1, 2, 3, 8], nodes.iter().map(as_row));
         let mut out = anstream::stdout().lock();
         write!(out, "{text}")?;
         out.flush()?;
@@ -137,6 +138,7 @@ fn as_json(node: &NodeStatus) -> serde_json::Value {
         "last_beat_ms": node.last_beat.as_millis(),
         "rooms": node.rooms,
         "tournaments": node.tournaments,
+        "studies": node.studies,
         "capacity": node.info.capacity,
         "peer_endpoint": node.info.peer_endpoint,
         "client_endpoint": node.info.client_endpoint,
@@ -152,6 +154,7 @@ fn as_row(node: &NodeStatus) -> Vec<String> {
         format!("{:.1} s ago", node.last_beat.as_secs_f64()),
         node.rooms.to_string(),
         node.tournaments.to_string(),
+        node.studies.to_string(),
         node.info.peer_endpoint.clone(),
     ]
 }
@@ -192,11 +195,12 @@ impl Drain {
             return Err(format!("node {} has just left", node.id.0).into());
         }
         say(format_args!(
-            "node {} ({}) hands over {} and {}, then stops",
+            "node {} ({}) hands over {}, {} and {} studies, then stops",
             node.id.0,
             node.info.name,
             counted(node.rooms, "room"),
             counted(node.tournaments, "tournament"),
+            node.studies,
         ))?;
         Ok(())
     }

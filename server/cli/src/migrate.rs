@@ -79,15 +79,17 @@ impl Migrate {
                 "finished_games": moved.finished,
                 "unfinished_games": moved.unfinished,
                 "tournaments": moved.tournaments,
+                "studies": moved.studies,
                 "unreadable": moved.unreadable,
             }))?;
             return Ok(ExitCode::SUCCESS);
         }
         say(format_args!(
-            "moved: {}, {} unfinished, {}",
+            "moved: {}, {} unfinished, {}, {} studies",
             counted(moved.finished, "finished game"),
             moved.unfinished,
             counted(moved.tournaments, "tournament"),
+            moved.studies,
         ))?;
         if moved.unreadable > 0 {
             say(format_args!(

@@ -174,9 +174,11 @@ impl GameHeader {
         self.tournament.and_then(|game| game.series)
     }
 
-    /// What changes hands together in a cluster: its tournament, or the room alone.
+    /// What changes hands together in a cluster: its tournament or study, or the room alone.
     pub fn unit(&self) -> Id {
-        (self.tournament).map_or(self.room_id, |game| game.tournament)
+        let study = self.study.as_ref().map(|game| game.study);
+        let tournament = self.tournament.map(|game| game.tournament);
+        tournament.or(study).unwrap_or(self.room_id)
     }
 
     /// Whether the cards are real.

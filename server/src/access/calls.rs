@@ -108,65 +108,79 @@ pub const CALLS: &[Call] = &[
     call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.RoomService/CreateRoom", Host, Refused).forwarded(),
     call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
-    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused),
-    call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused),
+    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused).forwarded(),
+    call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused).forwarded(),
     call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused),
     call(
         "/chefshat.v1.StudyService/AddStudyParticipants",
         Host,
         Refused,
-    ),
-    call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused),
-    call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused).streaming(),
+    )
+    .forwarded(),
+    call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused).forwarded(),
+    call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused)
+        .streaming()
+        .forwarded(),
     call(
         "/chefshat.v1.StudyService/RemoveStudyParticipant",
         Host,
         Refused,
-    ),
-    call("/chefshat.v1.StudyService/CloseStudy", Host, Refused),
-    call("/chefshat.v1.StudyService/ExportStudy", Host, Refused).streaming(),
+    )
+    .forwarded(),
+    call("/chefshat.v1.StudyService/CloseStudy", Host, Refused).forwarded(),
+    call("/chefshat.v1.StudyService/ExportStudy", Host, Refused)
+        .streaming()
+        .forwarded(),
     call(
         "/chefshat.v1.StudyService/DeleteStudyParticipant",
         Host,
         Refused,
-    ),
-    call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused),
+    )
+    .forwarded(),
+    call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused).forwarded(),
     call(
         "/chefshat.v1.ParticipationService/OpenStudy",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/FollowParticipation",
         Player,
         Refused,
     )
-    .streaming(),
+    .streaming()
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/GiveConsent",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/AnswerQuestionnaire",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/ContinueStudy",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/RecordTraces",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/WithdrawFromStudy",
         Player,
         Refused,
-    ),
+    )
+    .forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetTournament",
         Spectator,

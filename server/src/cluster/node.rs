@@ -20,6 +20,7 @@ use super::units::{Resumed, Units};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
+use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
@@ -58,7 +59,7 @@ impl ClusterNode {
         grace: Duration,
         store: Arc<dyn ClusterStore>,
         rooms: Arc<Rooms>,
-        tournaments: Arc<Tournaments>,
+        (tournaments, studies): (Arc<Tournaments>, Arc<Studies>),
     ) -> Self {
         let drain = CancellationToken::new();
         let (asked, is_asked_to_drain) = watch::channel(false);
@@ -66,7 +67,7 @@ impl ClusterNode {
         let lease = rooms.lease().expect("the rooms of a node have a lease");
         let lease = Arc::clone(lease);
         lease.joined(id);
-        let units = Units::new(Arc::clone(&store), rooms, tournaments, grace);
+        let units = Units::new(Arc::clone(&store), rooms, (tournaments, studies), grace);
         let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
             node: Node::new(id, store.lease(), capacity),

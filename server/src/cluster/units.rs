@@ -1,4 +1,4 @@
-//! The units that a node runs: resumes, stops and suspends their rooms and tournaments.
+//! The units that a node runs: resumes, stops and suspends their rooms, tournaments and studies.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -8,6 +8,7 @@ use tracing::{info, warn};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch};
+use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 use tokio::sync::Semaphore;
@@ -33,6 +34,7 @@ pub(super) struct Units {
     store: Arc<dyn ClusterStore>,
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
+    studies: Arc<Studies>,
     /// How long ephemeral games may continue when the node hands over.
     grace: Duration,
     /// The units that are to run here, with their epochs.
@@ -44,7 +46,7 @@ impl Units {
     pub(super) fn new(
         store: Arc<dyn ClusterStore>,
         rooms: Arc<Rooms>,
-        tournaments: Arc<Tournaments>,
+        (tournaments, studies): (Arc<Tournaments>, Arc<Studies>),
         grace: Duration,
     ) -> Self {
         Self {
@@ -52,6 +54,7 @@ impl Units {
             store,
             rooms,
             tournaments,
+            studies,
             wanted: Mutex::default(),
             loads: Semaphore::new(LOADS_AT_ONCE),
         }
@@ -71,6 +74,7 @@ impl Units {
     pub(super) fn fence(&self, unit: Id) {
         self.unwant(unit);
         self.tournaments.fence(unit);
+        self.studies.fence(unit);
         self.rooms.fence_unit(unit);
     }
 
@@ -84,6 +88,7 @@ impl Units {
             || self.rooms.is_over(unit) == Some(true)
             || self.tournaments.runs(unit)
             || self.tournaments.get(unit).is_some()
+            || self.studies.runs(unit)
     }
 
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
@@ -91,7 +96,9 @@ impl Units {
     pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> Resumed {
         // It was created here, and its node learns of it from its beat.
         let is_new = epoch == Epoch::FIRST;
-        if is_new && (self.rooms.runs(unit) || self.tournaments.runs(unit)) {
+        let runs =
+            || self.rooms.runs(unit) || self.tournaments.runs(unit) || self.studies.runs(unit);
+        if is_new && runs() {
             return Resumed::Runs;
         }
         self.stop(unit).await;
@@ -117,7 +124,8 @@ impl Units {
         if let Some(tournament) = loaded.tournament {
             self.tournaments.resume(tournament).await;
         }
-        let is_resumed = games > 0 || self.tournaments.get(unit).is_some();
+        let has_study = loaded.study.is_some_and(|study| self.studies.resume(study));
+        let is_resumed = games > 0 || has_study || self.tournaments.get(unit).is_some();
         info!(%unit, epoch = epoch.0, games, is_resumed, "taken over");
         Ok(match is_resumed {
             true => Resumed::Runs,
@@ -128,6 +136,7 @@ impl Units {
     /// Ends everything of a unit that runs here.
     pub(super) async fn stop(&self, unit: Id) {
         self.tournaments.stop_one(unit).await;
+        self.studies.stop_one(unit).await;
         self.rooms.stop_unit(unit).await;
     }
 
@@ -155,6 +164,7 @@ impl Units {
     /// database knows.
     pub(super) async fn release(&self, unit: Id, epoch: Epoch) -> bool {
         self.tournaments.stop_one(unit).await;
+        self.studies.stop_one(unit).await;
         self.rooms.suspend_unit(unit).await;
         match self.store.release(unit, epoch).await {
             Ok(()) => true,

@@ -4,7 +4,9 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::UNIX_EPOCH;
 
-use chefshat_proto::v1::{self, admin_service_server::AdminService};
+use chefshat_proto::v1::{
+    self, admin_service_server::AdminService, study_service_client::StudyServiceClient,
+};
 use chefshat_record::convert::FieldProblem;
 use futures::Stream;
 use tokio::sync::mpsc;
@@ -12,16 +14,20 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
+use super::forward::Gateway;
 use super::limits::charged;
 use super::pages;
 use super::reach::Reach;
 use super::status::{
-    Refusal, field, room_unknown, shutting_down, status, store_failed, tournament_unknown,
+    Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
+    tournament_unknown,
 };
 use super::tournaments;
+use crate::cluster::{FoundBy, Location};
 use crate::config::FOLLOW_SEND_TIMEOUT;
 use crate::connections::{Client, Connections};
-use crate::participants::{DataError, Participants};
+use crate::limits::Key;
+use crate::participants::{DataError, Participants, StudiesElsewhere};
 use crate::retention::Retention;
 use crate::store::{ForgetError, Keep};
 use chefshat_room::ids::Id;
@@ -218,16 +224,45 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::DeleteParticipantRequest>,
     ) -> Result<Response<v1::DeleteParticipantResponse>, Status> {
+        let elsewhere = OtherNodes(request.extensions().get::<Gateway>().cloned());
         let name = given(request.into_inner().name)?;
         let participants = Arc::clone(&self.participants);
         // Runs to completion even if the client goes.
-        let deleting = tokio::spawn(async move { participants.delete(&name).await });
+        let deleting = tokio::spawn(async move { participants.delete(&name, &elsewhere).await });
         let deleted = deleting.await.map_err(|error| {
             tracing::error!(%error, "deleting a participant's data failed");
             store_failed()
         })?;
         let deleted = deleted.map_err(data_failed)?;
         Ok(Response::new(deleted.into()))
+    }
+}
+
+/// The other nodes of a cluster, if there is one, which decide about the operator's token themselves.
+struct OtherNodes(Option<Gateway>);
+
+impl StudiesElsewhere for OtherNodes {
+    async fn delete_participant(&self, study: Id, number: u32) -> Result<(), DataError> {
+        let Some(gateway) = &self.0 else {
+            return Err(DataError::StudyUnreachable);
+        };
+        let found_by = FoundBy::Id(study);
+        let located = gateway.directory().locate(&found_by, Key::Resumed).await;
+        let Location::Node(peer) = located else {
+            return Err(DataError::StudyUnreachable);
+        };
+        let mut service = StudyServiceClient::new(gateway.peers().channel(&peer));
+        let request = gateway.request(v1::DeleteStudyParticipantRequest {
+            study_id: study.to_string(),
+            owner_token: String::new(),
+            number,
+        });
+        let deleted = service.delete_study_participant(request).await;
+        deleted.map(drop).map_err(|error| {
+            tracing::warn!(peer = %peer.node, %error, "another node did not delete a participant");
+            gateway.directory().forget(&found_by);
+            DataError::StudyUnreachable
+        })
     }
 }
 
@@ -251,6 +286,7 @@ fn data_failed(error: DataError) -> Status {
             [("field", "name")],
         ),
         DataError::ShuttingDown => shutting_down(),
+        DataError::StudyUnreachable => owner_unreachable(),
         error => {
             tracing::error!(%error, "a request for a participant's data failed");
             store_failed()

@@ -28,7 +28,7 @@ use super::limits::Charged;
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
 use crate::access::{Call, SECRET_HEADER};
 use crate::cluster::{Directory, Peer, Peers};
-use crate::config::MAX_MESSAGE_BYTES;
+use crate::config::MAX_STUDY_MESSAGE_BYTES;
 use crate::connections::peer_address;
 use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
@@ -38,7 +38,7 @@ const ATTEMPTS: u32 = 3;
 /// Pause before a call looks again: the node that was named is just handing over.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Most bytes of a request that are kept: one message.
-const MAX_KEPT_BYTES: usize = MAX_MESSAGE_BYTES + 1024;
+const MAX_KEPT_BYTES: usize = MAX_STUDY_MESSAGE_BYTES + 1024;
 /// The headers of a request that other nodes need.
 const HEADERS: [HeaderName; 8] = [
     header::AUTHORIZATION,

@@ -3,14 +3,17 @@
 
 mod participation;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{self, study_service_server::StudyService};
+use chefshat_proto::v1::{
+    self, study_service_client::StudyServiceClient, study_service_server::StudyService,
+};
 use chefshat_record::convert::FieldProblem;
 use chefshat_study::{Refusal as StudyRefusal, SettingsProblem};
 use futures::Stream;
+use futures::future::join_all;
 use prost::Message as _;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until, timeout};
@@ -19,18 +22,22 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
 use super::follow::{end, send};
+use super::forward::Gateway;
 use super::limits::charged;
+use super::lists::PEER_TIMEOUT;
+use super::reach::Reach;
 use super::status::{
     Refusal, disk_nearly_full, field, read_failed, request_id, request_id_used, shutting_down,
     status, store_failed,
 };
 use crate::access::{Caller, Role};
+use crate::cluster::FoundBy;
 use crate::config::{
     FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, HEARTBEAT, MAX_FOLLOWERS, MAX_STUDY_ADDED,
     MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
 };
 use crate::convert;
-use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Places, Refused};
+use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
 use crate::studies::{CreateProblem, ExportError, ExportedFile, Stopped, Studies, StudyHandle};
 use chefshat_room::ids::{Id, RequestKey};
@@ -41,6 +48,7 @@ type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 #[derive(Debug, Clone)]
 pub struct StudyCalls {
     studies: Arc<Studies>,
+    reach: Reach,
     calls: Arc<CallLimits>,
     followers: Arc<Places>,
     /// Places for streams of participants.
@@ -51,10 +59,16 @@ pub struct StudyCalls {
 
 impl StudyCalls {
     /// Creates the services for these studies; `closing` ends their streams.
-    pub fn new(studies: Arc<Studies>, calls: Arc<CallLimits>, closing: CancellationToken) -> Self {
+    pub fn new(
+        studies: Arc<Studies>,
+        reach: Reach,
+        calls: Arc<CallLimits>,
+        closing: CancellationToken,
+    ) -> Self {
         let shares = studies.rooms().shares();
         Self {
             studies,
+            reach,
             calls,
             followers: Places::new(MAX_FOLLOWERS, shares),
             participants: Places::new(MAX_STUDY_STREAMS, shares),
@@ -62,10 +76,29 @@ impl StudyCalls {
         }
     }
 
+    /// The study with this id, if this node has it. If another node does, the error sends the request
+    /// there.
+    async fn here(&self, id: Id, caller: Key) -> Result<Option<Arc<StudyHandle>>, Status> {
+        let known = self.studies.get(id);
+        if let Some(handle) = known.clone().filter(|handle| !handle.is_stopped()) {
+            return Ok(Some(handle));
+        }
+        let found_by = FoundBy::Id(id);
+        let checked = (self.reach).check_not_elsewhere(&found_by, caller, || known.is_some());
+        checked.await?;
+        Ok(self.studies.get(id))
+    }
+
     /// The study of an owner token. A wrong one is answered like an unknown study.
-    fn owned(&self, caller: &Caller, id: &str, token: &str) -> Result<Arc<StudyHandle>, Status> {
+    async fn owned(
+        &self,
+        caller: &Caller,
+        id: &str,
+        token: &str,
+    ) -> Result<Arc<StudyHandle>, Status> {
         let is_operator = caller.role == Role::Admin && caller.scope.is_none();
-        let handle = Id::parse(id).and_then(|id| self.studies.get(id));
+        let id = Id::parse(id).ok_or_else(study_unknown)?;
+        let handle = self.here(id, Key::of_caller(caller)).await?;
         handle
             .filter(|handle| handle.is_owner(token) || (is_operator && token.is_empty()))
             .ok_or_else(study_unknown)
@@ -92,6 +125,10 @@ impl StudyService for StudyCalls {
         let content = content_of(&settings);
         let request_key = request_id(&request.request_id)?.map(|id| RequestKey::new(id, &content));
         self.calls.charge(key, COST_OF_TOURNAMENT);
+        if let Some(request) = request_key {
+            // Another node may have created it for the same request.
+            self.here(Studies::created_id(request), key).await?;
+        }
         let created = self.studies.create(settings, request_key, key).await;
         let (handle, owner) = created.map_err(create_refused)?;
         Ok(Response::new(v1::CreateStudyResponse {
@@ -106,7 +143,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::GetStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         Ok(Response::new(v1::GetStudyResponse {
             study: Some(handle.describe()),
             participants: handle.participants(self.studies.rooms()),
@@ -118,6 +157,7 @@ impl StudyService for StudyCalls {
         request: Request<v1::ListStudiesRequest>,
     ) -> Result<Response<v1::ListStudiesResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let gateway = request.extensions().get::<Gateway>().cloned();
         let request = request.into_inner();
         let is_operator = caller.role == Role::Admin && caller.scope.is_none();
         let tokens = &request.owner_tokens;
@@ -130,9 +170,15 @@ impl StudyService for StudyCalls {
             .newest()
             .into_iter()
             .filter(|handle| is_operator || tokens.iter().any(|token| handle.is_owner(token)));
-        Ok(Response::new(v1::ListStudiesResponse {
-            studies: studies.map(|handle| handle.describe()).collect(),
-        }))
+        let mut studies: Vec<v1::Study> = studies.map(|handle| handle.describe()).collect();
+        if let Some(gateway) = gateway {
+            studies.extend(of_others(&gateway, &request).await);
+            studies.sort_by_key(|study| std::cmp::Reverse(study.created_at_ms));
+            // A study that just changes hands may be listed twice.
+            let mut seen = BTreeSet::new();
+            studies.retain(|study| seen.insert(study.study_id.clone()));
+        }
+        Ok(Response::new(v1::ListStudiesResponse { studies }))
     }
 
     async fn add_study_participants(
@@ -141,7 +187,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::AddStudyParticipantsResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let mut pseudonyms = Vec::new();
         for pseudonym in &request.pseudonyms {
             let pseudonym = convert::checked_name("pseudonyms", pseudonym, 1)
@@ -169,7 +217,9 @@ impl StudyService for StudyCalls {
         use chefshat_study::Status::{Active, DroppedOut, Invited};
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let numbers: Vec<u32> = handle.read(|study| {
             let participants = study.participants().iter();
             participants
@@ -189,7 +239,9 @@ impl StudyService for StudyCalls {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let place = self.followers.try_take(key).ok_or_else(|| {
             Refusal::from(Refused {
                 reason: "TOO_MANY_FOLLOWERS",
@@ -216,7 +268,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::RemoveStudyParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let removed = handle.remove(request.number, request.replace).await;
         let added = removed.map_err(stopped)?.map_err(refused)?;
         Ok(Response::new(v1::RemoveStudyParticipantResponse {
@@ -231,7 +285,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::CloseStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         handle.close().await.map_err(stopped)?;
         let study = Some(handle.describe());
         Ok(Response::new(v1::CloseStudyResponse { study }))
@@ -244,7 +300,9 @@ impl StudyService for StudyCalls {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let (sender, responses) = mpsc::channel(1);
         let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
@@ -283,7 +341,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::DeleteStudyParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let deleted = handle.withdraw(request.number, true).await;
         deleted.map_err(stopped)?.map_err(refused)?;
         let participant = handle.participant(request.number, self.studies.rooms());
@@ -300,7 +360,9 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::DeleteStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let handle = self.owned(&caller, &request.study_id, &request.owner_token)?;
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
         let deleted = self.studies.delete(handle, request.force).await;
         let (participants, games) = deleted.map_err(stopped)?.map_err(study_running)?;
         Ok(Response::new(v1::DeleteStudyResponse {
@@ -308,6 +370,23 @@ impl StudyService for StudyCalls {
             games: convert::number(games),
         }))
     }
+}
+
+/// The studies that the other nodes list. Those of a node that does not answer are left out.
+async fn of_others(gateway: &Gateway, request: &v1::ListStudiesRequest) -> Vec<v1::Study> {
+    let (_, peers) = gateway.directory().nodes().await;
+    let asked = peers.iter().map(|peer| async move {
+        let mut service = StudyServiceClient::new(gateway.peers().channel(peer));
+        let listing = service.list_studies(gateway.request(request.clone()));
+        match timeout(PEER_TIMEOUT, listing).await {
+            Ok(Ok(listed)) => listed.into_inner().studies,
+            _ => {
+                tracing::debug!(peer = %peer.node, "a node did not list its studies");
+                Vec::new()
+            }
+        }
+    });
+    join_all(asked).await.concat()
 }
 
 /// Sends a study and then what changes of it, until it is over.

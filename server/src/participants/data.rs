@@ -19,6 +19,11 @@ pub enum DataError {
     /// The server is shutting down.
     #[error("the server is shutting down; try again when it is back")]
     ShuttingDown,
+    /// No node has a study with the name at present; nothing was deleted in it.
+    #[error(
+        "a study with the name is just being taken over, or its server does not answer; try again"
+    )]
+    StudyUnreachable,
     /// Nobody receives the lines any more.
     #[error("the client has gone")]
     Gone,

@@ -19,10 +19,22 @@ pub use data::{DataError, ParticipantData};
 pub use delete::Deleted;
 pub use files::Skipped;
 
+use chefshat_room::ids::Id;
+
 use crate::rooms::Rooms;
 use crate::store::ForgetError;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
+
+/// The studies of other nodes of a cluster.
+pub trait StudiesElsewhere: Sync {
+    /// Deletes the data of a participant of a study.
+    fn delete_participant(
+        &self,
+        study: Id,
+        number: u32,
+    ) -> impl Future<Output = Result<(), DataError>> + Send;
+}
 
 /// The participants of a running server.
 pub struct Participants {
@@ -65,7 +77,11 @@ impl Participants {
     /// # Errors
     /// A game or tournament with the name is not over, or the store or the folder of records
     /// failed.
-    pub async fn delete(&self, name: &str) -> Result<Deleted, DataError> {
+    pub async fn delete(
+        &self,
+        name: &str,
+        elsewhere: &impl StudiesElsewhere,
+    ) -> Result<Deleted, DataError> {
         let _deleting = self.deleting.lock().await;
         if self.plays(name).await {
             return Err(ForgetError::GameRunning(name.to_owned()).into());
@@ -74,13 +90,16 @@ impl Participants {
             return Err(ForgetError::TournamentRunning(name.to_owned()).into());
         }
         let mut studies = 0;
-        for study in self.studies.newest() {
-            let Some(number) = study.number_by_pseudonym(name) else {
-                continue;
-            };
-            let withdrawn = study.withdraw(number, true).await;
-            // Only an unknown participant is refused.
-            drop(withdrawn.map_err(|_| DataError::ShuttingDown)?);
+        for (stored, number) in self.data.in_studies(name).await? {
+            let id = stored.header.id;
+            match self.studies.get(id).filter(|study| !study.is_stopped()) {
+                Some(study) => {
+                    let withdrawn = study.withdraw(number, true).await;
+                    // Only an unknown participant is refused.
+                    drop(withdrawn.map_err(|_| DataError::ShuttingDown)?);
+                }
+                None => elsewhere.delete_participant(id, number).await?,
+            }
             studies += 1;
         }
         // No record that was read before is written after.

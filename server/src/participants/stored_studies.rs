@@ -128,7 +128,10 @@ impl ParticipantData {
     }
 
     /// The studies that have a participant of this name, with its number.
-    async fn in_studies(&self, name: &str) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
+    pub(super) async fn in_studies(
+        &self,
+        name: &str,
+    ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
         let mut found = Vec::new();
         for id in self.store.studies().await? {
             let Some(stored) = self.store.study(id).await? else {

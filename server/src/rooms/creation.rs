@@ -105,6 +105,14 @@ pub enum PartOf {
 }
 
 impl PartOf {
+    /// What changes hands with it in a cluster.
+    fn unit(&self) -> Id {
+        match self {
+            Self::Tournament(game) => game.tournament,
+            Self::Study(game) => game.study,
+        }
+    }
+
     fn tournament(&self) -> Option<TournamentGame> {
         match self {
             Self::Tournament(game) => Some(*game),
@@ -216,8 +224,7 @@ impl Reservation {
     fn of(rooms: &Arc<Rooms>, owner: Token, new: &NewRoom) -> Result<Claim, CreateError> {
         let charged = new.charged;
         let seating = new.seating.as_ref();
-        let tournament = seating.and_then(|seating| seating.part_of.tournament());
-        let unit = tournament.map_or(owner.room, |game| game.tournament);
+        let unit = seating.map_or(owner.room, |seating| seating.part_of.unit());
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.room) {
             return match entry.header.owner.matches(&owner.secret) {
@@ -308,7 +315,7 @@ impl Reservation {
             };
             let handle = spawn_room(core, clock, None, journal, context);
             let durable = rooms.is_durable(&header);
-            if let Some(lease) = rooms.lease().filter(|_| header.tournament.is_none()) {
+            if let Some(lease) = rooms.lease().filter(|_| header.unit() == room_id) {
                 let ephemeral = !durable;
                 lease.report(header.unit(), News::Created { ephemeral });
             }

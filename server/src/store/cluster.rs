@@ -1,6 +1,6 @@
 //! What a store offers the nodes of a cluster besides [`Store`]: nodes and their leases, and who
-//! owns which rooms and tournaments. What changes hands together is a *unit*: a room without a
-//! tournament, or a tournament with all its rooms; its id is that of the room or tournament. Each
+//! owns which rooms, tournaments and studies. What changes hands together is a *unit*: a room alone,
+//! or a tournament or study with all its rooms; its id is that of the room, tournament or study. Each
 //! change of hands raises the *epoch* of the unit, and nothing is written for it at an older epoch
 //! (`StoreError::Fenced`). A unit with nothing open is over: nobody owns or claims it.
 
@@ -11,6 +11,7 @@ pub use chefshat_cluster::{Epoch, NodeId};
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryFutureExt as _};
 
+use super::studies::StoredStudy;
 use super::tournaments::StoredTournament;
 use super::{ResumableGame, Store, StoreError};
 use chefshat_room::ids::Id;
@@ -47,6 +48,8 @@ pub struct NodeStatus {
     pub rooms: u64,
     /// Tournaments that it owns and that are not over.
     pub tournaments: u64,
+    /// Its studies.
+    pub studies: u64,
 }
 
 /// The answer to a beat.
@@ -65,6 +68,8 @@ pub enum Kind {
     Room,
     /// A tournament.
     Tournament,
+    /// A study, which is never over.
+    Study,
 }
 
 /// Where a room or tournament is.
@@ -90,6 +95,8 @@ pub struct Location {
 pub struct Unit {
     /// The tournament, if the unit is one.
     pub tournament: Option<StoredTournament>,
+    /// The study, if the unit is one.
+    pub study: Option<StoredStudy>,
     /// Its durable rooms that are not over, and those that are but have not been removed yet,
     /// oldest first. A game that cannot be read is logged and left unchanged. The last entry of a
     /// game that has been claimed says that the server was restarted.

@@ -9,6 +9,7 @@ use chefshat_study::{
     At, Change, Content, ItemAnswer, ParticipantLink, Refusal, SessionSecret, Study,
 };
 use tokio::sync::{Mutex as AsyncMutex, mpsc, oneshot, watch};
+use tokio_util::sync::CancellationToken;
 
 use super::message::{Command, Message, Stopped};
 use crate::convert::{self, StudyPlan};
@@ -54,6 +55,8 @@ pub struct StudyHandle {
     /// The state with only committed changes.
     pub(super) committed: Mutex<Study>,
     pub(super) mailbox: mpsc::Sender<Message>,
+    /// Cancelled when its task ends.
+    pub(super) end: CancellationToken,
     /// Counts changes.
     pub(super) changes: watch::Sender<u64>,
     /// Counts the changes of each participant to whom somebody has listened.
@@ -70,6 +73,11 @@ impl StudyHandle {
     /// Its id.
     pub fn id(&self) -> Id {
         self.header.id
+    }
+
+    /// Whether its task has ended: the server ends, or another node has it.
+    pub fn is_stopped(&self) -> bool {
+        self.mailbox.is_closed()
     }
 
     /// Its settings.
@@ -138,14 +146,6 @@ impl StudyHandle {
     pub fn number_of(&self, link: &ParticipantLink) -> Option<u32> {
         let number = link.verify(&self.header.key)?;
         self.committed().participant(number).map(|_| number)
-    }
-
-    /// The participant with this pseudonym.
-    pub fn number_by_pseudonym(&self, pseudonym: &str) -> Option<u32> {
-        let study = self.committed();
-        let mut participants = study.participants().iter();
-        let found = participants.find(|(_, it)| it.pseudonym == pseudonym);
-        found.map(|(number, _)| *number)
     }
 
     /// The participant and the number of its session with this secret.

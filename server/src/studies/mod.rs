@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_study::{SettingsProblem, Study};
-use tokio::sync::{Mutex as AsyncMutex, mpsc, watch};
+use tokio::sync::{Mutex as AsyncMutex, Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
@@ -25,12 +25,13 @@ pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, Presence, StudyHandle, TraceRef
 pub use message::Stopped;
 
 use crate::clock::{TimeOfDay, since_epoch_ms};
+use crate::cluster::News;
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::convert::{self, StudyPlan};
 use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
-use crate::store::studies::StudyHeader;
+use crate::store::studies::{StoredStudy, StudyHeader};
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use task::{Stop, Task};
 
@@ -43,10 +44,8 @@ pub enum CreateProblem {
     /// A setting is invalid.
     #[error(transparent)]
     Settings(#[from] SettingsProblem),
-    /// This server hosts none.
-    #[error(
-        "a server that is a node of a cluster hosts no studies; run one with a data directory of its own (`chefshat serve --data-dir`)"
-    )]
+    /// The store of this server has no studies.
+    #[error("this server cannot host studies")]
     NotHosted,
     /// Its creator, or the server, has too many studies.
     #[error(transparent)]
@@ -76,6 +75,8 @@ pub struct Studies {
     table: Mutex<Table>,
     /// Locked while a study is created.
     creating: AsyncMutex<()>,
+    /// Notified when the creation of a study has ended.
+    created: Notify,
     places: Arc<Places>,
 }
 
@@ -83,6 +84,8 @@ pub struct Studies {
 struct Table {
     in_order: Vec<Arc<StudyHandle>>,
     by_id: BTreeMap<Id, Arc<StudyHandle>>,
+    /// The study that is being created, if there is one.
+    in_creation: Option<Id>,
 }
 
 impl Table {
@@ -108,6 +111,7 @@ impl Studies {
             stop: Stop::default(),
             table: Mutex::default(),
             creating: AsyncMutex::default(),
+            created: Notify::new(),
             places,
         })
     }
@@ -115,6 +119,11 @@ impl Studies {
     /// The rooms of its games.
     pub fn rooms(&self) -> &Arc<Rooms> {
         &self.rooms
+    }
+
+    /// The id of the study that this request creates.
+    pub fn created_id(request: RequestKey) -> Id {
+        shortened(request.owner().room)
     }
 
     /// Creates a study. Returns it with its owner token.
@@ -128,7 +137,7 @@ impl Studies {
         charged: Key,
     ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
         let store = self.rooms.store();
-        if !store.hosts_studies() || self.rooms.lease().is_some() {
+        if !store.hosts_studies() {
             return Err(CreateProblem::NotHosted);
         }
         let durable = store.outlives_server();
@@ -183,9 +192,17 @@ impl Studies {
             key: random_bytes(),
         };
         let store = self.rooms.store();
-        store.create_study(Arc::new(header.clone())).await?;
-        let handle = self.start_task(header, 0, plan, core, (charged, Some(place)));
-        Ok((handle, owner))
+        self.lock().in_creation = Some(header.id);
+        let stored = store.create_study(Arc::new(header.clone())).await;
+        let created = stored.map(|()| {
+            if let Some(lease) = self.rooms.lease() {
+                lease.report(header.id, News::Created { ephemeral: false });
+            }
+            self.start_task(header, 0, plan, core, (charged, Some(place)))
+        });
+        self.lock().in_creation = None;
+        self.created.notify_waiters();
+        Ok((created?, owner))
     }
 
     /// Resumes the studies of the store. The rooms must be restored already. One that cannot be read
@@ -200,19 +217,9 @@ impl Studies {
         }
         let mut count = 0;
         for id in store.studies().await? {
-            let restored = store.study(id).await.map_err(|error| error.to_string());
-            let restored = restored.and_then(|stored| {
-                let Some(stored) = stored else { return Ok(()) };
-                let problem = |problem: SettingsProblem| problem.to_string();
-                let plan = convert::study_plan(&stored.header.settings).map_err(problem)?;
-                let mut study = Study::new(plan.core.clone()).map_err(problem)?;
-                stored.changes.iter().for_each(|change| study.fold(change));
-                let charged = (Key::Study(id), None);
-                self.start_task(stored.header, stored.rows, plan, study, charged);
-                Ok(())
-            });
-            match restored {
-                Ok(()) => count += 1,
+            match store.study(id).await {
+                Ok(Some(stored)) => count += usize::from(self.resume(stored)),
+                Ok(None) => {}
                 Err(problem) => {
                     error!(study = %id, %problem, "a study cannot be resumed; it is left unchanged");
                 }
@@ -222,6 +229,59 @@ impl Studies {
             info!(studies = count, "studies resumed");
         }
         Ok(())
+    }
+
+    /// Resumes a study, whose rooms must be restored already. Returns whether it runs; one that cannot
+    /// be resumed is logged and left unchanged.
+    pub(crate) fn resume(&self, stored: StoredStudy) -> bool {
+        let id = stored.header.id;
+        let problem = |problem: SettingsProblem| problem.to_string();
+        let folded = || {
+            let plan = convert::study_plan(&stored.header.settings).map_err(problem)?;
+            let mut study = Study::new(plan.core.clone()).map_err(problem)?;
+            stored.changes.iter().for_each(|change| study.fold(change));
+            Ok::<_, String>((plan, study))
+        };
+        match folded() {
+            Ok((plan, study)) => {
+                let charged = (Key::Study(id), None);
+                self.start_task(stored.header, stored.rows, plan, study, charged);
+                true
+            }
+            Err(problem) => {
+                error!(study = %id, %problem, "a study cannot be resumed; it is left unchanged");
+                false
+            }
+        }
+    }
+
+    /// Whether this study runs here, or is being created.
+    pub(crate) fn runs(&self, id: Id) -> bool {
+        let table = self.lock();
+        let running = |handle: &Arc<StudyHandle>| !handle.mailbox.is_closed();
+        table.by_id.get(&id).is_some_and(running) || table.in_creation == Some(id)
+    }
+
+    /// Makes the task of a study end without publishing anything more.
+    pub(crate) fn fence(&self, id: Id) {
+        if let Some(handle) = self.get(id) {
+            handle.end.cancel();
+        }
+    }
+
+    /// Ends the task of a study, and forgets it: another node may have it.
+    pub(crate) async fn stop_one(&self, id: Id) {
+        loop {
+            let created = self.created.notified();
+            if self.lock().in_creation != Some(id) {
+                break;
+            }
+            created.await;
+        }
+        let Some(handle) = self.get(id) else { return };
+        handle.end.cancel();
+        handle.mailbox.closed().await;
+        self.lock().remove(id);
     }
 
     /// Deletes a study with all its data. Returns the numbers of its participants and games.
@@ -264,11 +324,11 @@ impl Studies {
         self.lock().by_id.get(&id).cloned()
     }
 
-    /// The study whose id begins with these bytes, as links have them.
-    pub fn by_short_id(&self, short: [u8; 12]) -> Option<Arc<StudyHandle>> {
+    /// The id that begins with these bytes, as links have them.
+    pub fn full_id(short: [u8; 12]) -> Id {
         let mut id = [0; 16];
         id[..short.len()].copy_from_slice(&short);
-        self.get(Id(id))
+        Id(id)
     }
 
     /// All studies, newest first.
@@ -297,7 +357,12 @@ impl Studies {
         (charged, place): (Key, Option<Held>),
     ) -> Arc<StudyHandle> {
         let (mailbox, inbox) = mpsc::channel(STUDY_MAILBOX);
+        let stop = Stop {
+            end: self.stop.end.child_token(),
+            ..self.stop.clone()
+        };
         let handle = Arc::new(StudyHandle {
+            end: stop.end.clone(),
             header,
             plan,
             charged,
@@ -311,11 +376,12 @@ impl Studies {
             streams: AtomicU64::new(0),
         });
         let mut table = self.lock();
+        table.remove(handle.id());
         table.in_order.push(Arc::clone(&handle));
         table.by_id.insert(handle.id(), Arc::clone(&handle));
         drop(table);
         let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), self.now, rows);
-        self.tracker.spawn(task.run(inbox, self.stop.clone()));
+        self.tracker.spawn(task.run(inbox, stop));
         handle
     }
 

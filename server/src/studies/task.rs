@@ -9,11 +9,12 @@ use chefshat_study::{Change, Refusal, Status, Study};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info};
+use tracing::{error, info, warn};
 
 use super::handle::StudyHandle;
 use super::message::{Command, Message};
 use crate::clock::TimeOfDay;
+use crate::cluster::News;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use chefshat_room::ids::Id;
@@ -107,16 +108,12 @@ impl Task {
             // From here on no end of a game is missed.
             changed.as_mut().enable();
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
-                error!(study = %self.handle.id(), %error, "the store failed; the study stops");
-                return;
+                return self.fail(&error);
             }
             match self.delete_study().await {
                 Ok(false) => {}
                 Ok(true) => return,
-                Err(error) => {
-                    error!(study = %self.handle.id(), %error, "the store failed; the study stops");
-                    return;
-                }
+                Err(error) => return self.fail(&error),
             }
             let wake = self.wake_at();
             let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
@@ -131,6 +128,42 @@ impl Task {
                 () = changed => {}
                 () = alarm, if wake.is_some() => {}
             }
+        }
+    }
+
+    fn fail(&self, error: &StoreError) {
+        let study = self.handle.id();
+        match (error, self.rooms.lease()) {
+            (StoreError::Fenced(_), _) => info!(%study, %error, "the study stops here"),
+            (_, Some(_)) => warn!(%study, %error, "the study stops until it is resumed"),
+            (_, None) => error!(%study, %error, "the store failed; the study stops"),
+        }
+        if let Some(lease) = self.rooms.lease()
+            && !self.handle.end.is_cancelled()
+        {
+            lease.report(study, News::Stopped);
+        }
+    }
+
+    /// The result of a write, once this server may publish it. The study must stop if another node may
+    /// have it.
+    async fn published<T>(
+        &self,
+        written: impl Future<Output = Result<T, StoreError>>,
+    ) -> Result<T, StoreError> {
+        let fenced = || StoreError::Fenced(self.handle.id());
+        let Some(lease) = self.rooms.lease() else {
+            return written.await;
+        };
+        let written = async {
+            let written = written.await?;
+            lease.held().await;
+            Ok(written)
+        };
+        tokio::select! {
+            biased;
+            written = written => written,
+            () = self.handle.end.cancelled() => Err(fenced()),
         }
     }
 
@@ -254,7 +287,8 @@ impl Task {
                 let changes = std::mem::take(&mut self.pending);
                 let id = self.handle.id();
                 let store = self.rooms.store();
-                store.append_study(id, self.rows, changes.clone()).await?;
+                self.published(store.append_study(id, self.rows, changes.clone()))
+                    .await?;
                 self.rows += 1;
                 self.handle.publish(&changes);
             }

@@ -158,13 +158,13 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     }
     let link = study.link(1).link;
     let link = ParticipantLink::parse(&link).expect("a link");
-    assert!(studies.by_short_id(link.study()).is_some());
+    assert!(studies.get(Studies::full_id(link.study())).is_some());
 
     let deleted = studies.delete(Arc::clone(study), true).await;
     assert_eq!(deleted.expect("it runs"), Ok((2, 1)));
     assert!(lab.store.study(id).await.expect("readable").is_none());
     assert_eq!(lab.store.studies().await, Ok(Vec::new()));
-    assert!(studies.by_short_id(link.study()).is_none());
+    assert!(studies.get(Studies::full_id(link.study())).is_none());
     assert!(studies.newest().is_empty());
     assert!(study.open(1).await.is_err(), "its task has ended");
     assert!(study.is_over());

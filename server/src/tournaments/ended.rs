@@ -23,6 +23,8 @@ impl Tournaments {
                     self.rooms.show_ended(game).await;
                 }
             }
+            // It is never over.
+            Kind::Study => {}
             Kind::Tournament => {
                 let is_shown = self.get(id).is_some();
                 if !is_shown && let Some(stored) = directory.ended_tournament(id).await? {

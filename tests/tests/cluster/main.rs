@@ -8,3 +8,4 @@ mod faults;
 mod measure;
 mod proxy;
 mod rounds;
+mod studies;

@@ -582,7 +582,11 @@ impl ClusterStore for FakeStore {
                     rows,
                 });
             }
-            Ok(Some(Unit { tournament, games }))
+            Ok(Some(Unit {
+                tournament,
+                study: None,
+                games,
+            }))
         }
         .boxed()
     }

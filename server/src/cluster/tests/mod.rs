@@ -25,6 +25,7 @@ use crate::room::{Handle, JoinRequest, RoomGone};
 use crate::rooms::{NewRoom, Rooms};
 use crate::store::Store;
 use crate::store::cluster::{ClusterStore, Kind, NodeInfo};
+use crate::studies::Studies;
 use crate::tournaments::{Entry, TournamentHandle, Tournaments};
 use fake::{Database, FakeStore};
 
@@ -51,7 +52,8 @@ impl TestNode {
         let directory = Arc::new(directory);
         let rooms = Rooms::of_node(&config, stored, directory, Some(lease), tracker.clone());
         let rooms = rooms.expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker);
+        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
+        let studies = Studies::new(Arc::clone(&rooms), tracker);
         let info = NodeInfo {
             capacity: 1_000,
             ..NodeInfo::default()
@@ -66,7 +68,7 @@ impl TestNode {
             Duration::ZERO,
             shared,
             Arc::clone(&rooms),
-            Arc::clone(&tournaments),
+            (Arc::clone(&tournaments), studies),
         );
         let mut publishes = node.may_publish();
         soon(publishes.wait_for(|it| *it)).await.expect("it runs");

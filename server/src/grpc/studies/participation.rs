@@ -20,18 +20,19 @@ use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
 use crate::limits::{Key, Refused};
 use crate::metrics::StreamKind;
 use crate::rooms::Rooms;
-use crate::studies::{StudyHandle, TraceRefusal};
+use crate::studies::{Studies, StudyHandle, TraceRefusal};
 use chefshat_room::ids::Id;
 
 impl StudyCalls {
     /// The study and the participant of a link. Wrong links are charged like wrong join codes.
-    fn of_link(&self, link: &str, key: Key) -> Result<(Arc<StudyHandle>, u32), Status> {
+    async fn of_link(&self, link: &str, key: Key) -> Result<(Arc<StudyHandle>, u32), Status> {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
-        let found = ParticipantLink::parse(link).and_then(|link| {
-            let handle = self.studies.by_short_id(link.study())?;
-            let number = handle.number_of(&link)?;
-            Some((handle, number))
-        });
+        let mut found = None;
+        if let Some(link) = ParticipantLink::parse(link) {
+            let handle = self.here(Studies::full_id(link.study()), key).await?;
+            found = handle.and_then(|handle| Some((handle.number_of(&link)?, handle)));
+        }
+        let found = found.map(|(number, handle)| (handle, number));
         found.ok_or_else(|| {
             self.calls.wrong_code(key);
             status(
@@ -44,12 +45,18 @@ impl StudyCalls {
     }
 
     /// The study, the participant and the session of a secret.
-    fn of_session(&self, secret: &str) -> Result<(Arc<StudyHandle>, u32, u32), Status> {
-        let found = SessionSecret::parse(secret).and_then(|secret| {
-            let handle = self.studies.by_short_id(secret.study())?;
-            let (number, session) = handle.session_of(&secret)?;
-            Some((handle, number, session))
-        });
+    async fn of_session(
+        &self,
+        secret: &str,
+        key: Key,
+    ) -> Result<(Arc<StudyHandle>, u32, u32), Status> {
+        let mut found = None;
+        if let Some(secret) = SessionSecret::parse(secret)
+            && let Some(handle) = self.here(Studies::full_id(secret.study()), key).await?
+        {
+            let session = handle.session_of(&secret);
+            found = session.map(|(number, session)| (handle, number, session));
+        }
         found.ok_or_else(|| {
             status(
                 Code::Unauthenticated,
@@ -84,7 +91,7 @@ impl ParticipationService for StudyCalls {
         request: Request<v1::OpenStudyRequest>,
     ) -> Result<Response<v1::OpenStudyResponse>, Status> {
         let key = charged(request.extensions());
-        let (handle, number) = self.of_link(&request.into_inner().link, key)?;
+        let (handle, number) = self.of_link(&request.into_inner().link, key).await?;
         let opened = handle.open(number).await.map_err(stopped)?;
         let session = opened.map_err(refused)?;
         Ok(Response::new(v1::OpenStudyResponse {
@@ -101,7 +108,7 @@ impl ParticipationService for StudyCalls {
         request: Request<v1::FollowParticipationRequest>,
     ) -> Result<Response<Self::FollowParticipationStream>, Status> {
         let key = charged(request.extensions());
-        let (handle, number, session) = self.of_session(&request.into_inner().session)?;
+        let (handle, number, session) = self.of_session(&request.into_inner().session, key).await?;
         let place = self.participants.try_take(key).ok_or_else(|| {
             Refusal::from(Refused {
                 reason: "TOO_MANY_FOLLOWERS",
@@ -133,8 +140,9 @@ impl ParticipationService for StudyCalls {
         &self,
         request: Request<v1::GiveConsentRequest>,
     ) -> Result<Response<v1::GiveConsentResponse>, Status> {
+        let key = charged(request.extensions());
         let request = request.into_inner();
-        let (handle, number, session) = self.of_session(&request.session)?;
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
         let given = handle.consent(at(number, session, request.step)).await;
         given.map_err(stopped)?.map_err(refused)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
@@ -145,8 +153,9 @@ impl ParticipationService for StudyCalls {
         &self,
         request: Request<v1::AnswerQuestionnaireRequest>,
     ) -> Result<Response<v1::AnswerQuestionnaireResponse>, Status> {
+        let key = charged(request.extensions());
         let request = request.into_inner();
-        let (handle, number, session) = self.of_session(&request.session)?;
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
         let answers = convert::answers_from_proto(request.answers).map_err(|item| {
             status(
                 Code::InvalidArgument,
@@ -165,8 +174,9 @@ impl ParticipationService for StudyCalls {
         &self,
         request: Request<v1::ContinueStudyRequest>,
     ) -> Result<Response<v1::ContinueStudyResponse>, Status> {
+        let key = charged(request.extensions());
         let request = request.into_inner();
-        let (handle, number, session) = self.of_session(&request.session)?;
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
         let continued = handle.proceed(at(number, session, request.step)).await;
         continued.map_err(stopped)?.map_err(refused)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
@@ -177,8 +187,9 @@ impl ParticipationService for StudyCalls {
         &self,
         request: Request<v1::RecordTracesRequest>,
     ) -> Result<Response<v1::RecordTracesResponse>, Status> {
+        let key = charged(request.extensions());
         let request = request.into_inner();
-        let (handle, number, session) = self.of_session(&request.session)?;
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
         let game =
             Id::parse(&request.game_id).ok_or_else(|| traces_refused(TraceRefusal::GameUnknown))?;
         let rooms = self.studies.rooms();
@@ -197,7 +208,7 @@ impl ParticipationService for StudyCalls {
     ) -> Result<Response<v1::WithdrawFromStudyResponse>, Status> {
         let key = charged(request.extensions());
         let request = request.into_inner();
-        let (handle, number) = self.of_link(&request.link, key)?;
+        let (handle, number) = self.of_link(&request.link, key).await?;
         let withdrawn = handle.withdraw(number, request.delete_data).await;
         withdrawn.map_err(stopped)?.map_err(refused)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);

@@ -28,6 +28,10 @@ use chefshat_room::ids::Id;
 const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
 /// How often a claim is tried again because the last owner has just written something.
 const CLAIM_ATTEMPTS: usize = 5;
+/// The kinds of what is owned.
+const ROOM: i16 = 0;
+const TOURNAMENT: i16 = 1;
+const STUDY: i16 = 2;
 /// The columns of `location`.
 macro_rules! locations {
     ($rest:literal) => {
@@ -266,7 +270,7 @@ impl ClusterStore for PostgresStore {
                     "SELECT number, games.form, header, over,
                             kind, node = $2 AND epoch = $3 AND NOT over AS is_owned
                      FROM owned LEFT JOIN games USING (game_id)
-                     WHERE unit = $1 AND (kind = 1 OR durable AND number IS NOT NULL
+                     WHERE unit = $1 AND (kind <> 0 OR durable AND number IS NOT NULL
                                                  AND (NOT over OR ended_ms >= clock_ms() - $4))
                      ORDER BY number",
                 )
@@ -281,18 +285,24 @@ impl ClusterStore for PostgresStore {
             if !(items.iter()).any(|item| item.get::<Option<bool>, _>(5) == Some(true)) {
                 return Ok(None);
             }
-            let (rooms, tournaments): (Vec<_>, Vec<_>) =
-                (items.into_iter()).partition(|item| item.get::<i16, _>(4) == 0);
-            let tournament = match tournaments.is_empty() {
-                true => None,
-                false => self.tournament_over(&self.control, unit).await?,
+            let (rooms, others): (Vec<_>, Vec<_>) =
+                (items.into_iter()).partition(|item| item.get::<i16, _>(4) == ROOM);
+            let is = |kind: i16| others.iter().any(|item| item.get::<i16, _>(4) == kind);
+            let tournament = match is(TOURNAMENT) {
+                true => self.tournament_over(&self.control, unit).await?,
+                false => None,
+            };
+            let study = match is(STUDY) {
+                true => self.control.study(unit).await?,
+                false => None,
             };
             let rooms = self.control.rooms(rooms).await?;
-            if tournament.is_some() {
-                lock(&self.tournaments).insert(unit, at);
+            if tournament.is_some() || study.is_some() {
+                lock(&self.epochs).insert(unit, at);
             }
             Ok(Some(Unit {
                 tournament,
+                study,
                 // At the epoch that was asked for: if another one has come since, they are fenced.
                 games: (rooms.into_iter())
                     .map(|room| self.resumable(room, at))
@@ -398,7 +408,8 @@ impl ClusterStore for PostgresStore {
                     "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
                             greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
-                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments
+                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
+                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
                      FROM nodes ORDER BY node",
                 )
                 .bind(expire_after)
@@ -416,6 +427,7 @@ impl ClusterStore for PostgresStore {
                         drain: row.get("drain"),
                         rooms: number(row, "rooms"),
                         tournaments: number(row, "tournaments"),
+                        studies: number(row, "studies"),
                     }
                 })
                 .collect())
@@ -508,7 +520,8 @@ fn location(row: &PgRow) -> Result<Location, StoreError> {
     Ok(Location {
         id: id_of(row, 0).ok_or_else(odd)?,
         kind: match row.get::<i16, _>(1) {
-            0 => Kind::Room,
+            ROOM => Kind::Room,
+            STUDY => Kind::Study,
             _ => Kind::Tournament,
         },
         unit: id_of(row, 2).ok_or_else(odd)?,

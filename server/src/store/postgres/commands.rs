@@ -13,6 +13,7 @@ use sqlx::{Connection as _, Row as _};
 
 use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole};
 use super::forget::rewrite;
+use super::studies::StudyWrite;
 use super::values::{Owned, integer, text};
 use super::writer::{Answers, Work, confirming};
 use crate::store::StoreError;
@@ -59,6 +60,8 @@ pub(super) enum Command {
     Delete { games: Vec<Id> },
     /// Removes a participant from games and tournaments that are over.
     Rewrite(Rewrite),
+    /// Writes something for a study.
+    Study(StudyWrite),
     /// Creates a tournament with its first row.
     Tournament {
         id: Id,
@@ -143,6 +146,7 @@ impl Command {
                 rewrite(connection, changes).await?;
                 return Ok(Ok(0));
             }
+            Self::Study(write) => return write.run(connection, again).await,
             Self::Tournament { .. } => return self.create_tournament(connection, again).await,
             Self::TournamentEntries {
                 owned,

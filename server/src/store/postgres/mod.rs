@@ -1,5 +1,5 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
-//! reads, `journals`, `appends`, `commands`, `ends` and `forget` write through `writer`, `cluster`,
+//! reads, `journals`, `appends`, `commands`, `ends`, `forget` and `studies` write through `writer`, `cluster`,
 //! `claims`, `handover` and `owned` are about nodes and what they own, `transfer` moves an SQLite
 //! database here, `form` (beside this folder) encodes; this file joins them into a store.
 
@@ -15,6 +15,7 @@ mod journals;
 mod open;
 mod owned;
 mod reader;
+mod studies;
 #[cfg(test)]
 pub(super) mod tests;
 mod transfer;
@@ -29,6 +30,7 @@ use std::time::Duration;
 use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
+use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
@@ -43,6 +45,7 @@ pub use transfer::{TransferError, Transferred, transfer};
 use super::codec::Codec;
 use super::ephemeral::EphemeralJournal;
 use super::form;
+use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame,
@@ -56,6 +59,7 @@ use commands::Command;
 use handover::Handed;
 use journals::{DurableJournal, Whole};
 use reader::{Reader, StoredRoom};
+use studies::StudyWrite;
 use values::{FIRST_EPOCH, Owned, integer};
 use writer::{Queue, Shared};
 
@@ -114,8 +118,8 @@ pub struct PostgresStore {
     commands: Queue<Command>,
     /// The node; 0: none has joined.
     node: AtomicI64,
-    /// The epochs at which the tournaments of this node are written.
-    tournaments: Mutex<HashMap<Id, i64>>,
+    /// The epochs at which the tournaments and studies of this node are written.
+    epochs: Mutex<HashMap<Id, i64>>,
     closing: CancellationToken,
     writing: Mutex<Vec<JoinHandle<()>>>,
     metrics: StoreMetrics,
@@ -159,7 +163,7 @@ impl PostgresStore {
             rows: writer::start(&shared, APPENDERS, &mut writing),
             commands: writer::start(&shared, COMMANDERS, &mut writing),
             node: AtomicI64::new(0),
-            tournaments: Mutex::default(),
+            epochs: Mutex::default(),
             closing,
             writing: Mutex::new(writing),
             metrics,
@@ -176,20 +180,36 @@ impl PostgresStore {
         }
     }
 
-    /// The epoch at which this node writes a tournament.
-    fn tournament_epoch(&self, tournament: Id) -> Result<i64, StoreError> {
-        let epoch = lock(&self.tournaments).get(&tournament).copied();
-        epoch.ok_or(StoreError::Fenced(tournament))
+    /// The epoch at which this node writes a tournament or study.
+    fn epoch_of(&self, unit: Id) -> Result<i64, StoreError> {
+        let epoch = lock(&self.epochs).get(&unit).copied();
+        epoch.ok_or(StoreError::Fenced(unit))
+    }
+
+    /// A tournament or study, as this node writes it.
+    fn owned(&self, unit: Id) -> Result<Owned, StoreError> {
+        Ok(Owned {
+            id: unit,
+            unit,
+            epoch: self.epoch_of(unit)?,
+        })
+    }
+
+    /// Writes something for a study.
+    async fn write_study(&self, write: StudyWrite) -> Result<(), StoreError> {
+        let command = Arc::new(Command::Study(write));
+        self.commands.commit(command).await.map(drop)
     }
 
     /// A room to be created: what its journals are written as.
     fn place(&self, header: &GameHeader) -> Result<Owned, StoreError> {
+        let unit = header.unit();
         Ok(Owned {
             id: header.room_id,
-            unit: header.unit(),
-            epoch: match header.tournament {
-                Some(game) => self.tournament_epoch(game.tournament)?,
-                None => FIRST_EPOCH,
+            unit,
+            epoch: match unit == header.room_id {
+                true => FIRST_EPOCH,
+                false => self.epoch_of(unit)?,
             },
         })
     }
@@ -391,7 +411,7 @@ impl Store for PostgresStore {
                 over: entries.iter().any(TournamentEntry::is_end),
             };
             self.commands.commit(Arc::new(create)).await?;
-            lock(&self.tournaments).insert(header.id, FIRST_EPOCH);
+            lock(&self.epochs).insert(header.id, FIRST_EPOCH);
             Ok(())
         }
         .boxed()
@@ -405,11 +425,7 @@ impl Store for PostgresStore {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let append = Command::TournamentEntries {
-                owned: Owned {
-                    id: tournament,
-                    unit: tournament,
-                    epoch: self.tournament_epoch(tournament)?,
-                },
+                owned: self.owned(tournament)?,
                 position: integer(row),
                 entries: form::tournament_entries_to_bytes(&entries),
                 over: entries.iter().any(TournamentEntry::is_end),
@@ -425,6 +441,99 @@ impl Store for PostgresStore {
         newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
         self.own_tournaments(newest_over).boxed()
+    }
+
+    fn hosts_studies(&self) -> bool {
+        true
+    }
+
+    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let create = StudyWrite::Create {
+                id: header.id,
+                node: self.node()?,
+                header: form::study_to_bytes(&header),
+            };
+            self.write_study(create).await?;
+            lock(&self.epochs).insert(header.id, FIRST_EPOCH);
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn append_study(
+        &self,
+        study: Id,
+        row: u64,
+        changes: Vec<StudyChange>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let append = StudyWrite::Append {
+                owned: self.owned(study)?,
+                position: integer(row),
+                changes: form::study_changes_to_bytes(&changes),
+            };
+            self.write_study(append).await
+        }
+        .boxed()
+    }
+
+    fn rewrite_study(
+        &self,
+        study: Id,
+        changes: Vec<StudyChange>,
+        forgotten: u32,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let rewrite = StudyWrite::Rewrite {
+                owned: self.owned(study)?,
+                changes: form::study_changes_to_bytes(&changes),
+                forgotten,
+            };
+            self.write_study(rewrite).await
+        }
+        .boxed()
+    }
+
+    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let owned = self.owned(study)?;
+            self.write_study(StudyWrite::Delete { owned }).await?;
+            lock(&self.epochs).remove(&study);
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+        self.reader.study(study).boxed()
+    }
+
+    /// Those of all nodes.
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.reader.studies().boxed()
+    }
+
+    fn append_traces(
+        &self,
+        study: Id,
+        traces: StoredTraces,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let add = StudyWrite::Traces {
+                owned: self.owned(study)?,
+                id: Id::random(),
+                participant: traces.number,
+                game: traces.game,
+                traces: form::traces_to_bytes(traces.traces),
+            };
+            self.write_study(add).await
+        }
+        .boxed()
+    }
+
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        self.reader.traces(study).boxed()
     }
 
     /// Never: a database that does not answer may do so later.

@@ -13,11 +13,12 @@ use tokio::time::timeout;
 use super::errors::explain;
 use crate::store::StoreError;
 
-/// The migrations, oldest first. A released one never changes: sqlx refuses a database in which it ran
-/// with another text. Before the first release, changes go into the first one, since no database
-/// outlives its tests.
-const MIGRATIONS: [(i64, &str, &str); 1] =
-    [(1, "games", include_str!("migrations/0001_games.sql"))];
+/// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
+/// another text.
+const MIGRATIONS: [(i64, &str, &str); 2] = [
+    (1, "games", include_str!("migrations/0001_games.sql")),
+    (2, "studies", include_str!("migrations/0002_studies.sql")),
+];
 /// How long connecting may take.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 /// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;

@@ -12,8 +12,11 @@ use super::errors::failure;
 use super::open::{self, DatabaseError};
 use super::values::{FIRST_EPOCH, integer, text};
 use crate::store::form;
-use crate::store::sqlite::{Contents, GameRow, JournalRow, ParticipantRow, TournamentRow};
+use crate::store::sqlite::{
+    Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
+};
 use crate::store::{DATABASE_FILE, OpenError, StoreError};
+use chefshat_room::ids::Id;
 use chefshat_room::journal::GameHeader;
 
 /// Rows in one statement, and how many bytes of journals at most, nearly.
@@ -29,6 +32,8 @@ pub struct Transferred {
     pub unfinished: u64,
     /// Tournaments.
     pub tournaments: u64,
+    /// Studies.
+    pub studies: u64,
     /// Unfinished games and tournaments that this version cannot read; they are moved, but do not
     /// resume.
     pub unreadable: u64,
@@ -48,14 +53,9 @@ pub enum TransferError {
     Database(#[from] DatabaseError),
     /// The database has games already.
     #[error(
-        "the database already has games or tournaments; nothing was changed: create an empty database and name that"
+        "the database already has games, tournaments or studies; nothing was changed: create an empty database and name that"
     )]
     NotEmpty,
-    /// The folder has studies, which a cluster does not host.
-    #[error(
-        "the folder has {0} studies, and servers of a cluster host none; nothing was moved: keep a server on this folder for them"
-    )]
-    Studies(u64),
     /// Reading or writing failed.
     #[error("{0}; nothing was moved")]
     Store(#[from] StoreError),
@@ -84,20 +84,16 @@ pub async fn transfer(
     // Its statements may take long.
     let address = open::address(url)?.disable_statement_logging();
     let contents = Contents::open(data_dir).await?;
-    let studies = contents.studies().await?;
-    if studies > 0 {
-        return Err(TransferError::Studies(studies));
-    }
     open::migrate(url).await?;
     let mut connection = open::connect(&address).await?;
     let mut transaction = connection.begin().await?;
     // Nobody creates anything meanwhile.
-    sqlx::query("LOCK TABLE games, tournaments, owned IN EXCLUSIVE MODE")
+    sqlx::query("LOCK TABLE games, tournaments, studies, owned IN EXCLUSIVE MODE")
         .execute(&mut *transaction)
         .await?;
     let empty: bool = sqlx::query_scalar(
         "SELECT NOT EXISTS (SELECT FROM games) AND NOT EXISTS (SELECT FROM tournaments)
-                AND NOT EXISTS (SELECT FROM owned)",
+                AND NOT EXISTS (SELECT FROM studies) AND NOT EXISTS (SELECT FROM owned)",
     )
     .fetch_one(&mut *transaction)
     .await?;
@@ -106,6 +102,7 @@ pub async fn transfer(
     }
     let mut moved = Transferred::default();
     move_tournaments(&contents, &mut transaction, &mut moved).await?;
+    move_studies(&contents, &mut transaction, &mut moved).await?;
     let all = contents.count().await?;
     let mut games = contents.games();
     let mut rows = Vec::new();
@@ -135,6 +132,7 @@ pub async fn transfer(
         "UPDATE finished SET last = (SELECT coalesce(max(listed), 0) FROM games)",
         "SELECT setval(pg_get_serial_sequence('games', 'number'), max(number)) FROM games HAVING count(*) > 0",
         "SELECT setval(pg_get_serial_sequence('tournaments', 'number'), max(number)) FROM tournaments HAVING count(*) > 0",
+        "SELECT setval(pg_get_serial_sequence('studies', 'number'), max(number)) FROM studies HAVING count(*) > 0",
     ] {
         sqlx::query(statement).execute(&mut *transaction).await?;
     }
@@ -159,6 +157,71 @@ async fn move_tournaments(
         insert_full(connection, "tournament_entries", &mut rows).await?;
     }
     insert_rows(connection, "tournament_entries", &mut rows).await
+}
+
+async fn move_studies(
+    contents: &Contents,
+    connection: &mut PgConnection,
+    moved: &mut Transferred,
+) -> Result<(), TransferError> {
+    let mut studies = contents.studies();
+    while let Some(study) = studies.try_next().await? {
+        moved.studies += 1;
+        insert_study(connection, &study).await?;
+    }
+    let mut rows = Vec::new();
+    let mut journals = contents.study_journals();
+    while let Some(row) = journals.try_next().await? {
+        rows.push(row);
+        insert_full(connection, "study_changes", &mut rows).await?;
+    }
+    insert_rows(connection, "study_changes", &mut rows).await?;
+    let mut traces = contents.traces();
+    while let Some(row) = traces.try_next().await? {
+        insert_traces(connection, &row).await?;
+    }
+    Ok(())
+}
+
+/// Inserts a study, which the next node takes over.
+async fn insert_study(
+    connection: &mut PgConnection,
+    study: &StudyRow,
+) -> Result<(), TransferError> {
+    sqlx::query(
+        "WITH study AS (
+             INSERT INTO studies (number, study_id, form, header)
+             OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4)
+         )
+         INSERT INTO owned (id, unit, kind, epoch, join_code, durable, form)
+         VALUES ($2, $2, 2, $5, 'study ' || encode($2, 'hex'), true, $3)",
+    )
+    .bind(study.number)
+    .bind(study.id.as_slice())
+    .bind(study.form)
+    .bind(study.header.as_slice())
+    .bind(FIRST_EPOCH)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+async fn insert_traces(
+    connection: &mut PgConnection,
+    traces: &TracesRow,
+) -> Result<(), TransferError> {
+    sqlx::query(
+        "INSERT INTO study_traces (trace_id, study, participant, game_id, traces)
+         VALUES ($1, $2, $3, $4, $5)",
+    )
+    .bind(Id::random().0.as_slice())
+    .bind(traces.study)
+    .bind(traces.participant)
+    .bind(traces.game_id.as_slice())
+    .bind(traces.traces.as_slice())
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 /// Inserts a tournament; `false` if it cannot be read, so that nobody resumes it.

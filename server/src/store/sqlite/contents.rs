@@ -60,6 +60,23 @@ pub(in crate::store) struct TournamentRow {
     pub(in crate::store) header: Vec<u8>,
 }
 
+/// A study as stored.
+pub(in crate::store) struct StudyRow {
+    pub(in crate::store) number: i64,
+    pub(in crate::store) id: Vec<u8>,
+    pub(in crate::store) form: i64,
+    pub(in crate::store) header: Vec<u8>,
+}
+
+/// Interface traces as stored.
+pub(in crate::store) struct TracesRow {
+    /// The number of the study.
+    pub(in crate::store) study: i64,
+    pub(in crate::store) participant: i64,
+    pub(in crate::store) game_id: Vec<u8>,
+    pub(in crate::store) traces: Vec<u8>,
+}
+
 /// The database of a data directory.
 pub(in crate::store) struct Contents(Opened);
 
@@ -80,13 +97,38 @@ impl Contents {
         Ok(count.cast_unsigned())
     }
 
-    /// Number of studies.
-    pub(in crate::store) async fn studies(&self) -> Result<u64, StoreError> {
-        let count: i64 = sqlx::query_scalar("SELECT count(*) FROM studies")
-            .fetch_one(&self.0.readers)
-            .await
-            .map_err(failure)?;
-        Ok(count.cast_unsigned())
+    /// The studies, in the order of their numbers.
+    pub(in crate::store) fn studies(&self) -> Rows<'_, StudyRow> {
+        self.rows(
+            "SELECT number, study_id, form, header FROM studies ORDER BY number",
+            |row| StudyRow {
+                number: row.get(0),
+                id: row.get(1),
+                form: row.get(2),
+                header: row.get(3),
+            },
+        )
+    }
+
+    /// The journals of all studies.
+    pub(in crate::store) fn study_journals(&self) -> Rows<'_, JournalRow> {
+        self.rows(
+            "SELECT study, position, changes FROM study_changes ORDER BY study, position",
+            journal_row,
+        )
+    }
+
+    /// The interface traces of all studies, in the order in which they were added.
+    pub(in crate::store) fn traces(&self) -> Rows<'_, TracesRow> {
+        self.rows(
+            "SELECT study, participant, game_id, traces FROM study_traces ORDER BY number",
+            |row| TracesRow {
+                study: row.get(0),
+                participant: row.get(1),
+                game_id: row.get(2),
+                traces: row.get(3),
+            },
+        )
     }
 
     /// The games, in the order of their numbers.

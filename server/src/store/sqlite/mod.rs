@@ -29,7 +29,9 @@ use tokio::task::JoinHandle;
 use tracing::error;
 
 pub use backup::{DatabaseCopy, check_copy, copy_database};
-pub(in crate::store) use contents::{Contents, GameRow, JournalRow, ParticipantRow, TournamentRow};
+pub(in crate::store) use contents::{
+    Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
+};
 pub use errors::FILE as DATABASE_FILE;
 pub use open::{LOCK_FILE, OpenError};
 

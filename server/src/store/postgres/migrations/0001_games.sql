@@ -49,7 +49,6 @@ CREATE TABLE owned (
 CREATE UNIQUE INDEX owned_by_open_code ON owned (join_code) WHERE NOT over;
 CREATE INDEX owned_by_code ON owned (join_code);
 CREATE INDEX owned_by_node ON owned (node) WHERE NOT over;
-CREATE INDEX owned_by_game ON owned (game_id) WHERE NOT over;
 CREATE INDEX owned_by_unit ON owned (unit);
 CREATE INDEX owned_by_end ON owned (ended_ms) WHERE over AND kind = 0;
 

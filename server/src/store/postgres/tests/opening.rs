@@ -3,6 +3,7 @@
 use chefshat_postgres::Server;
 
 use super::*;
+use crate::store::postgres::open::NEWEST;
 
 async fn refusal(database: &Database) -> DatabaseError {
     let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
@@ -23,13 +24,25 @@ async fn only_an_empty_database_gets_tables_without_being_asked() {
     database.run("DROP TABLE recipes");
     node(&database).await.close().await;
     node(&database).await.close().await;
-    assert_eq!(migrate(database.url()).await.ok(), Some((1, 1)));
+    assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
+}
+
+#[tokio::test]
+async fn a_database_of_the_version_before_studies_is_upgraded() {
+    let database = chefshat_postgres::database();
+    migrate(database.url()).await.expect("an empty database");
+    database.run("DROP TABLE studies, study_changes, study_traces; DROP INDEX owned_by_game");
+    database.run("DELETE FROM _sqlx_migrations WHERE version > 1");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Older), "{error}");
+    assert_eq!(migrate(database.url()).await.ok(), Some((1, NEWEST)));
+    node(&database).await.close().await;
 }
 
 #[tokio::test]
 async fn a_later_schema_is_used_if_it_only_adds() {
     let database = chefshat_postgres::database();
-    assert_eq!(migrate(database.url()).await.ok(), Some((0, 1)));
+    assert_eq!(migrate(database.url()).await.ok(), Some((0, NEWEST)));
     database.run(
         "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
          VALUES (9999, 'of the future', true, '', 0)",
