@@ -96,7 +96,6 @@ async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-#[ignore = "an open fault: now and then a game stands still after the second kill"]
 async fn a_tournament_whose_owner_is_killed_twice_counts_every_game_once() {
     let mut cluster = Cluster::start(NODES, Leases::Steady).await;
     let client = Client::connect(cluster.url()).await.expect("it listens");
