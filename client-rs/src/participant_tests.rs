@@ -138,6 +138,9 @@ fn a_seat_that_is_attached_twice_is_played_under_its_newest_handle() {
         (0, decision(4)),
     ]);
     assert_eq!(sent, ["0:4=10"]);
+    // A late refusal of one of its attachments takes nothing away.
+    let sent = cup.receive(vec![(0, refused(FIRST_SEAT)), (0, decision(5))]);
+    assert_eq!(sent, ["0:5=10"]);
 }
 
 #[test]

@@ -184,7 +184,11 @@ impl<'a, A: Agent> Session<'a, A> {
                 }
             }
             Update::Refused(refused) if refused.request_id != 0 => {
-                self.settling(refused.request_id, |seat| seat.refused(refused));
+                let number = refused.request_id;
+                // The server may have attached it meanwhile, with its participant.
+                if !self.by_handle.values().any(|it| *it == number) {
+                    self.settling(number, |seat| seat.refused(refused));
+                }
             }
             Update::Refused(refused) => {
                 tracing::warn!(handle, reason = refused.reason, "{}", refused.message);

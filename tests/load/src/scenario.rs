@@ -12,6 +12,8 @@ use crate::pulse::{Latencies, Plan, Window, latencies};
 use crate::server::{Kind, Launcher};
 use crate::tally::{Counts, Traffic};
 
+/// Decisions after which a window closes with --smoke.
+const SMOKE_DECISIONS: u64 = 1_000;
 /// Rooms in the durability scenario without `--rooms`.
 const DURABLE_ROOMS: usize = 64;
 /// Rooms of the scenarios of `--scale`: 4, 64, 400, 1,000 and 4,000 connections.
@@ -183,7 +185,9 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
     };
     if load.smoke {
         plan.warmup = Duration::from_millis(50);
-        plan.window = Duration::from_millis(200);
+        // On a busy machine a short time may have no decision at all.
+        plan.decisions = Some(SMOKE_DECISIONS);
+        plan.window = Duration::from_mins(1);
     }
     let purpose = scenario.purpose;
     let mut outcome = Outcome {

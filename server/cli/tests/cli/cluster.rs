@@ -33,7 +33,7 @@ fn a_drained_node_hands_its_room_to_another_and_stops() {
     cluster("drain nobody").assert_failed("`chefshat cluster status`");
     cluster("drain first")
         .clean()
-        .assert_says(&["hands over 1 room and 0 tournaments"]);
+        .assert_says(&["hands over 1 room, 0 tournaments and 0 studies"]);
     assert_eq!(first.0.wait().unwrap().code(), Some(0));
     assert_eq!(rooms_of("first"), None, "it has left");
     until("the other node to have the room", || {

@@ -189,10 +189,10 @@ async fn rewrite(
          ), study AS (
              SELECT number FROM owner JOIN studies ON study_id = id
          ), later AS (
-             DELETE FROM study_changes USING study WHERE study_changes.study = number AND position > 0
+             DELETE FROM study_changes USING study WHERE study_changes.study = study.number AND position > 0
          ), traces AS (
              DELETE FROM study_traces USING study
-             WHERE study_traces.study = number AND participant = $3
+             WHERE study_traces.study = study.number AND participant = $3
          )
          INSERT INTO study_changes (study, position, epoch, changes)
          SELECT number, 0, $2, $4 FROM study
@@ -244,9 +244,9 @@ async fn delete(connection: &mut PgConnection, owned: Owned) -> sqlx::Result<boo
          ), study AS (
              DELETE FROM studies USING owner WHERE study_id = id RETURNING number
          ), changes AS (
-             DELETE FROM study_changes USING study WHERE study_changes.study = number
+             DELETE FROM study_changes USING study WHERE study_changes.study = study.number
          ), traces AS (
-             DELETE FROM study_traces USING study WHERE study_traces.study = number
+             DELETE FROM study_traces USING study WHERE study_traces.study = study.number
          )
          DELETE FROM owned USING owner WHERE owned.id = owner.id RETURNING owned.id",
     )

@@ -171,7 +171,7 @@ fn a_hint_selects_the_suggested_action() {
     assert!(session.screen().contains("The hint is being computed."));
     assert_eq!(session.press(KeyCode::Char('h')), None, "one at a time");
     let plays: Vec<ActionId> = (legal.iter()).filter(|it| *it != decision.pass()).collect();
-    assert!(plays.len() > 2, "{plays:?}");
+    assert!(plays.len() > 1, "{plays:?}");
     for action in plays {
         let hint = v1::Hint {
             action: action.index().into(),

@@ -45,13 +45,19 @@ fn every_moment_is_the_same_forwards_and_back() {
 #[test]
 fn a_record_with_hints_says_so() {
     let mut lines = lines("fixed.jsonl");
-    let hinted = lines.iter_mut().find_map(|line| match &mut line.line {
-        Some(record_line::Line::Decision(decision)) => Some(decision),
-        _ => None,
-    });
-    hinted.expect("a decision").hints = 2;
-    if let Some(record_line::Line::Header(header)) = &mut lines[0].line {
-        header.policy.get_or_insert_default().hints = true;
+    let mut hints = Some(2);
+    for line in lines.iter_mut().filter_map(|line| line.line.as_mut()) {
+        match line {
+            record_line::Line::Header(header) => header.policy.get_or_insert_default().hints = true,
+            record_line::Line::Event(event) => {
+                if let Some(Kind::GameStarted(started)) = &mut event.kind {
+                    started.policy.get_or_insert_default().hints = true;
+                }
+            }
+            // The first one.
+            record_line::Line::Decision(decision) => decision.hints = hints.take().unwrap_or(0),
+            _ => {}
+        }
     }
     let mut reel = of_record(lines).expect("a record");
     press(&mut reel, KeyCode::Home);
