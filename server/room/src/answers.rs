@@ -72,6 +72,19 @@ pub enum LeaveError {
     Assigned,
 }
 
+/// What a participant expresses.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Expression {
+    /// For the record only.
+    pub record_only: bool,
+    /// The seat that it is about, if it is about one.
+    pub about: Option<u32>,
+    /// Whether it says something in words.
+    pub in_words: bool,
+    /// The expression, encoded.
+    pub encoded: Box<[u8]>,
+}
+
 /// Why an expression is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExpressError {
@@ -81,6 +94,9 @@ pub enum ExpressError {
     /// It is about a seat that the room does not have.
     #[error("the room has no seat with this number")]
     NoSuchSeat,
+    /// People may not write in this room.
+    #[error("people may not write in this room; its creator decides that")]
+    ChatOff,
     /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
     TooMany,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use chefshat_engine::{ActionError, Seat};
 
-use super::answers::{Answer, Answered, ExpressError, JoinError, LeaveError, Verdict};
+use super::answers::{Answer, Answered, ExpressError, Expression, JoinError, LeaveError, Verdict};
 use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
     MAX_EXPRESSIONS_PER_SEAT, MAX_GATEWAY_DELAY, MAX_SEATINGS, OpenDecision, State,
@@ -212,17 +212,20 @@ impl Core {
         &mut self,
         now: Duration,
         seat: Seat,
-        record_only: bool,
-        about: Option<u32>,
-        expression: Box<[u8]>,
+        expression: Expression,
     ) -> Result<(), ExpressError> {
         if self.state.is_over() {
             return Err(ExpressError::GameOver);
         }
         let exists =
             |seat: u32| usize::try_from(seat).is_ok_and(|seat: usize| seat < self.seats.len());
-        if about.is_some_and(|seat| !exists(seat)) {
+        if expression.about.is_some_and(|seat| !exists(seat)) {
             return Err(ExpressError::NoSuchSeat);
+        }
+        let is_person = (self.standing(seat).participant)
+            .is_some_and(|participant| participant.kind == ParticipantKind::Human);
+        if expression.in_words && is_person && !self.header.policy.chat {
+            return Err(ExpressError::ChatOff);
         }
         if self.seats[seat.index()].expressions >= MAX_EXPRESSIONS_PER_SEAT {
             return Err(ExpressError::TooMany);
@@ -231,8 +234,8 @@ impl Core {
             now,
             Change::Expressed {
                 seat,
-                record_only,
-                expression,
+                record_only: expression.record_only,
+                expression: expression.encoded,
             },
         );
         Ok(())

@@ -36,8 +36,8 @@ use chefshat_engine::{
 
 pub use absence::Awaited;
 pub use answers::{
-    Answer, Answered, ExpressError, HintError, JoinError, LeaveError, ReportError, ReportOutcome,
-    ReportVerdict, SeatStanding, Verdict,
+    Answer, Answered, ExpressError, Expression, HintError, JoinError, LeaveError, ReportError,
+    ReportOutcome, ReportVerdict, SeatStanding, Verdict,
 };
 
 pub use journal::Marker;

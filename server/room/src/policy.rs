@@ -104,6 +104,8 @@ pub struct Policy {
     pub visibility: Visibility,
     /// Whether seats may ask for hints.
     pub hints: bool,
+    /// Whether people may write.
+    pub chat: bool,
     /// How long the game waits, at each decision, for a seat that is not connected. `None`, in games
     /// of earlier servers: an absence changes nothing.
     pub absence_time: Option<Duration>,
@@ -186,6 +188,7 @@ impl Default for Policy {
             one_seat_per_client: false,
             visibility: Visibility::Public,
             hints: false,
+            chat: false,
             absence_time: Some(Duration::from_secs(10)),
         }
     }

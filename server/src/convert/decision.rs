@@ -1,12 +1,12 @@
 //! Decisions: masks, answers and their results, annotations, expressions.
 
 use chefshat_engine::{MAX_SEATS, Mask, RuleSet};
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, expression::About};
 use chefshat_record::convert::{FieldProblem, check_expression};
 use prost::Message as _;
 
 use chefshat_room::journal::Source;
-use chefshat_room::{Answer, Answered, ExpressError, Verdict};
+use chefshat_room::{Answer, Answered, ExpressError, Expression, Verdict};
 
 /// Encodes a mask.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
@@ -95,9 +95,17 @@ pub fn answer_from_proto(answer: v1::Answer) -> Answer {
 ///
 /// # Errors
 /// A field is out of its range.
-pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, FieldProblem> {
+pub fn expression_from_proto(expression: &v1::Expression) -> Result<Expression, FieldProblem> {
     check_expression(expression, MAX_SEATS)?;
-    Ok(expression.encode_to_vec().into_boxed_slice())
+    Ok(Expression {
+        record_only: expression.record_only,
+        about: match expression.about {
+            Some(About::AboutSeat(seat)) => Some(seat),
+            _ => None,
+        },
+        in_words: expression.media.starts_with("data:"),
+        encoded: expression.encode_to_vec().into_boxed_slice(),
+    })
 }
 
 /// Why an expression was refused, for the stream of its seat.
@@ -108,6 +116,7 @@ pub fn express_refused(error: ExpressError) -> v1::Refused {
     const FAILED_PRECONDITION: u32 = 9;
     let (code, reason) = match error {
         ExpressError::GameOver => (FAILED_PRECONDITION, "GAME_OVER"),
+        ExpressError::ChatOff => (FAILED_PRECONDITION, "CHAT_OFF"),
         ExpressError::TooMany => (RESOURCE_EXHAUSTED, "TOO_MANY_EXPRESSIONS"),
         ExpressError::NoSuchSeat => (INVALID_ARGUMENT, "EXPRESSION_REFUSED"),
     };

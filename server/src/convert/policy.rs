@@ -84,6 +84,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Err(_) => return Err(FieldProblem::unknown("visibility", message.visibility)),
         },
         hints: message.hints,
+        chat: message.chat,
         absence_time: time("absence_time_ms", message.absence_time_ms, 0..=DAY_MS)?,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
@@ -134,6 +135,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
         one_seat_per_client: policy.one_seat_per_client,
         visibility: visibility_to_proto(policy.visibility).into(),
         hints: policy.hints,
+        chat: policy.chat,
         absence_time_ms: policy.absence_time.map(millis),
     }
 }

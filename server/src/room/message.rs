@@ -17,7 +17,8 @@ use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::{AbortReason, Marked, ParticipantKind};
 use chefshat_room::{
-    Answer, ConnectionId, ExpressError, HintError, JoinError, LeaveError, MarkError, ReportError,
+    Answer, ConnectionId, ExpressError, Expression, HintError, JoinError, LeaveError, MarkError,
+    ReportError,
 };
 
 /// A request for a seat.
@@ -147,14 +148,7 @@ pub enum SeatAction {
     /// Answers a decision.
     Answer(Answer),
     /// Expresses something.
-    Express {
-        /// For the record only.
-        record_only: bool,
-        /// The seat that it is about, if it is about one.
-        about: Option<u32>,
-        /// The expression, encoded.
-        expression: Box<[u8]>,
-    },
+    Express(Expression),
     /// Takes the seat back from its substitute.
     Resume,
 }

@@ -34,6 +34,7 @@ pub fn simulation_policy(
         one_seat_per_client: false,
         visibility: v1::Visibility::Unspecified.into(),
         hints: false,
+        chat: false,
         absence_time_ms: None,
     }
 }

@@ -84,6 +84,18 @@ async fn a_person_who_plays_as_a_robot_is_one_until_the_record() {
         let shown = client.express(robot, expression(ExpressionSource::Model, record_only));
         shown.await.expect("expressed");
     }
+    // A robot speaks; people write only where the policy lets them.
+    let line = || v1::Expression {
+        label: "say".into(),
+        media: "data:,Ciao".into(),
+        ..v1::Expression::default()
+    };
+    client.express(robot, line()).await.expect("a robot speaks");
+    let refused = client.express(&tickets[0], line()).await;
+    assert_eq!(
+        refused.expect_err("people do not write here").reason(),
+        Some("CHAT_OFF")
+    );
     let mut watching = client.spectate(&room.room_id, 0);
     let watched = async {
         let mut seen = String::new();

@@ -178,6 +178,7 @@ export function WatchFields(props: GameProps) {
         checked={form.hints}
         onCheck={(hints) => change({ hints })}
       />
+      <CheckField label={words.chat} hint={words.chatHint} checked={form.chat} onCheck={(chat) => change({ chat })} />
       <CheckField label={words.allowed} checked={form.spectators} onCheck={(spectators) => change({ spectators })} />
       {form.spectators && (
         <>

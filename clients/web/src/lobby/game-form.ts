@@ -52,6 +52,7 @@ export interface GameForm {
   spectatorDelay: string;
   spectatorsSeeHands: boolean;
   hints: boolean;
+  chat: boolean;
   visibility: VisibilityChoice;
 }
 
@@ -86,6 +87,7 @@ export function newGame(): GameForm {
     spectatorDelay: "0",
     spectatorsSeeHands: false,
     hints: false,
+    chat: false,
     visibility: "public",
   };
 }
@@ -190,6 +192,7 @@ export function policyOf(form: GameForm) {
     spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
     spectatorsSeeHands: form.spectators && form.spectatorsSeeHands,
     hints: form.hints,
+    chat: form.chat,
     visibility: VISIBILITIES[form.visibility],
   } satisfies MessageInitShape<typeof RoomPolicySchema>;
 }

@@ -62,6 +62,7 @@ export function Seated({ acting, study, banner, tools, onward, below, onPick }: 
       onPick={onPick}
       onExpress={wizard ? undefined : acting.express}
       phrases={!study && !wizard}
+      chat={table.policy?.chat ?? false}
     >
       {wizard && table.phase !== "gameOver" && table.phase !== "aborted" && (
         <Console

@@ -15,7 +15,7 @@ export interface Gesture {
   valence?: number;
   /** -1..1 */
   arousal?: number;
-  /** The words of a robot's line, as a data URL. */
+  /** The words of a line, as a data URL. */
   media?: string;
   source: ExpressionSource;
 }
@@ -53,21 +53,24 @@ export type Phrase = keyof typeof PHRASES;
 
 const SAYS = "say:";
 
-/** A robot's line, and its request for help: the words are in `media`. */
+/** A line, and a robot's request for help: the words are in `media`. */
 const SPOKEN = ["say", "help"];
 const WORDS = "data:,";
 /** The longest `media` that the protocol allows, bytes. */
 const MAX_MEDIA = 256;
 
-/** The expression for a line as a robot's program sends it. A text that does not fit is cut off. */
-export function lineGesture(text: string): Gesture {
+/** Longest line that is typed, characters. */
+export const MAX_LINE = 80;
+
+/** The expression for a line, by default as a robot's program sends it. A text that does not fit is cut off. */
+export function lineGesture(text: string, source = ExpressionSource.MODEL): Gesture {
   const characters = Array.from(text);
   let media = WORDS + encodeURIComponent(text);
   while (media.length > MAX_MEDIA) {
     characters.pop();
     media = WORDS + encodeURIComponent(`${characters.join("").trimEnd()}…`);
   }
-  return { label: "say", media, source: ExpressionSource.MODEL };
+  return { label: "say", media, source };
 }
 
 /** The label under which the page shows an expression: that of a robot's line has its words. */

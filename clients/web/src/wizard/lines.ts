@@ -3,12 +3,10 @@
 
 import { ExpressionSource } from "../gen/chefshat/v1/decision_pb";
 import { recall, remember } from "../store";
-import { type Gesture, gesture, type Label } from "../table/expressions";
+import { type Gesture, gesture, type Label, MAX_LINE } from "../table/expressions";
 
 /** Lines with a key: Alt and a digit from 1 to 9. */
 export const MAX_LINES = 9;
-/** Longest line, characters. */
-export const MAX_LINE = 80;
 
 const LINES = "wizard.lines";
 

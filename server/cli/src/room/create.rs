@@ -74,6 +74,9 @@ pub(super) struct Create {
     /// Let seats ask for hints; records say which decisions had one.
     #[arg(long)]
     hints: bool,
+    /// Let people write to everybody at the table.
+    #[arg(long)]
+    chat: bool,
 }
 
 impl Create {
@@ -188,6 +191,7 @@ impl Create {
                 waiting_time_ms: self.waiting_time_ms,
                 one_seat_per_client: self.one_seat_per_client,
                 hints: self.hints,
+                chat: self.chat,
                 ..self.policy.message()
             }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),

@@ -470,6 +470,7 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         one_seat_per_client: false,
         visibility: v1::Visibility::Unspecified.into(),
         hints: false,
+        chat: false,
         absence_time_ms: None,
     }
 }

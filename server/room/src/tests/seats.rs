@@ -4,7 +4,7 @@ use chefshat_engine::RewardScheme;
 
 use super::*;
 use crate::journal::AbortReason;
-use crate::{ExpressError, JOIN_HOLD, JoinError, LeaveError, MAX_SEATINGS};
+use crate::{ExpressError, Expression, JOIN_HOLD, JoinError, LeaveError, MAX_SEATINGS};
 
 #[test]
 fn reserved_seats_are_only_given_to_their_kind() {
@@ -141,13 +141,47 @@ fn rewards_go_to_turns_and_to_invalid_attempts() {
 }
 
 #[test]
+fn people_write_only_where_the_policy_allows_it() {
+    for chat in [false, true] {
+        let policy = Policy {
+            chat,
+            ..Policy::default()
+        };
+        let mut table = Table::empty(policy, vec![OPEN; 4]);
+        let [person, agent] =
+            [ParticipantKind::Human, ParticipantKind::Agent].map(|kind| table.join(kind));
+        let mut says = |seat: Result<Seat, JoinError>, in_words| {
+            let expression = Expression {
+                in_words,
+                ..Expression::default()
+            };
+            let said = table
+                .core
+                .express(table.now, seat.expect("a free seat"), expression);
+            table.commit();
+            said
+        };
+        let allowed = if chat {
+            Ok(())
+        } else {
+            Err(ExpressError::ChatOff)
+        };
+        assert_eq!(says(person, true), allowed);
+        assert_eq!(says(person, false), Ok(()));
+        assert_eq!(says(agent, true), Ok(()));
+    }
+}
+
+#[test]
 fn expressions_are_public_or_recorded_only_and_limited() {
     let mut table = Table::playing(Policy::default());
     let seat = Seat::new(1);
     let express = |table: &mut Table, record_only| {
-        let said = table
-            .core
-            .express(table.now, seat, record_only, None, Box::default());
+        let expression = Expression {
+            record_only,
+            ..Expression::default()
+        };
+        let said = table.core.express(table.now, seat, expression);
         table.commit();
         said
     };

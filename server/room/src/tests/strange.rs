@@ -5,6 +5,7 @@ use chefshat_agents::AgentKind;
 use proptest::prelude::*;
 
 use super::*;
+use crate::Expression;
 
 #[derive(Debug, Clone)]
 enum Input {
@@ -70,13 +71,11 @@ fn step(table: &mut Table, input: &Input) {
             }
         }
         Input::Express(seat, record_only) => {
-            let _ = table.core.express(
-                table.now,
-                Seat::new(seat),
+            let expression = Expression {
                 record_only,
-                None,
-                Box::default(),
-            );
+                ..Expression::default()
+            };
+            let _ = (table.core).express(table.now, Seat::new(seat), expression);
         }
         Input::Resume(seat) => table.core.resume(table.now, Seat::new(seat)),
         Input::Wait(time) => table.pass_time(ms(time)),

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::task::{Context, Poll};
 
-use chefshat_proto::v1::expression::About;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
 use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
@@ -459,14 +458,7 @@ pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, 
         let problem = "the server sets WIZARD in records; send what a robot would";
         return Err(FieldProblem::new("source", problem));
     }
-    Ok(SeatAction::Express {
-        record_only: expression.record_only,
-        about: match expression.about {
-            Some(About::AboutSeat(seat)) => Some(seat),
-            _ => None,
-        },
-        expression: convert::expression_from_proto(expression)?,
-    })
+    convert::expression_from_proto(expression).map(SeatAction::Express)
 }
 
 #[cfg(test)]

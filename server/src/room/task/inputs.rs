@@ -229,13 +229,8 @@ impl Room {
                 let answered = self.core.answer(self.now, seat, answer, arrived, handed);
                 Ok(Some(convert::answer_result(decision_id, action, answered)))
             }
-            SeatAction::Express {
-                record_only,
-                about,
-                expression,
-            } => self
-                .core
-                .express(self.now, seat, record_only, about, expression)
+            SeatAction::Express(expression) => (self.core)
+                .express(self.now, seat, expression)
                 .map(|()| None),
             SeatAction::Resume => {
                 self.core.resume(self.now, seat);

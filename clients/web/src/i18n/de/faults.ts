@@ -42,6 +42,7 @@ export const faults: Texts["faults"] = {
     SPECTATORS_NOT_ADMITTED: "In diesem Raum darf niemand zuschauen.",
     TOO_MANY_SPECTATORS: "Dieser Raum hat schon so viele Zuschauer, wie er erlaubt.",
     DECISION_CLOSED: "Diese Entscheidung ist nicht mehr offen.",
+    CHAT_OFF: "In diesem Raum kann man nicht schreiben; es gibt fertige Sätze.",
     HINTS_OFF: "In diesem Raum gibt es keine Tipps.",
     TOO_MANY_HINTS: "Du hast für diese Entscheidung schon alle Tipps bekommen.",
     TOO_MANY_EXPRESSIONS: "Zu viele Reaktionen auf einmal. Warte einen Moment.",

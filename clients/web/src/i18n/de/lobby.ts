@@ -220,6 +220,9 @@ export const lobby: Texts["lobby"] = {
     watch: {
       playersHints: "Spieler dürfen Tipps anfordern",
       playersHintsHint: "Die Aufzeichnung sagt, bei welchen Entscheidungen.",
+      chat: "Spieler dürfen einander schreiben",
+      chatHint:
+        "Alle am Tisch und die Zuschauer lesen mit, und es steht in der Aufzeichnung. Sonst gibt es fertige Sätze.",
       allowed: "Zuschauer sind erlaubt",
       delay: "Verzögerung in Entscheidungen",
       delayHint: "Zuschauer sehen die Partie um so viele Entscheidungen später.",

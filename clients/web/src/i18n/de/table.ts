@@ -227,6 +227,8 @@ export const table: Texts["table"] = {
       sadness: "Traurigkeit",
     },
     say: "Sag etwas",
+    ownWords: "Eigene Worte",
+    sayIt: "Sagen",
     phrases: {
       "good-luck": "Viel Glück!",
       "well-played": "Gut gespielt!",

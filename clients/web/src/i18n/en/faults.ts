@@ -39,6 +39,7 @@ export const faults = {
     SPECTATORS_NOT_ADMITTED: "This room does not allow spectators.",
     TOO_MANY_SPECTATORS: "This room already has as many spectators as it allows.",
     DECISION_CLOSED: "This decision is not open any more.",
+    CHAT_OFF: "People may not write in this room; there are ready-made phrases.",
     HINTS_OFF: "There are no hints in this room.",
     TOO_MANY_HINTS: "You have had all hints for this decision.",
     TOO_MANY_EXPRESSIONS: "Too many expressions at once. Wait a moment.",

@@ -218,6 +218,9 @@ export const lobby = {
     watch: {
       playersHints: "Players may ask for hints",
       playersHintsHint: "The record says which decisions had one.",
+      chat: "Players may write to each other",
+      chatHint:
+        "Everybody at the table and spectators read it, and it is in the record. Otherwise there are ready-made phrases.",
       allowed: "Spectators may watch",
       delay: "Delay in decisions",
       delayHint: "Spectators see the game this many decisions late.",

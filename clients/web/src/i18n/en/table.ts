@@ -222,6 +222,8 @@ export const table = {
       sadness: "sadness",
     },
     say: "Say something",
+    ownWords: "Your own words",
+    sayIt: "Say it",
     phrases: {
       "good-luck": "Good luck!",
       "well-played": "Well played!",

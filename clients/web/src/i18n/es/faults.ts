@@ -41,6 +41,7 @@ export const faults: Texts["faults"] = {
     SPECTATORS_NOT_ADMITTED: "Esta sala no admite espectadores.",
     TOO_MANY_SPECTATORS: "Esta sala ya tiene tantos espectadores como admite.",
     DECISION_CLOSED: "Esta decisión ya no está abierta.",
+    CHAT_OFF: "En esta sala no se puede escribir; hay frases preparadas.",
     HINTS_OFF: "En esta sala no hay pistas.",
     TOO_MANY_HINTS: "Ya has recibido todas las pistas para esta decisión.",
     TOO_MANY_EXPRESSIONS: "Demasiadas reacciones a la vez. Espera un momento.",

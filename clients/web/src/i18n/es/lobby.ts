@@ -224,6 +224,8 @@ export const lobby: Texts["lobby"] = {
     watch: {
       playersHints: "Los jugadores pueden pedir pistas",
       playersHintsHint: "El registro dice en qué decisiones.",
+      chat: "Los jugadores pueden escribirse",
+      chatHint: "Lo leen todos en la mesa y los espectadores, y queda en el registro. Si no, hay frases preparadas.",
       allowed: "Se permiten espectadores",
       delay: "Retraso en decisiones",
       delayHint: "Los espectadores ven la partida con este número de decisiones de retraso.",

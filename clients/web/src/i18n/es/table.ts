@@ -227,6 +227,8 @@ export const table: Texts["table"] = {
       sadness: "tristeza",
     },
     say: "Di algo",
+    ownWords: "Con tus palabras",
+    sayIt: "Dilo",
     phrases: {
       "good-luck": "¡Suerte!",
       "well-played": "¡Bien jugado!",

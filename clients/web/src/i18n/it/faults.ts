@@ -40,6 +40,7 @@ export const faults: Texts["faults"] = {
     SPECTATORS_NOT_ADMITTED: "Questa stanza non ammette spettatori.",
     TOO_MANY_SPECTATORS: "Questa stanza ha già il numero massimo di spettatori.",
     DECISION_CLOSED: "Questa decisione non è più aperta.",
+    CHAT_OFF: "In questa stanza non si può scrivere; ci sono frasi pronte.",
     HINTS_OFF: "In questa stanza non ci sono suggerimenti.",
     TOO_MANY_HINTS: "Hai già avuto tutti i suggerimenti per questa decisione.",
     TOO_MANY_EXPRESSIONS: "Troppe espressioni in poco tempo. Aspetta un momento.",

@@ -223,6 +223,9 @@ export const lobby: Texts["lobby"] = {
     watch: {
       playersHints: "I giocatori possono chiedere suggerimenti",
       playersHintsHint: "La registrazione dice per quali decisioni.",
+      chat: "I giocatori possono scriversi",
+      chatHint:
+        "Lo leggono tutti al tavolo e gli spettatori, ed è nella registrazione. Altrimenti ci sono frasi pronte.",
       allowed: "Gli spettatori possono guardare",
       delay: "Ritardo in decisioni",
       delayHint: "Gli spettatori vedono la partita con questo ritardo.",

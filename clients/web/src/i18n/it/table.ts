@@ -227,6 +227,8 @@ export const table: Texts["table"] = {
       sadness: "tristezza",
     },
     say: "Di’ qualcosa",
+    ownWords: "Parole tue",
+    sayIt: "Dillo",
     phrases: {
       "good-luck": "Buona fortuna!",
       "well-played": "Bella giocata!",

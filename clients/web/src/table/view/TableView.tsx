@@ -77,6 +77,8 @@ interface TableViewProps {
   onExpress?: ((gesture: Gesture) => void) | undefined;
   /** Whether there are quick phrases beside the expressions. */
   phrases?: boolean;
+  /** Whether people may write. */
+  chat?: boolean;
 }
 
 /** The heading wraps only between its parts, not before a number or dot. */
@@ -186,7 +188,9 @@ export function TableView(props: TableViewProps) {
             cards={false}
           />
           {/* Before the hand, so that the buttons are one Tab after the cards. */}
-          {props.onExpress && <Expressions onExpress={props.onExpress} phrases={props.phrases ?? false} />}
+          {props.onExpress && (
+            <Expressions onExpress={props.onExpress} phrases={props.phrases ?? false} chat={props.chat ?? false} />
+          )}
           <div class={css.ownCards} data-part="own-cards">
             <Hand
               row={row}

@@ -2,11 +2,22 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
+import { ExpressionSource } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import { Button } from "../../parts/Button";
 import { Dialog } from "../../parts/Dialog";
+import { TextField } from "../../parts/Field";
 import { Icon } from "../../parts/Icon";
-import { type Gesture, gesture, LABELS, PHRASES, type Phrase, phraseGesture } from "../expressions";
+import {
+  type Gesture,
+  gesture,
+  LABELS,
+  lineGesture,
+  MAX_LINE,
+  PHRASES,
+  type Phrase,
+  phraseGesture,
+} from "../expressions";
 import type { OpenDecision } from "../model/live";
 import { lookupOf } from "../model/lookup";
 import type { Requirement } from "../model/requirement";
@@ -85,11 +96,17 @@ interface ExpressionsProps {
   onExpress: (gesture: Gesture) => void;
   /** Whether there are quick phrases too. */
   phrases: boolean;
+  /** Whether people may write. */
+  chat: boolean;
 }
 
-export function Expressions({ onExpress, phrases }: ExpressionsProps) {
+export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
   const words = t().table.expressions;
   const [talking, setTalking] = useState(false);
+  const say = (gesture: Gesture) => {
+    setTalking(false);
+    onExpress(gesture);
+  };
   return (
     <fieldset class={css.expressions} data-part="expressions" aria-label={words.label}>
       {LABELS.map((label) => (
@@ -105,7 +122,7 @@ export function Expressions({ onExpress, phrases }: ExpressionsProps) {
           <Face label={label} />
         </button>
       ))}
-      {phrases && (
+      {(phrases || chat) && (
         <button
           type="button"
           class={css.tool}
@@ -121,21 +138,39 @@ export function Expressions({ onExpress, phrases }: ExpressionsProps) {
       )}
       {talking && (
         <Dialog title={words.say} onClose={() => setTalking(false)}>
-          <div class={css.phrases} data-part="phrases">
-            {(Object.keys(PHRASES) as Phrase[]).map((phrase) => (
-              <Button
-                key={phrase}
-                onClick={() => {
-                  setTalking(false);
-                  onExpress(phraseGesture(phrase));
-                }}
-              >
-                {words.phrases[phrase]}
-              </Button>
-            ))}
-          </div>
+          {chat && <OwnWords onExpress={say} />}
+          {phrases && (
+            <div class={css.phrases} data-part="phrases">
+              {(Object.keys(PHRASES) as Phrase[]).map((phrase) => (
+                <Button key={phrase} onClick={() => say(phraseGesture(phrase))}>
+                  {words.phrases[phrase]}
+                </Button>
+              ))}
+            </div>
+          )}
         </Dialog>
       )}
     </fieldset>
+  );
+}
+
+/** A line of the person's own words. */
+function OwnWords({ onExpress }: Pick<ExpressionsProps, "onExpress">) {
+  const words = t().table.expressions;
+  const [text, setText] = useState("");
+  const line = text.trim();
+  return (
+    <form
+      class={css.ownWords}
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (line) onExpress(lineGesture(line, ExpressionSource.SELF_REPORT));
+      }}
+    >
+      <TextField label={words.ownWords} value={text} maxLength={MAX_LINE} onText={setText} />
+      <Button look="main" type="submit" disabled={!line}>
+        {words.sayIt}
+      </Button>
+    </form>
   );
 }

@@ -643,7 +643,7 @@ class Expression(_message.Message):
     source: Global___ExpressionSource.ValueType
     """Its source."""
     media: _builtins.str
-    """Reference to recorded media, at most 256 bytes."""
+    """Reference to recorded media, or words as a data URL ("data:,Good%20luck"), at most 256 bytes."""
     record_only: _builtins.bool
     """Only for the record: nobody in the room sees it."""
     about_seat: _builtins.int

@@ -82,7 +82,7 @@ class PlayServiceServicer(object):
     def Act(self, request, context):
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
         INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
-        (GAME_OVER, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
+        (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
         TOO_MANY_HINTS).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

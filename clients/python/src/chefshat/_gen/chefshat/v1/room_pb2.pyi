@@ -449,6 +449,7 @@ class RoomPolicy(_message.Message):
     VISIBILITY_FIELD_NUMBER: _builtins.int
     HINTS_FIELD_NUMBER: _builtins.int
     ABSENCE_TIME_MS_FIELD_NUMBER: _builtins.int
+    CHAT_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. A
     special action has the longest time of any seat that participants can take, for every holder of
@@ -527,6 +528,11 @@ class RoomPolicy(_message.Message):
     of the server, see ServerRestarted. Unset in games of earlier servers: the decision time and
     the bank run on while a seat is away, and max_timeouts alone decides when it is substituted.
     """
+    chat: _builtins.bool
+    """Whether people may write to everybody at the table: an Expression with the label "say" and the
+    words as a data URL in `media`, as robots speak. By default not: then expressions of people
+    with words are refused (CHAT_OFF).
+    """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
         """Other times for some kinds of participants, each kind at most once. People have the default
@@ -555,10 +561,11 @@ class RoomPolicy(_message.Message):
         visibility: Global___Visibility.ValueType = ...,
         hints: _builtins.bool = ...,
         absence_time_ms: _builtins.int | None = ...,
+        chat: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "hints", b"hints", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "visibility", b"visibility", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms", "_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "absence_time_ms", b"absence_time_ms", "bank_ms", b"bank_ms", "chat", b"chat", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "hints", b"hints", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "one_seat_per_client", b"one_seat_per_client", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "visibility", b"visibility", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__absence_time_ms: _TypeAlias = _typing.Literal["absence_time_ms"]  # noqa: Y015
     _WhichOneofArgType__absence_time_ms: _TypeAlias = _typing.Literal["_absence_time_ms", b"_absence_time_ms"]  # noqa: Y015
