@@ -14,7 +14,7 @@ import { GetLeaderboardResponseSchema } from "../src/gen/chefshat/v1/tournament_
 import { MAX_LINES } from "../src/people/games";
 import { PersonPage } from "../src/people/PersonPage";
 import { Result } from "../src/table/view/Result";
-import { root } from "./mounted";
+import { root, settle } from "./mounted";
 import { stateOf } from "./table-state";
 
 const NAME = '<b>Dr. "Rösa"/II</b> & ?#%';
@@ -59,8 +59,6 @@ async function show(records: ReturnType<typeof record>[], rated: Rated[]) {
   return list;
 }
 
-/** Lets the page process all responses, which are there already. */
-const settle = () => act(() => new Promise<void>((resolve) => setTimeout(resolve)));
 const rows = () => [...root.querySelectorAll("tbody tr")];
 const facts = () =>
   [...root.querySelectorAll("dl > div")].map((fact) => [...fact.querySelectorAll("dt, b, dd > span")].map(text));
