@@ -73,7 +73,7 @@ export function routeOf(path: string): Route {
     case "studies":
       return second === "new" ? { page: "newStudy" } : { page: "ownStudy", studyId: second };
     case "people":
-      return { page: "person", name: second };
+      return { page: "person", name: second === ". " || second === ".. " ? second.trim() : second };
     default:
       return { page: "unknown" };
   }
@@ -101,7 +101,8 @@ export function pathOf(route: Route): string {
     case "results":
       return `/tournaments/${encodeURIComponent(route.tournamentId)}/results`;
     case "person":
-      return `/people/${encodeURIComponent(route.name)}`;
+      // Browsers resolve the parts "." and "..", however they are encoded. Names never end with a space.
+      return `/people/${encodeURIComponent(route.name)}${/^\.{1,2}$/.test(route.name) ? "%20" : ""}`;
     case "study":
       return `/study/${encodeURIComponent(route.link)}`;
     case "newStudy":

@@ -7,6 +7,9 @@ import { startLanguage } from "../src/i18n";
 
 export let root: HTMLElement;
 
+/** Lets the page process the responses that fakes have given. */
+export const settle = () => act(() => new Promise<void>((resolve) => setTimeout(resolve)));
+
 beforeEach(async () => {
   await startLanguage();
   root = document.createElement("div");

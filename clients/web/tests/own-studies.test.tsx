@@ -3,6 +3,7 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { create } from "@bufbuild/protobuf";
+import { Code } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
@@ -19,20 +20,25 @@ import {
   AddStudyParticipantsResponseSchema,
   CreateStudyResponseSchema,
   DeleteStudyParticipantResponseSchema,
+  DeleteStudyResponseSchema,
   ExportStudyResponseSchema,
+  ListStudiesResponseSchema,
   ListStudyLinksResponseSchema,
   RemoveStudyParticipantResponseSchema,
 } from "../src/gen/chefshat/v1/study_service_pb";
 import { startLanguage } from "../src/i18n";
 import { zipped } from "../src/parts/zip";
+import { navigate, route } from "../src/router";
 import { forgetAll } from "../src/store";
 import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
+import { StudiesPage } from "../src/studies/StudiesPage";
 import { settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, settingsOf } from "../src/studies/study-form";
-import { root } from "./mounted";
+import { root, settle } from "./mounted";
+import { refused } from "./study-fake";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TOKEN = "ab".repeat(48);
@@ -58,7 +64,10 @@ const participants = [
 ];
 const button = (words: string) =>
   [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
-const press = (words: string) => act(async () => button(words)?.click());
+const press = async (words: string) => {
+  await act(() => button(words)?.click());
+  await settle();
+};
 
 test("the form makes the settings of a study, and says what is missing", async () => {
   const form = emptyForm("en");
@@ -209,6 +218,63 @@ test("the page shows progress, adds participants, shows links, and asks before i
   await press("Remove…");
   await press("Remove now");
   expect(remove.mock.calls[0]?.[0]).toMatchObject({ number: 2, replace: false });
+});
+
+const OTHER = "0123456789abcdef0123456789abcdef";
+const OTHER_TOKEN = "cd".repeat(48);
+
+test("a study is deleted after a confirmation, and this device forgets its key", async () => {
+  keepOwnerToken(ID, TOKEN);
+  keepOwnerToken(OTHER, OTHER_TOKEN);
+  navigate({ page: "ownStudy", studyId: ID });
+  const erase = vi.spyOn(studyApi, "deleteStudy").mockResolvedValue(create(DeleteStudyResponseSchema));
+  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await press("Delete the study…");
+  expect(root.querySelector('[data-part="question"]')?.textContent).toMatch(/cannot be restored/);
+  await press("Cancel");
+  expect(erase).not.toHaveBeenCalled();
+  await press("Delete the study…");
+  await press("Delete everything now");
+  expect(erase.mock.calls.map(([request]) => request)).toEqual([{ studyId: ID, ownerToken: TOKEN, force: false }]);
+  expect([ownerTokenOf(ID), ownerTokenOf(OTHER)]).toEqual([null, OTHER_TOKEN]);
+  expect(route.value).toEqual({ page: "studies" });
+
+  const list = vi.spyOn(studyApi, "listStudies").mockResolvedValue(create(ListStudiesResponseSchema));
+  await act(() => render(<StudiesPage />, root));
+  expect(list.mock.calls[0]?.[0]).toEqual({ ownerTokens: [OTHER_TOKEN] });
+});
+
+test("participants in the middle of a study are removed only after the server has refused", async () => {
+  keepOwnerToken(ID, TOKEN);
+  navigate({ page: "ownStudy", studyId: ID });
+  const erase = vi.spyOn(studyApi, "deleteStudy").mockImplementation(async ({ force }) => {
+    if (!force) throw refused("STUDY_RUNNING");
+    return create(DeleteStudyResponseSchema);
+  });
+  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  expect(button("Remove the participants and delete…")).toBeUndefined();
+  await press("Delete the study…");
+  await press("Delete everything now");
+  expect(root.querySelector('[role="alert"]')?.textContent).toContain("in the middle of this study");
+  expect([ownerTokenOf(ID), route.value.page]).toEqual([TOKEN, "ownStudy"]);
+  await press("Remove the participants and delete…");
+  expect([...root.querySelectorAll('[data-part="question"]')].at(-1)?.textContent).toMatch(
+    /removed.*cannot be restored/,
+  );
+  await press("Remove them and delete everything now");
+  expect(erase.mock.calls.map(([{ force }]) => force)).toEqual([false, true]);
+  expect([ownerTokenOf(ID), route.value.page]).toEqual([null, "studies"]);
+});
+
+test("a study that cannot be deleted stays, and says why", async () => {
+  keepOwnerToken(ID, TOKEN);
+  vi.spyOn(studyApi, "deleteStudy").mockRejectedValue(refused("STORE_FAILED", Code.Unavailable));
+  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await press("Delete the study…");
+  await press("Delete everything now");
+  expect(root.querySelector('[role="alert"]')).not.toBeNull();
+  expect(button("Remove the participants and delete…")).toBeUndefined();
+  expect(ownerTokenOf(ID)).toBe(TOKEN);
 });
 
 test("the data are one ZIP with the files of the server", async () => {

@@ -22,6 +22,10 @@ const ROUTES: [string, Route][] = [
   ["/studies/0123", { page: "ownStudy", studyId: "0123" }],
   ["/leaderboard", { page: "leaderboard" }],
   ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II" }],
+  ["/people/%3F%23%25%20%22%3Cb%3E", { page: "person", name: '?#% "<b>' }],
+  ["/people/.%20", { page: "person", name: "." }],
+  ["/people/..%20", { page: "person", name: ".." }],
+  ["/people/...", { page: "person", name: "..." }],
   ["/tutorial", { page: "tutorial" }],
   ["/rules", { page: "rules" }],
 ];
@@ -29,6 +33,7 @@ const ROUTES: [string, Route][] = [
 test.each(ROUTES)("%s is parsed and formatted", (path, route) => {
   expect(routeOf(path)).toEqual(route);
   expect(pathOf(route)).toBe(path);
+  expect(new URL(path, location.origin).pathname).toBe(path);
 });
 
 test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s is unknown", (path) => {

@@ -12,8 +12,8 @@ import { ButtonLink } from "../parts/Button";
 import { SelectField } from "../parts/Field";
 import { KindBadge } from "../parts/KindBadge";
 import { Notice } from "../parts/Notice";
-import { PersonName } from "../tournaments/PersonName";
 import css from "./People.module.css";
+import { PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 

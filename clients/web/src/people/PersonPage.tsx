@@ -1,7 +1,8 @@
 // A participant: rating, totals, and games with links to their replays.
 
+import type { ComponentChildren } from "preact";
 import { wordsOf } from "../api/faults";
-import { type Beginning, countWords, useShown } from "../api/pages";
+import { useShown } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { PageProps } from "../app";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
@@ -12,9 +13,9 @@ import { KindBadge } from "../parts/KindBadge";
 import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
-import { PersonName } from "../tournaments/PersonName";
-import { gamesOf, type OwnGame, ratedAs, sum, unratedBecause } from "./games";
+import { gamesOf, MAX_LINES, type OwnGame, type Ratings, ratedAs, sum, unratedBecause } from "./games";
 import css from "./People.module.css";
+import { PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 
@@ -31,8 +32,8 @@ export function PersonPage({ route }: PageProps<"person">) {
   const rated = usePolled((signal) => ratedAs(name, signal), EVERY_MS, name);
   const { list } = shown;
   const fault = shown.fault ?? rated.fault;
-  const last = list?.items[0];
-  const self = last?.record.seats[last.seat];
+  const games = list?.items ?? [];
+  const self = games[0]?.record.seats[games[0].seat];
   return (
     <div class={css.people}>
       <header class={css.personHead}>
@@ -41,14 +42,14 @@ export function PersonPage({ route }: PageProps<"person">) {
       </header>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       {!list && !fault && <p class="soft">{t().common.loading}</p>}
-      {list?.items.length === 0 && <p class="sheet">{words.none}</p>}
-      {list && list.items.length > 0 && (
+      <Facts rated={rated.value} games={games} />
+      {list && games.length === 0 && <p class="sheet">{words.none}</p>}
+      {games.length > 0 && (
         <>
-          <Facts rated={rated.value} games={list} />
           <section class="sheet stack">
             <h2>{words.played}</h2>
             <WhichAreRated />
-            <Games games={list.items} />
+            <Games games={games} />
             <MoreButton shown={shown} what={words.played} />
           </section>
           {self?.builtInAgent === "" && <p class="soft small">{words.sameName}</p>}
@@ -61,40 +62,54 @@ export function PersonPage({ route }: PageProps<"person">) {
   );
 }
 
-/** The rating, and the totals of the known games. */
-function Facts({ rated, games }: { rated: readonly Rated[] | null; games: Beginning<OwnGame> }) {
+/** The ratings, and the totals of the games shown. */
+function Facts({ rated, games }: { rated: Ratings | null; games: readonly OwnGame[] }) {
   const words = t().people.person;
-  const all = sum(games.items);
-  const of = games.more ? words.ofNewest(games.items.length) : "";
+  const { games: finished, wins, meanPlace } = sum(games);
+  const lines = rated?.lines ?? [];
+  if (lines.length === 0 && games.length === 0) return null;
   return (
     <dl class={css.personFacts}>
-      {rated?.map((line) => (
+      {lines.map((line) => (
         <Rating key={`${line.kind} ${line.builtIn}`} line={line} />
       ))}
-      {rated?.length === 0 && <Fact label={words.rating} value="–" text={words.unrated} wide />}
-      <Fact label={words.games} value={countWords(all.games, games.more)} />
-      <Fact label={words.wins} value={String(all.wins)} text={of} />
-      {all.games > 0 && <Fact label={words.meanPlace} value={decimal(all.meanPlace, 2)} text={of} />}
+      {rated && lines.length === 0 && (
+        <Fact label={words.rating} value="–" text={rated.complete ? words.unrated : words.notListed(MAX_LINES)} wide />
+      )}
+      {games.length > 0 && <Fact label={words.games} value={String(finished)} text={words.ofShown(games.length)} />}
+      {finished > 0 && (
+        <>
+          <Fact label={words.wins} value={String(wins)} text={words.ofThese(finished)} />
+          <Fact label={words.meanPlace} value={decimal(meanPlace, 2)} text={words.ofThese(finished)} />
+        </>
+      )}
     </dl>
   );
 }
 
+/** A line of the leaderboard. Its kind is shown, because a name can have several. */
 function Rating({ line }: { line: Rated }) {
-  const words = t().people.person;
+  const words = t().people;
   if (!line.rating) return null;
   const { from, to } = ratingRange(line.rating);
-  const text = `${words.rated(line.place)}. ${words.ratingRange(decimal(from, 1), decimal(to, 1))}`;
-  return <Fact label={words.rating} value={ratingWords(line.rating)} text={text} wide />;
+  const place = `${words.person.rated(line.place)}, ${words.ratedGames(line.rating.games)}.`;
+  const label = (
+    <>
+      {words.person.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
+    </>
+  );
+  const range = words.person.ratingRange(decimal(from, 1), decimal(to, 1));
+  return <Fact label={label} value={ratingWords(line.rating)} text={`${place} ${range}`} wide />;
 }
 
-function Fact(props: { label: string; value: string; text?: string; wide?: boolean }) {
-  const { label, value, text = "", wide = false } = props;
+function Fact(props: { label: ComponentChildren; value: string; text: string; wide?: boolean }) {
+  const { label, value, text, wide = false } = props;
   return (
     <div class={`sheet ${wide ? css.personFactWide : ""}`}>
       <dt class="soft">{label}</dt>
       <dd>
         <b class="number">{value}</b>
-        {text && <span class="soft small">{text}</span>}
+        <span class="soft small">{text}</span>
       </dd>
     </div>
   );
@@ -115,13 +130,8 @@ function Games({ games }: { games: readonly OwnGame[] }) {
         <tr>
           <th scope="col">{words.columns.date}</th>
           <th scope="col">{words.columns.place}</th>
-          <th scope="col" class={css.leaderboardMinor}>
-            {words.columns.points}
-          </th>
-          <th scope="col" class={`${css.leaderboardMinor} ${css.personOthers}`}>
-            {words.columns.others}
-          </th>
-          <th scope="col" class={css.personOthers}>
+          <th scope="col">{words.columns.points}</th>
+          <th scope="col" class={css.personGame}>
             {words.columns.game}
           </th>
         </tr>
@@ -133,16 +143,8 @@ function Games({ games }: { games: readonly OwnGame[] }) {
             <tr key={record.gameId}>
               <td class="number">{date}</td>
               <td>{place === undefined ? <span class="soft">{words.aborted}</span> : t().common.place(place)}</td>
-              <td class={`number ${css.leaderboardMinor}`}>{points ?? "–"}</td>
-              <td class={`${css.leaderboardMinor} ${css.personOthers}`}>
-                {others.map((other, index) => (
-                  <span key={other.seat}>
-                    {index > 0 && ", "}
-                    <PersonName name={nameOf(other)} />
-                  </span>
-                ))}
-              </td>
-              <td class={css.personOthers}>
+              <td class="number">{points ?? "–"}</td>
+              <td class={css.personGame}>
                 <a href={pathOf({ page: "replay", gameId: record.gameId })}>
                   {words.replay}
                   <span class="visually-hidden"> {words.of(record.roomName, date)}</span>
@@ -151,6 +153,15 @@ function Games({ games }: { games: readonly OwnGame[] }) {
                   {record.roomName}
                   <NotRated record={record} />
                 </span>
+                <p class="small">
+                  {words.against}{" "}
+                  {others.map((other, index) => (
+                    <span key={other.seat}>
+                      {index > 0 && ", "}
+                      <PersonName name={nameOf(other)} builtIn={other.builtInAgent} />
+                    </span>
+                  ))}
+                </p>
               </td>
             </tr>
           );

@@ -6,8 +6,8 @@ import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import { GameOrigin, type Participant, RoomState } from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 
-/** Lines of the leaderboard that are searched. */
-const MAX_LINES = 1000;
+/** Most lines of the leaderboard in a response. */
+export const MAX_LINES = 1000;
 
 /** A participant's result in a game. */
 export interface OwnGame {
@@ -17,6 +17,14 @@ export interface OwnGame {
   readonly place: number | undefined;
   readonly points: number | undefined;
   readonly others: readonly Participant[];
+}
+
+/** A participant's ratings. */
+export interface Ratings {
+  /** One per kind. */
+  readonly lines: readonly Rated[];
+  /** Whether the leaderboard was searched to its end. */
+  readonly complete: boolean;
 }
 
 /** The totals of a participant's games with a result. */
@@ -35,10 +43,10 @@ export function gamesOf(name: string): AskPage<OwnGame> {
   };
 }
 
-/** Requests a participant's lines of the leaderboard: one per kind. */
-export async function ratedAs(name: string, signal: AbortSignal): Promise<Rated[]> {
-  const board = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
-  return board.rated.filter((line) => line.name === name);
+/** Requests a participant's lines of the leaderboard. */
+export async function ratedAs(name: string, signal: AbortSignal): Promise<Ratings> {
+  const { rated } = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
+  return { lines: rated.filter((line) => line.name === name), complete: rated.length < MAX_LINES };
 }
 
 /** The result of a participant in a game; at its first seat if it has several. */

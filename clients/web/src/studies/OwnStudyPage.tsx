@@ -3,7 +3,7 @@
 
 import { type Signal, signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
-import { wordsOf } from "../api/faults";
+import { faultOf, wordsOf } from "../api/faults";
 import { type Following, follow } from "../api/follow";
 import type { PageProps } from "../app";
 import { LinkList } from "../experiment/LinkList";
@@ -19,6 +19,7 @@ import { download, fileName } from "../parts/download";
 import { Field, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { zipped } from "../parts/zip";
+import { navigate } from "../router";
 import { byCondition, STATES, stateName } from "./board";
 import { studyApi } from "./client";
 import css from "./Own.module.css";
@@ -27,6 +28,7 @@ import {
   addressOf,
   closeStudy,
   deleteDataOf,
+  deleteStudy,
   exportStudy,
   keepOwnerToken,
   linksOf,
@@ -140,7 +142,35 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
           {words.closeText}
         </ConfirmButton>
       )}
+      <Delete study={study} />
     </div>
+  );
+}
+
+/** Deletes the study; with the participants who are in the middle of it only after the server refused. */
+function Delete({ study }: { study: Study }) {
+  const words = t().studies.own.erase;
+  const [refused, setRefused] = useState(false);
+  const erase = async (force: boolean) => {
+    try {
+      await deleteStudy(study.studyId, force);
+    } catch (thrown) {
+      if (faultOf(thrown).reason === "STUDY_RUNNING") setRefused(true);
+      throw thrown;
+    }
+    navigate({ page: "studies" }, { replace: true });
+  };
+  return (
+    <>
+      <ConfirmButton label={words.button} confirm={words.confirm} act={() => erase(false)}>
+        {words.text}
+      </ConfirmButton>
+      {refused && (
+        <ConfirmButton label={words.force} confirm={words.forceConfirm} act={() => erase(true)}>
+          {words.forceText} {words.text}
+        </ConfirmButton>
+      )}
+    </>
   );
 }
 

@@ -63,6 +63,16 @@ export async function closeStudy(studyId: string): Promise<void> {
   await studyApi.closeStudy(ownership(studyId), call);
 }
 
+/**
+ * Deletes a study with all its data, and its owner token on this device. Refused with STUDY_RUNNING
+ * while participants are in the middle of it, unless `force` removes them.
+ */
+export async function deleteStudy(studyId: string, force: boolean): Promise<void> {
+  // No deadline: the server answers when all records are deleted.
+  await studyApi.deleteStudy({ ...ownership(studyId), force });
+  remember(STORED + studyId, null);
+}
+
 /** The data of a study as files, in the order of the server; `onFiles` is called with their number. */
 export async function exportStudy(
   studyId: string,

@@ -4,8 +4,8 @@
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
+import { PersonName } from "../people/PersonName";
 import css from "./Entrants.module.css";
-import { PersonName } from "./PersonName";
 import { joinedIn, nameOf } from "./structure";
 
 interface EntrantsProps {

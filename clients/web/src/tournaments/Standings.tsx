@@ -10,8 +10,8 @@ import {
 } from "../gen/chefshat/v1/tournament_pb";
 import { decimal, t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
+import { PersonName } from "../people/PersonName";
 import { ratingWords } from "../people/rating";
-import { PersonName } from "./PersonName";
 import css from "./Standings.module.css";
 import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./structure";
 

@@ -146,7 +146,7 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   "new study": { path: () => "/studies/new", ready: "main form" },
   "study of one's own": { path: () => `/studies/${studyId}`, ready: '[data-part~="participants"] tbody tr' },
   leaderboard: { path: () => "/leaderboard", ready: "tbody tr" },
-  "a person": { path: () => "/people/Gustav", ready: "h1" },
+  "a person": { path: () => "/people/Gustav", ready: "tbody tr" },
   tutorial: { path: () => "/tutorial", ready: '[data-part~="lesson"]' },
   "not found": { path: () => "/nowhere/at/all", ready: "h1" },
 };

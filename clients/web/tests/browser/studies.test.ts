@@ -83,3 +83,30 @@ test("a participant goes through all stages, on two devices, without meeting a c
   expect(archive).toContain("cond-");
   expect(researcher.faults).toEqual([]);
 });
+
+test("a researcher deletes a study with a participant in the middle of it, and its link and key are gone", async () => {
+  const { studyId, ownerToken } = await newStudy(server, { participants: 2 });
+  const { links } = await clientsOf(server).studies.addStudyParticipants({ studyId, ownerToken, count: 1 });
+  const participant = await person(browser);
+  await participant.page.goto(`${server.url}/study/${links[0]?.link}`);
+  await consent(participant.page);
+
+  const { page, faults } = await person(browser, { viewport: PHONE });
+  await page.goto(`${server.url}/studies/${studyId}`);
+  await page.getByLabel("Owner token").fill(ownerToken);
+  await page.getByRole("button", { name: "Use this key" }).click();
+  await page.getByRole("button", { name: "Delete the study…" }).press("Enter");
+  await page.getByRole("button", { name: "Delete everything now" }).press("Enter");
+  await page.getByText("Participants are in the middle of this study.").waitFor();
+  await page.getByRole("button", { name: "Remove the participants and delete…" }).press("Enter");
+  expect(await serious(page)).toEqual([]);
+  expect(await tooWide(page)).toEqual([]);
+  await page.getByRole("button", { name: "Remove them and delete everything now" }).press("Enter");
+  await page.getByText("This device has no studies.").waitFor();
+  expect(new URL(page.url()).pathname).toBe("/studies");
+  await page.goto(`${server.url}/studies/${studyId}`);
+  await page.getByText("This device has no key of this study.").waitFor();
+  await participant.page.goto(`${server.url}/study/${links[0]?.link}`);
+  await participant.page.getByRole("alert").waitFor();
+  expect(faults).toEqual([]);
+});

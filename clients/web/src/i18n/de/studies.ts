@@ -152,6 +152,14 @@ export const studies: Texts["studies"] = {
     closeDo: "Jetzt schließen",
     closeText: "Niemand kann mehr beginnen. Wer begonnen hat, kann zu Ende machen.",
     isClosed: "Die Studie ist geschlossen: Niemand kann mehr beginnen.",
+    erase: {
+      button: "Studie löschen…",
+      confirm: "Jetzt alles löschen",
+      text: "Einstellungen, Teilnehmer, Einwilligungen, Antworten, Bedienungsdaten und Partien mit ihren Aufzeichnungen werden gelöscht und können nicht wiederhergestellt werden. Die Links gelten nicht mehr. Lade die Daten vorher herunter.",
+      force: "Teilnehmer entfernen und löschen…",
+      forceConfirm: "Jetzt entfernen und alles löschen",
+      forceText: "Teilnehmer, die mitten in der Studie sind, werden entfernt und ihre Partien geschlossen.",
+    },
     seeds: "SHA-256 der Seeds der Partien, für eine Präregistrierung",
   },
   make: {

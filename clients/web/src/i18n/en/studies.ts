@@ -148,6 +148,14 @@ export const studies = {
     closeDo: "Close it now",
     closeText: "Nobody can begin any more. Those who have begun can finish.",
     isClosed: "The study is closed: nobody can begin any more.",
+    erase: {
+      button: "Delete the study…",
+      confirm: "Delete everything now",
+      text: "Settings, participants, consent, answers, traces and games with their records are deleted and cannot be restored. The links stop working. Download the data first.",
+      force: "Remove the participants and delete…",
+      forceConfirm: "Remove them and delete everything now",
+      forceText: "Participants who are in the middle of the study are removed, and their games are closed.",
+    },
     seeds: "SHA-256 of the game seeds, for a preregistration",
   },
   make: {

@@ -149,6 +149,14 @@ export const studies: Texts["studies"] = {
     closeDo: "Cerrarlo ahora",
     closeText: "Ya no puede empezar nadie. Quienes han empezado pueden terminar.",
     isClosed: "El estudio está cerrado: ya no puede empezar nadie.",
+    erase: {
+      button: "Borrar el estudio…",
+      confirm: "Borrar todo ahora",
+      text: "Se borran la configuración, los participantes, los consentimientos, las respuestas, las trazas y las partidas con sus registros, y no se pueden recuperar. Los enlaces dejan de funcionar. Descarga antes los datos.",
+      force: "Quitar a los participantes y borrar…",
+      forceConfirm: "Quitarlos y borrar todo ahora",
+      forceText: "Se quita a los participantes que están en mitad del estudio y se cierran sus partidas.",
+    },
     seeds: "SHA-256 de las semillas de las partidas, para un prerregistro",
   },
   make: {

@@ -149,6 +149,14 @@ export const studies: Texts["studies"] = {
     closeDo: "Chiudilo ora",
     closeText: "Nessuno potrà più iniziare. Chi ha iniziato può finire.",
     isClosed: "Lo studio è chiuso: nessuno può più iniziare.",
+    erase: {
+      button: "Cancella lo studio…",
+      confirm: "Cancella tutto ora",
+      text: "Impostazioni, partecipanti, consensi, risposte, tracce e partite con le loro registrazioni vengono cancellati senza possibilità di recupero. I link non funzionano più. Scarica prima i dati.",
+      force: "Rimuovi i partecipanti e cancella…",
+      forceConfirm: "Rimuovili e cancella tutto ora",
+      forceText: "I partecipanti che sono a metà dello studio vengono rimossi e le loro partite chiuse.",
+    },
     seeds: "SHA-256 dei semi delle partite, per una preregistrazione",
   },
   make: {

@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { t } from "../../i18n";
 import { ButtonLink } from "../../parts/Button";
 import { SeatNumber } from "../../parts/SeatNumber";
+import { PersonName } from "../../people/PersonName";
 import type { ShiftResult, TableState } from "../model/state";
 import { nameOf } from "../words";
 import css from "./Result.module.css";
@@ -11,7 +12,10 @@ import css from "./Result.module.css";
 interface ResultProps {
   table: TableState;
   own: number | undefined;
-  /** Whether to show links after the game; not in a replay. */
+  /**
+   * Whether to show links after the game; not in a replay, where the names of the players lead to
+   * their pages instead.
+   */
   links?: boolean;
   /** The next step, before all links. */
   onward?: ComponentChildren;
@@ -23,7 +27,7 @@ interface ResultProps {
  */
 export function Result({ table, own, links = true, onward }: ResultProps) {
   const ways = links && <Ways table={table} onward={onward} />;
-  if (table.phase === "gameOver") return <GameResult table={table} own={own} ways={ways} />;
+  if (table.phase === "gameOver") return <GameResult table={table} own={own} profiles={!links} ways={ways} />;
   if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
   if (table.result && table.phase !== "pizza") {
     return <ShiftTable table={table} result={table.result} />;
@@ -85,7 +89,7 @@ interface EndProps {
   ways: ComponentChildren;
 }
 
-function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
+function GameResult({ table, own, profiles, ways }: EndProps & { own: number | undefined; profiles: boolean }) {
   const words = t().table.result;
   const winner = table.standings[0]?.seat;
   return (
@@ -101,7 +105,7 @@ function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
         </thead>
         <tbody>
           {table.standings.map(({ seat, place, points }) => (
-            <Row key={seat} table={table} seat={seat} place={place}>
+            <Row key={seat} table={table} seat={seat} place={place} profile={profiles}>
               <td class="number">{points}</td>
             </Row>
           ))}
@@ -128,15 +132,18 @@ interface RowProps {
   table: TableState;
   seat: number;
   place: number;
+  profile?: boolean;
   children: ComponentChildren;
 }
 
-function Row({ table, seat, place, children }: RowProps) {
+function Row({ table, seat, place, profile = false, children }: RowProps) {
+  const name = nameOf(table, seat);
   return (
     <tr>
       <td>{t().common.place(place)}</td>
       <th scope="row">
-        <SeatNumber seat={seat} /> {nameOf(table, seat)}
+        <SeatNumber seat={seat} />{" "}
+        {profile ? <PersonName name={name} builtIn={table.seats[seat]?.builtIn ?? ""} /> : name}
       </th>
       {children}
     </tr>

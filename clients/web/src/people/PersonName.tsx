@@ -7,7 +7,7 @@ interface PersonNameProps {
   name: string;
   /**
    * Name of the built-in agent: its games are listed under this name, whatever it is called in the
-   * tournament.
+   * game or tournament.
    */
   builtIn?: string;
   /** Not in the wall view, where nobody can follow a link. */
