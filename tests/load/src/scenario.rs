@@ -13,7 +13,7 @@ use crate::server::{Kind, Launcher};
 use crate::tally::{Counts, Traffic};
 
 /// Decisions after which a window closes with --smoke.
-const SMOKE_DECISIONS: u64 = 1_000;
+const SMOKE_DECISIONS: u64 = 100;
 /// Rooms in the durability scenario without `--rooms`.
 const DURABLE_ROOMS: usize = 64;
 /// Rooms of the scenarios of `--scale`: 4, 64, 400, 1,000 and 4,000 connections.
