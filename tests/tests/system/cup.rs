@@ -290,17 +290,29 @@ async fn a_tournament_of_sixteen_resumes_after_sigkill_and_counts_every_game_onc
     for game in &games {
         assert_eq!(game.state(), v1::TournamentGameState::Counted, "{game:?}");
     }
-    // There are no other records of the tournament.
-    let mut kept = BTreeSet::new();
-    for entry in std::fs::read_dir(folder.path().join("records")).expect("a folder of records") {
-        let path = entry.expect("an entry").path();
-        let lines = chefshat_record::jsonl::read(&path).expect("a record");
-        if let Some(Line::Header(header)) = &lines[0].line
-            && header.tournament_id == id
-        {
-            kept.insert(header.game_id.clone());
+    // There are no other records of the tournament. A record may still be being written.
+    let records = folder.path().join("records");
+    let kept = || {
+        let entries = std::fs::read_dir(&records).expect("a folder of records");
+        let paths = entries.map(|entry| entry.expect("an entry").path());
+        let mut kept = BTreeSet::new();
+        for path in paths.filter(|path| path.extension().is_some_and(|it| it == "jsonl")) {
+            let lines = chefshat_record::jsonl::read(&path).expect("a record");
+            if let Some(Line::Header(header)) = &lines[0].line
+                && header.tournament_id == id
+            {
+                kept.insert(header.game_id.clone());
+            }
         }
-    }
+        kept
+    };
+    let written = async {
+        while kept().len() < different.len() {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    patiently("all records", written).await;
+    let kept = kept();
     assert_eq!(kept.iter().collect::<BTreeSet<_>>(), different);
 
     let results = client.tournament_results(&id).await.expect("results");
