@@ -137,7 +137,7 @@ async fn a_person_who_plays_as_a_robot_is_one_until_the_record() {
         _ => None,
     });
     let sources: Vec<_> = sources.map(|expression| expression.source()).collect();
-    assert_eq!(sources, [ExpressionSource::Wizard; 2]);
+    assert_eq!(sources, [ExpressionSource::Wizard; 3]);
     let outcome = outcome::outcome(&record).expect("a finished game");
     assert_eq!(outcome.unrated, Some(outcome::Unrated::Wizard));
     let rated = client.leaderboard(v1::GetLeaderboardRequest::default());
