@@ -191,7 +191,8 @@ pub(super) async fn run(
         let forgets = |(order, _): &Pending| {
             matches!(
                 order,
-                WriteCommand::Rewrite(_)
+                WriteCommand::Delete { .. }
+                    | WriteCommand::Rewrite(_)
                     | WriteCommand::StudyRewritten { .. }
                     | WriteCommand::StudyDeleted(_)
             )
