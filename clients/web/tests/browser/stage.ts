@@ -12,6 +12,9 @@ import { PATIENCE_MS } from "./patience";
 const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
 FLAGS.push("--disable-background-networking", "--disable-component-update", "--disable-sync");
+// Proxies of the tests have certificates of an authority that Chromium does not know. The option of
+// a context would not apply to service workers.
+FLAGS.push("--ignore-certificate-errors");
 
 /** How many times slower than this machine the pages run: no test may depend on their speed. */
 const SLOWDOWN = Number(process.env.CHEFSHAT_SLOWDOWN ?? 1);
@@ -114,7 +117,6 @@ export async function person(
   const context = await browser.newContext({
     locale: "en-GB",
     viewport: { width: 1280, height: 800 },
-    ignoreHTTPSErrors: true,
     ...options,
   });
   context.setDefaultTimeout(PATIENCE_MS);
