@@ -29,7 +29,7 @@ use tracing::{info, warn};
 
 use crate::access::{Access, TokenFileError};
 use crate::cluster::{
-    CONNECTION_WINDOW, ClusterNode, Directory, MAX_RESET_STREAMS, NodeLease, PING_INTERVAL,
+    CONNECTION_WINDOW, ClusterNode, Directory, Hosted, MAX_RESET_STREAMS, NodeLease, PING_INTERVAL,
     PING_TIMEOUT, PeerPort, STREAM_WINDOW, SingleServer, StoreDirectory,
 };
 use crate::config::{
@@ -173,8 +173,11 @@ impl Server {
             info,
             grace,
             store,
-            Arc::clone(&server.rooms),
-            (Arc::clone(&server.tournaments), Arc::clone(&server.studies)),
+            Hosted {
+                rooms: Arc::clone(&server.rooms),
+                tournaments: Arc::clone(&server.tournaments),
+                studies: Arc::clone(&server.studies),
+            },
         ));
         Ok(server)
     }

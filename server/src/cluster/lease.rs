@@ -1,15 +1,19 @@
-//! What the rooms and tournaments of a node share with its task: until when they may publish, and
+//! What the rooms, tournaments and studies of a node share with its task: until when they may publish, and
 //! which of them are new or have stopped by themselves.
 
 use std::collections::BTreeSet;
+use std::future::Future;
 use std::sync::{Mutex, MutexGuard};
 
 use chefshat_cluster::NodeId;
 use chefshat_room::ids::Id;
 use tokio::sync::{Notify, watch};
 use tokio::time::{Instant, sleep_until};
+use tokio_util::sync::CancellationToken;
 
-/// The lease of a node, as its rooms and tournaments see it.
+use crate::store::StoreError;
+
+/// The lease of a node, as its rooms, tournaments and studies see it.
 ///
 /// It is checked before anything is published, on the clock and not by a message from the task: a
 /// process that was stopped for a while must not publish before that task runs again.
@@ -72,6 +76,29 @@ impl NodeLease {
         let mut until = self.until.subscribe();
         let held = until.wait_for(|until| Instant::now() < *until).await;
         held.expect("the sender is borrowed");
+    }
+
+    /// The result of a write for a tournament or study, once the node may publish it. Its task must
+    /// stop, which cancels `end`, if another node may have it.
+    ///
+    /// # Errors
+    /// The write failed, or the task stops.
+    pub async fn published<T>(
+        &self,
+        unit: Id,
+        end: &CancellationToken,
+        written: impl Future<Output = Result<T, StoreError>>,
+    ) -> Result<T, StoreError> {
+        let written = async {
+            let written = written.await?;
+            self.held().await;
+            Ok(written)
+        };
+        tokio::select! {
+            biased;
+            written = written => written,
+            () = end.cancelled() => Err(StoreError::Fenced(unit)),
+        }
     }
 
     /// Sets until when the node may publish.

@@ -22,3 +22,4 @@ pub use peers::{
     CONNECTION_WINDOW, MAX_RESET_STREAMS, PEER_NAME, PING_INTERVAL, PING_TIMEOUT, PeerPort,
     PeerPortError, Peers, STREAM_WINDOW,
 };
+pub use units::Hosted;

@@ -16,12 +16,9 @@ use tracing::{error, info, warn};
 
 use super::lease::{News, NodeLease};
 use super::turns::Turns;
-use super::units::{Resumed, Units};
-use crate::rooms::Rooms;
+use super::units::{Hosted, Resumed, Units};
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
-use crate::studies::Studies;
-use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
 /// How long an answer of the database is awaited, except to a beat. After that, the next beat says
@@ -58,16 +55,15 @@ impl ClusterNode {
         info: NodeInfo,
         grace: Duration,
         store: Arc<dyn ClusterStore>,
-        rooms: Arc<Rooms>,
-        (tournaments, studies): (Arc<Tournaments>, Arc<Studies>),
+        hosted: Hosted,
     ) -> Self {
         let drain = CancellationToken::new();
         let (asked, is_asked_to_drain) = watch::channel(false);
         let (publishes, may_publish) = watch::channel(false);
-        let lease = rooms.lease().expect("the rooms of a node have a lease");
-        let lease = Arc::clone(lease);
+        let lease = hosted.rooms.lease();
+        let lease = Arc::clone(lease.expect("the rooms of a node have a lease"));
         lease.joined(id);
-        let units = Units::new(Arc::clone(&store), rooms, (tournaments, studies), grace);
+        let units = Units::new(Arc::clone(&store), hosted, grace);
         let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
             node: Node::new(id, store.lease(), capacity),

@@ -29,6 +29,17 @@ pub(super) enum Resumed {
     Impossible,
 }
 
+/// What a server hosts.
+#[derive(Debug)]
+pub struct Hosted {
+    /// The rooms, those of games of tournaments and studies as well.
+    pub rooms: Arc<Rooms>,
+    /// The tournaments.
+    pub tournaments: Arc<Tournaments>,
+    /// The studies.
+    pub studies: Arc<Studies>,
+}
+
 /// The units of a node. What is done with one unit is done one after another, by the caller.
 pub(super) struct Units {
     store: Arc<dyn ClusterStore>,
@@ -43,12 +54,12 @@ pub(super) struct Units {
 }
 
 impl Units {
-    pub(super) fn new(
-        store: Arc<dyn ClusterStore>,
-        rooms: Arc<Rooms>,
-        (tournaments, studies): (Arc<Tournaments>, Arc<Studies>),
-        grace: Duration,
-    ) -> Self {
+    pub(super) fn new(store: Arc<dyn ClusterStore>, hosted: Hosted, grace: Duration) -> Self {
+        let Hosted {
+            rooms,
+            tournaments,
+            studies,
+        } = hosted;
         Self {
             grace,
             store,
@@ -82,13 +93,16 @@ impl Units {
         (self.wanted.lock()).expect("nothing panics under this lock")
     }
 
+    /// Whether a unit runs here, or is being created.
+    fn runs(&self, unit: Id) -> bool {
+        self.rooms.runs(unit) || self.tournaments.runs(unit) || self.studies.runs(unit)
+    }
+
     /// Whether something of a unit is here: it runs, is being created, or is over.
     pub(super) fn has(&self, unit: Id) -> bool {
-        self.rooms.runs(unit)
+        self.runs(unit)
             || self.rooms.is_over(unit) == Some(true)
-            || self.tournaments.runs(unit)
             || self.tournaments.get(unit).is_some()
-            || self.studies.runs(unit)
     }
 
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
@@ -96,9 +110,7 @@ impl Units {
     pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> Resumed {
         // It was created here, and its node learns of it from its beat.
         let is_new = epoch == Epoch::FIRST;
-        let runs =
-            || self.rooms.runs(unit) || self.tournaments.runs(unit) || self.studies.runs(unit);
-        if is_new && runs() {
+        if is_new && self.runs(unit) {
             return Resumed::Runs;
         }
         self.stop(unit).await;

@@ -19,7 +19,7 @@ use super::pages;
 use crate::cluster::Peer;
 
 /// How long another node may take to list what it has. Without its answer, that is left out.
-pub(super) const PEER_TIMEOUT: Duration = Duration::from_secs(2);
+const PEER_TIMEOUT: Duration = Duration::from_secs(2);
 /// The metadata of another node's answer with the numbers of what it lists.
 const NUMBERS: &str = "chefshat-numbers";
 

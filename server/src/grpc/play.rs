@@ -289,7 +289,6 @@ pub(super) fn with_heartbeats(
 
 #[cfg(test)]
 mod tests {
-
     use tokio_util::task::TaskTracker;
 
     use super::*;

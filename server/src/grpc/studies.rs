@@ -13,7 +13,6 @@ use chefshat_proto::v1::{
 use chefshat_record::convert::FieldProblem;
 use chefshat_study::{Refusal as StudyRefusal, SettingsProblem};
 use futures::Stream;
-use futures::future::join_all;
 use prost::Message as _;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until, timeout};
@@ -24,7 +23,7 @@ use tonic::{Code, Request, Response, Status};
 use super::follow::{end, send};
 use super::forward::Gateway;
 use super::limits::charged;
-use super::lists::PEER_TIMEOUT;
+use super::lists;
 use super::reach::Reach;
 use super::status::{
     Refusal, disk_nearly_full, field, read_failed, request_id, request_id_used, shutting_down,
@@ -172,7 +171,13 @@ impl StudyService for StudyCalls {
             .filter(|handle| is_operator || tokens.iter().any(|token| handle.is_owner(token)));
         let mut studies: Vec<v1::Study> = studies.map(|handle| handle.describe()).collect();
         if let Some(gateway) = gateway {
-            studies.extend(of_others(&gateway, &request).await);
+            let ask = |channel| {
+                let (mut service, request) = (StudyServiceClient::new(channel), request.clone());
+                let request = gateway.request(request);
+                async move { service.list_studies(request).await }
+            };
+            let others = lists::of_others(&gateway, ask).await;
+            studies.extend(others.flat_map(|listed| listed.studies));
             studies.sort_by_key(|study| std::cmp::Reverse(study.created_at_ms));
             // A study that just changes hands may be listed twice.
             let mut seen = BTreeSet::new();
@@ -370,23 +375,6 @@ impl StudyService for StudyCalls {
             games: convert::number(games),
         }))
     }
-}
-
-/// The studies that the other nodes list. Those of a node that does not answer are left out.
-async fn of_others(gateway: &Gateway, request: &v1::ListStudiesRequest) -> Vec<v1::Study> {
-    let (_, peers) = gateway.directory().nodes().await;
-    let asked = peers.iter().map(|peer| async move {
-        let mut service = StudyServiceClient::new(gateway.peers().channel(peer));
-        let listing = service.list_studies(gateway.request(request.clone()));
-        match timeout(PEER_TIMEOUT, listing).await {
-            Ok(Ok(listed)) => listed.into_inner().studies,
-            _ => {
-                tracing::debug!(peer = %peer.node, "a node did not list its studies");
-                Vec::new()
-            }
-        }
-    });
-    join_all(asked).await.concat()
 }
 
 /// Sends a study and then what changes of it, until it is over.

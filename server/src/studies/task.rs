@@ -145,25 +145,15 @@ impl Task {
         }
     }
 
-    /// The result of a write, once this server may publish it. The study must stop if another node may
-    /// have it.
+    /// The result of a write, once this server may publish it.
     async fn published<T>(
         &self,
         written: impl Future<Output = Result<T, StoreError>>,
     ) -> Result<T, StoreError> {
-        let fenced = || StoreError::Fenced(self.handle.id());
-        let Some(lease) = self.rooms.lease() else {
-            return written.await;
-        };
-        let written = async {
-            let written = written.await?;
-            lease.held().await;
-            Ok(written)
-        };
-        tokio::select! {
-            biased;
-            written = written => written,
-            () = self.handle.end.cancelled() => Err(fenced()),
+        let handle = &self.handle;
+        match self.rooms.lease() {
+            Some(lease) => lease.published(handle.id(), &handle.end, written).await,
+            None => written.await,
         }
     }
 

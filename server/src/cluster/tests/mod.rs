@@ -17,7 +17,7 @@ use tokio_util::task::TaskTracker;
 use super::located::LOOK_LIMIT;
 use super::node::LEFT_ALONE;
 use super::units::LOADS_AT_ONCE;
-use super::{ClusterNode, FoundBy, Location, News, NodeLease, StoreDirectory};
+use super::{ClusterNode, FoundBy, Hosted, Location, News, NodeLease, StoreDirectory};
 use crate::config::ServerConfig;
 use crate::convert;
 use crate::limits::Key;
@@ -67,8 +67,11 @@ impl TestNode {
             info,
             Duration::ZERO,
             shared,
-            Arc::clone(&rooms),
-            (Arc::clone(&tournaments), studies),
+            Hosted {
+                rooms: Arc::clone(&rooms),
+                tournaments: Arc::clone(&tournaments),
+                studies,
+            },
         );
         let mut publishes = node.may_publish();
         soon(publishes.wait_for(|it| *it)).await.expect("it runs");

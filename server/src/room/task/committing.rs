@@ -7,10 +7,9 @@ use std::time::Duration;
 use chefshat_room::State;
 use chefshat_room::ids::Id;
 use tokio::time::Instant;
-use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use super::{Room, TaskContext};
+use super::Room;
 use crate::convert;
 use crate::outbox::StreamEnd;
 use crate::store::{Signed, StoreError};
@@ -34,8 +33,7 @@ impl Room {
         if !self.commit_now() {
             let room = self.core.header().room_id;
             let appended = self.journal.append(self.core.pending());
-            let appended = unless_fenced(&self.context, &self.fence, room, appended);
-            if let Err(error) = appended.await {
+            if let Err(error) = unless(self.fence.cancelled(), room, appended).await {
                 self.fail(&error);
                 return false;
             }
@@ -87,7 +85,15 @@ impl Room {
         let finished = match signed {
             Ok(signed) => {
                 let finished = self.journal.finish(summary.map(Box::new), signed);
-                unless_lost(&self.context, &self.fence, header.room_id, finished).await
+                // A node that has a lease learns from its beat that the game is over, maybe before
+                // it learns the outcome: it is fenced then, and not lost.
+                let lost = async {
+                    self.fence.cancelled().await;
+                    if let Some(lease) = &self.context.lease {
+                        lease.lapsed().await;
+                    }
+                };
+                unless(lost, header.room_id, finished).await
             }
             Err(error) => Err(error),
         };
@@ -164,41 +170,15 @@ impl Room {
     }
 }
 
-/// The result of a write, unless the room is fenced before. In a single server it never is.
-async fn unless_fenced(
-    context: &TaskContext,
-    fence: &CancellationToken,
+/// The result of a write, unless the room is lost before.
+async fn unless(
+    lost: impl Future<Output = ()>,
     room: Id,
     written: impl Future<Output = Result<(), StoreError>>,
 ) -> Result<(), StoreError> {
-    if context.lease.is_none() {
-        return written.await;
-    }
     tokio::select! {
         biased;
         written = written => written,
-        () = fence.cancelled() => Err(StoreError::Fenced(room)),
-    }
-}
-
-/// The outcome of the end of a game, unless the room is fenced and the node has no lease. A node
-/// that has one learns from its beat that the game is over, maybe before it learns the outcome.
-async fn unless_lost(
-    context: &TaskContext,
-    fence: &CancellationToken,
-    room: Id,
-    finished: impl Future<Output = Result<(), StoreError>>,
-) -> Result<(), StoreError> {
-    let Some(lease) = &context.lease else {
-        return finished.await;
-    };
-    let lost = async {
-        fence.cancelled().await;
-        lease.lapsed().await;
-    };
-    tokio::select! {
-        biased;
-        finished = finished => finished,
         () = lost => Err(StoreError::Fenced(room)),
     }
 }
