@@ -96,17 +96,20 @@ export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "T
   throw new Error(`not to be reached with ${key}; the focus is on "${(await focus(page)).label}"`);
 }
 
-/** The announcements of the pages that are opened from now on, as they are made. */
-export async function hearing(page: Page): Promise<string[]> {
+/**
+ * The announcements, or the texts of another element, of the pages that are opened from now on, as
+ * they change.
+ */
+export async function hearing(page: Page, region = '[data-testid="announcer"]'): Promise<string[]> {
   const heard: string[] = [];
   await page.exposeFunction("hear", (text: string) => heard.push(text));
-  await page.addInitScript(() => {
+  await page.addInitScript((selector) => {
     const { hear } = globalThis as unknown as { hear(text: string): void };
     new MutationObserver((changes) => {
-      const region = document.querySelector('[data-testid="announcer"]');
+      const region = document.querySelector(selector);
       if (region && changes.some(({ target }) => region.contains(target))) hear(region.textContent);
     }).observe(document, { subtree: true, childList: true, characterData: true });
-  });
+  }, region);
   return heard;
 }
 
