@@ -1,7 +1,7 @@
 // A knockout as a bracket: a column per round, a box per table; the two who advance are marked by
 // text and sign. On a narrow page the rounds are stacked.
 
-import type { Tournament, TournamentGame } from "../gen/chefshat/v1/tournament_pb";
+import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import css from "./Bracket.module.css";
 import { GameLink } from "./GameLink";
@@ -64,7 +64,7 @@ interface BoxProps {
 function Box({ tournament, table, mine, final, large }: BoxProps) {
   const words = t().tournaments;
   const over = table.games.length > 0 && table.games.every(isOver);
-  const playing = table.games.length > 0 && !over;
+  const playing = table.games.some(({ state }) => state === TournamentGameState.PLAYING);
   return (
     <div
       class={`${css.table} ${playing ? css.playing : ""} ${table.seats.length === 0 ? css.empty : ""}`}

@@ -27,15 +27,20 @@ interface StandingsProps {
   large?: boolean;
 }
 
+/** The heading of the standings. */
+export function standingsTitle({ state }: Tournament): string {
+  const words = t().tournaments.standings;
+  return state === TournamentState.FINISHED ? words.final : words.title;
+}
+
 /** The table of standings. */
 export function Standings({ tournament, standings, mine, large = false }: StandingsProps) {
   const words = t().tournaments.standings;
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   const players = tournament.settings?.rules?.players ?? 4;
-  const caption = tournament.state === TournamentState.FINISHED ? words.final : words.title;
   return (
     <table class={css.standings} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
-      <caption class="visually-hidden">{caption}</caption>
+      <caption class="visually-hidden">{standingsTitle(tournament)}</caption>
       <thead>
         <tr>
           <th scope="col">{words.place}</th>
@@ -101,18 +106,24 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
   const words = t().tournaments.standings;
   const participant = participantOf(tournament, standing.participant);
   if (!participant) return null;
+  const gone = participant.withdrawn ? words.withdrawn : !participant.connected && !isEnded(tournament) && words.away;
   const remarks = [
     participant.filler && words.filler,
-    participant.withdrawn && words.withdrawn,
     participant.former.length > 0 && words.former(participant.former.map(({ name }) => name).join(", ")),
     standing.forfeited > 0 && words.forfeited(standing.forfeited),
     standing.byes > 0 && words.byes(standing.byes),
-    !participant.connected && !participant.withdrawn && !isEnded(tournament) && words.away,
+    gone,
   ].filter(Boolean);
   return (
     <>
       <PersonName name={nameOf(tournament, standing.participant)} builtIn={participant.builtInAgent} linked={!large} />{" "}
-      <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
+      {large && gone ? (
+        <span class="soft" data-part="standings-gone">
+          {gone}
+        </span>
+      ) : (
+        <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
+      )}
       {!large && remarks.length > 0 && <span class={`soft small ${css.remarks}`}>{remarks.join(" · ")}</span>}
     </>
   );

@@ -32,7 +32,7 @@ import { WhichPlace } from "./OwnPlace";
 import { Participation } from "./Participation";
 import { decidePlace, type HeldPlace, heldPlace, placeFromLink, takePlace } from "./place";
 import { Rounds } from "./Rounds";
-import { Confidence, Standings } from "./Standings";
+import { Confidence, Standings, standingsTitle } from "./Standings";
 import { isEnded, participantOf } from "./structure";
 import tournamentsCss from "./Tournaments.module.css";
 import { Wall } from "./Wall";
@@ -209,7 +209,7 @@ function Overview({ live, mine, children }: OverviewProps) {
       </header>
       {children}
       <section class={`sheet ${tournamentsCss.part}`}>
-        <h2>{standingsTitle(live)}</h2>
+        <h2>{tournament.round === 0 ? words.standings.field : standingsTitle(tournament)}</h2>
         {tournament.round === 0 ? (
           <Entrants tournament={tournament} mine={mine} />
         ) : (
@@ -245,10 +245,4 @@ function lostPlace(tournament: Tournament, { participant, name }: HeldPlace): "l
   if (!here || isEnded(tournament)) return null;
   if (here.withdrawn) return "left";
   return here.name !== name && here.former.some((former) => former.name === name) ? "replaced" : null;
-}
-
-function standingsTitle({ tournament }: LiveTournament): string {
-  const words = t().tournaments.standings;
-  if (tournament.round === 0) return words.field;
-  return tournament.state === TournamentState.FINISHED ? words.final : words.title;
 }

@@ -15,7 +15,7 @@ import { useFit } from "./fit";
 import { type LiveTournament, useGames } from "./following";
 import { hostedTournament, invitationTo } from "./hosting";
 import { TablesOnWall } from "./Rounds";
-import { Standings } from "./Standings";
+import { Standings, standingsTitle } from "./Standings";
 import { bracket, playedRounds } from "./structure";
 import css from "./Wall.module.css";
 import { inShort, playWords, TournamentStateChip } from "./words";
@@ -66,7 +66,7 @@ export function Wall({ live }: { live: LiveTournament }) {
   );
 }
 
-/** The join code and its QR code, while anybody may join. */
+/** The address with the join code as a QR code, and both in letters, while anybody may join. */
 function WayIn({ tournamentId, code }: { tournamentId: string; code: string }) {
   const words = t().tournaments.wall;
   return (
@@ -74,7 +74,7 @@ function WayIn({ tournamentId, code }: { tournamentId: string; code: string }) {
       <h2>{words.join}</h2>
       <QrCode text={invitationTo(tournamentId, code)} label={t().lobby.invite.qr} />
       <p>
-        {words.orCode} <b class={css.code}>{code}</b>
+        {words.orCode(location.host)} <b class={css.code}>{code}</b>
       </p>
     </section>
   );
@@ -94,7 +94,7 @@ function Played({ live }: { live: LiveTournament }) {
     <>
       <section class={css.part}>
         <h2>
-          {words.standings.title}
+          {standingsTitle(tournament)}
           {lines.several && <span class="soft number"> {words.wall.more(lines.from, lines.to)}</span>}
         </h2>
         <Fitted>

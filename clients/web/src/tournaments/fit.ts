@@ -10,6 +10,11 @@ const SMALLEST = 8;
 const LARGEST = 0.075;
 /** Halvings of the range between them, which find the size to less than a pixel. */
 const STEPS = 8;
+/**
+ * Taken off the size that fits, pixels: the measures are rounded, so that half a pixel may be too
+ * much, which would cut off a border. It is this much per em of a content of 8 em.
+ */
+const SPARE = 1 / 16;
 
 /** A box with the largest type that fits it. Its content is sized in `em`. */
 export function useFit<Box extends HTMLElement>(): RefObject<Box | null> {
@@ -37,5 +42,5 @@ export function fitTo(box: HTMLElement): void {
     if (box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth) small = tried;
     else large = tried;
   }
-  box.style.fontSize = `${small}px`;
+  box.style.fontSize = `${small - SPARE}px`;
 }

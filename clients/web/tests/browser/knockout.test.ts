@@ -60,7 +60,7 @@ test("two people leave a knockout, substitutes play on, and nobody waits for mor
   const wall = await person(browser, { viewport: { width: 1920, height: 1080 } });
   await wall.page.goto(`${address}?wall&code=${joinCode}`);
   const invitation = wall.page.locator('[data-part~="wall-invitation"]');
-  await invitation.getByText(joinCode).waitFor();
+  await invitation.getByText(`or open ${server.address} and enter ${joinCode}`).waitFor();
   await invitation.getByRole("img", { name: "QR code of the address" }).waitFor();
 
   // They join one after the other, because the draw depends on the order.
@@ -104,7 +104,8 @@ test("two people leave a knockout, substitutes play on, and nobody waits for mor
     await spectator.page.locator('[data-part~="table"]').waitFor();
     return true;
   };
-  await Promise.all(players.map((player) => takePart(player, over, leaves)));
+  const gone = wall.page.getByRole("row", { name: "Rosa not connected" }).waitFor();
+  await Promise.all([gone, ...players.map((player) => takePart(player, over, leaves))]);
   expect(await over).toBe(TournamentState.FINISHED);
   expect(await robot).toBe(0);
 
@@ -146,7 +147,7 @@ test("two people leave a knockout, substitutes play on, and nobody waits for mor
     await page.getByRole("button", { name: "Back to the standings" }).click();
     await page.getByRole("table", { name: "Final standings" }).getByRole("row").nth(1).getByText(winner).waitFor();
   }
-  await wall.page.getByText("finished").waitFor();
+  await wall.page.getByRole("heading", { name: "Final standings" }).waitFor();
   await wall.page
     .getByRole("listitem")
     .filter({ hasText: `${winner}★` })

@@ -36,7 +36,7 @@ export const tournaments: Texts["tournaments"] = {
     more: (from, to) => `${from} bis ${to}`,
     tables: (from, to) => `Tische ${from} bis ${to}`,
     join: "Zum Anmelden scannen",
-    orCode: "oder den Code eingeben",
+    orCode: (host) => `oder ${host} öffnen und eingeben:`,
   },
   print: "Drucken",
   results: {

@@ -36,7 +36,7 @@ export const tournaments = {
     more: (from: number, to: number) => `${from} to ${to}`,
     tables: (from: number, to: number) => `tables ${from} to ${to}`,
     join: "Scan to join",
-    orCode: "or enter the code",
+    orCode: (host: string) => `or open ${host} and enter`,
   },
   print: "Print",
   results: {

@@ -41,7 +41,7 @@ export const tournaments: Texts["tournaments"] = {
     more: (from, to) => `de ${from} a ${to}`,
     tables: (from, to) => `mesas de ${from} a ${to}`,
     join: "Escanea para inscribirte",
-    orCode: "o escribe el código",
+    orCode: (host) => `o abre ${host} y escribe`,
   },
   print: "Imprimir",
   results: {

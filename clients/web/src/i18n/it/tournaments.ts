@@ -36,7 +36,7 @@ export const tournaments: Texts["tournaments"] = {
     more: (from, to) => `da ${from} a ${to}`,
     tables: (from, to) => `tavoli da ${from} a ${to}`,
     join: "Inquadra il codice per iscriverti",
-    orCode: "oppure inserisci il codice",
+    orCode: (host) => `oppure apri ${host} e inserisci`,
   },
   print: "Stampa",
   results: {
