@@ -2,10 +2,10 @@
 //! seats that a test controls step by step over real sockets, and a ledger of what agents received.
 //! Agents that play on their own come from the SDKs.
 
-/// The samples of the README, compiled.
-#[doc = include_str!("../../README.md")]
+/// The samples of the book in Rust, compiled.
+#[doc = include_str!("../../docs/agents-rust.md")]
 #[cfg(doctest)]
-pub struct Readme;
+pub struct AgentsInRust;
 
 mod busy_rooms;
 mod disk;

@@ -1,4 +1,4 @@
-"""Every sample runs on both servers: the Python in the READMEs, the files in samples/, and the command."""
+"""Every sample runs on both servers: the Python in the READMEs and the book, the files in samples/, and the command."""
 
 import json
 import os
@@ -15,11 +15,16 @@ from chefshat import agent as command
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PRINTED_ADDRESS = "127.0.0.1:50051"
-# The README of the package and, in a complete checkout, of the project.
-READMES = [path for path in (PACKAGE / "README.md", PACKAGE.parents[1] / "README.md") if path.is_file()]
-README = [
+ROOT = PACKAGE.parents[1]
+# The README of the package and, in a complete checkout, those pages of the project that explain it.
+PAGES = [
+    path
+    for path in (PACKAGE / "README.md", ROOT / "README.md", ROOT / "docs" / "agents-python.md", ROOT / "docs" / "learning.md")
+    if path.is_file()
+]
+PRINTED = [
     block
-    for path in READMES
+    for path in PAGES
     for block in re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 ]
 SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
@@ -35,23 +40,23 @@ def run_python(*arguments: str, folder: Path = PACKAGE) -> str:
 
 
 def test_there_are_samples() -> None:
-    assert len(READMES) == 2
-    assert len(README) >= 7
+    assert len(PAGES) == 4
+    assert len(PRINTED) >= 15
     assert len(SAMPLES) >= 4
 
 
-@pytest.mark.parametrize("number", range(len(README)))
-def test_readme(number: int, address: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    assert PRINTED_ADDRESS in README[number]
-    if "replay" in README[number] and "fake" in request.fixturenames:
+@pytest.mark.parametrize("number", range(len(PRINTED)))
+def test_printed(number: int, address: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    assert PRINTED_ADDRESS in PRINTED[number]
+    if "replay" in PRINTED[number] and "fake" in request.fixturenames:
         pytest.skip("the records of the fake server cannot be replayed")
-    if "env.save" in README[number] and "fake" in request.fixturenames:
+    if "env.save" in PRINTED[number] and "fake" in request.fixturenames:
         pytest.skip("the fake server saves no games")
-    if "chefshat import search" in README[number]:
+    if "chefshat import search" in PRINTED[number]:
         pytest.importorskip("chefshat_native")
         if "fake" in request.fixturenames:
             pytest.skip("the decisions of the fake server follow no rules")
-    assert run_python("-c", README[number].replace(PRINTED_ADDRESS, address), folder=tmp_path) != ""
+    assert run_python("-c", PRINTED[number].replace(PRINTED_ADDRESS, address), folder=tmp_path) != ""
 
 
 @pytest.mark.parametrize("name", SAMPLES)

@@ -253,18 +253,18 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.C
     assert f"cannot write {tmp_path / 'no' / 'roles.pdf'}: No such file or directory" in capsys.readouterr().err
 
 
-def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_commands_of_the_book_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
-    lines = [line for line in readme.splitlines() if line.startswith("chefshat-robot print ")]
+    page = (Path(__file__).parents[3] / "docs/robot-print.md").read_text()
+    lines = [line for line in page.splitlines() if line.startswith("chefshat-robot print ")]
     assert len(lines) == 3
     for line in lines:
         assert main(shlex.split(line, comments=True)[1:]) == 0
     assert len(list(tmp_path.glob("*.pdf"))) == 3
 
 
-def test_the_readme_counts_the_sheets(printed: dict[str, list[Page]]) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
+def test_the_book_counts_the_sheets(printed: dict[str, list[Page]]) -> None:
+    page = (Path(__file__).parents[3] / "docs/robot-print.md").read_text()
     for part, pages in printed.items():
         sheets = len(pages) // 2 if part in PIECES else len(pages)
-        assert f"| `{part}` | {sheets} |" in readme
+        assert f"| `{part}` | {sheets} |" in page

@@ -1,9 +1,10 @@
-"""The samples in the README run, and what it names exists."""
+"""The samples in the book run, and what it names exists."""
 
 from __future__ import annotations
 
 import argparse
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -14,11 +15,13 @@ from chefshat_robot import cli, drivers
 from chefshat_robot.drivers import CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Pose, Say, driver
 from tests.loop import run
 
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[3]
+PAGES = [ROOT / "clients/robot/README.md", *sorted((ROOT / "docs").glob("robot*.md"))]
+TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)
 
 
 def test_the_sample_of_a_driver_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    (sample,) = [code for code in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "class Lamp" in code]
+    (sample,) = [code for code in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL) if "class Lamp" in code]
     (tmp_path / "my_module.py").write_text(sample, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "my_module", raising=False)
@@ -59,14 +62,14 @@ def test_the_sample_of_a_robots_program_works() -> None:
 
 def test_every_command_and_every_driver_is_described() -> None:
     for name in ("calibrate", "perceive", "table", "robot", "wizard", "affect", "markers"):
-        assert f"chefshat-robot {name}" in README
+        assert f"chefshat-robot {name}" in TEXT
     for name in drivers.DRIVERS:
-        assert f"| `{name}` |" in README
+        assert f"| `{name}` |" in TEXT
 
 
 def test_commands_parse() -> None:
-    """Every command in the README has options that exist."""
-    lines = [line.partition(" #")[0].split() for line in README.splitlines() if line.startswith("chefshat-robot ")]
+    """Every command in the book has options that exist."""
+    lines = [shlex.split(line, comments=True) for line in TEXT.splitlines() if line.startswith("chefshat-robot ")]
     assert lines
     for _, name, *arguments in lines:
         parser = argparse.ArgumentParser()
