@@ -8,7 +8,7 @@ use crate::places::{NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
 use crate::steps::Steps;
 use crate::web;
-use crate::{arrows, circles};
+use crate::{arrows, book, circles};
 
 /// What is off by default and still checked and tested, in one build with the rest.
 pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
@@ -23,6 +23,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
 
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
+    book::check_and_build(places, steps)?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
     for name in ["compose", "compose.proxy", "compose.cluster"] {
         let file = format!("docker/{name}.yaml");

@@ -1,11 +1,12 @@
 //! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, builds the
-//! page, and wheels.
+//! page, the book and wheels.
 //!
-//! The command line is here; [`lint`], [`test`], [`web`] and [`wheels`] are the tasks, [`setup`] prepares them.
+//! The command line is here; [`lint`], [`test`], [`book`], [`web`] and [`wheels`] are the tasks, [`setup`] prepares them.
 //! It depends on no crate of the project: it only starts other programs, and builds even if they do
 //! not.
 
 mod arrows;
+mod book;
 mod circles;
 mod command;
 mod failure;
@@ -50,6 +51,8 @@ enum Task {
     },
     /// Check format, lints, protocol, licences and images.
     Lint,
+    /// Build the book of `docs/` into `target/book`, and check its links.
+    Book,
     /// Build the page for people, which the server serves on its port.
     Web,
     /// Build the wheels of the Python packages, into `target/wheels`.
@@ -69,6 +72,7 @@ fn main() -> ExitCode {
     let outcome = Places::find().and_then(|places| match cli.task {
         Task::Test { only, slow } => test::run(&places, &mut steps, only, slow),
         Task::Lint => lint::run(&places, &mut steps),
+        Task::Book => book::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
         Task::Wheels { profile, try_them } => wheels::run(&places, &mut steps, &profile, try_them),
     });

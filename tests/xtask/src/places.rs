@@ -143,6 +143,11 @@ impl Places {
         self.target.join("wheels")
     }
 
+    /// The book, as a folder of HTML.
+    pub(crate) fn book(&self) -> PathBuf {
+        self.target.join("book")
+    }
+
     /// Virtual environment with the oldest or newest versions that the Python SDK works with.
     pub(crate) fn versions(&self, which: &str) -> PathBuf {
         self.own.join(format!("venv-{which}"))
