@@ -12,6 +12,8 @@ mod conformance;
 mod connect;
 mod data_dir;
 mod demo;
+#[cfg(test)]
+mod documents;
 mod error;
 mod experiment;
 mod export;

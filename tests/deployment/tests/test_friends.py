@@ -3,9 +3,6 @@
 import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,64 +10,11 @@ from pathlib import Path
 import chefshat
 import pytest
 from certificates import PATIENCE_S
-from chefshat.local_server import BINARY, clean_environment
+from chefshat.local_server import BINARY
+from machine import Machine, copied, finished
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "access.md"
 SECTION = "## A tournament of friends"
-
-
-class Machine:
-    """A folder in which somebody types commands. Values take the place of those on the page."""
-
-    def __init__(self, folder: Path, values: dict[str, str]) -> None:
-        folder.mkdir()
-        self.folder = folder
-        self.values = values
-        programs = [str(Path(os.environ[BINARY]).parent), str(Path(sys.executable).parent), os.environ["PATH"]]
-        self._environment = clean_environment() | {"PATH": ":".join(programs)}
-        self._started: list[subprocess.Popen[str]] = []
-
-    def start(self, commands: str) -> subprocess.Popen[str]:
-        """Types commands, which may run for long."""
-        # The longest first: a name may be part of a URL.
-        for written in sorted(self.values, key=len, reverse=True):
-            commands = commands.replace(written, self.values[written])
-        process = subprocess.Popen(
-            ["bash", "-e", "-c", commands],
-            cwd=self.folder,
-            env=self._environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            process_group=0,
-        )
-        self._started.append(process)
-        return process
-
-    def type(self, commands: str) -> str:
-        """Types commands, which must succeed, and returns what they print."""
-        return finished(self.start(commands))
-
-    def leave(self) -> None:
-        """Ends what still runs."""
-        for process in self._started:
-            if process.poll() is None:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.communicate()
-
-
-def finished(process: subprocess.Popen[str]) -> str:
-    """What commands print, which must succeed."""
-    output, _ = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, output
-    return output
-
-
-def copied(pattern: str, output: str) -> str:
-    """What a person copies from an output."""
-    match = re.search(pattern, output)
-    assert match, output
-    return match[1]
 
 
 def refusal(call: Callable[[], object]) -> str:
