@@ -81,5 +81,6 @@ def test_a_training_against_a_player_resumes(
     for wrong in ("[]", "{"):
         with pytest.raises(SystemExit):
             command.main([*resume, "--club-arguments", wrong])
-    assert command.main(["ppo", "--out", str(out), "--decisions", "64", *games[:5], "club:club_players:NoSuchPlayer"]) == 1
+    other = str(tmp_path / "other.safetensors")
+    assert command.main(["ppo", "--out", other, "--decisions", "64", *games[:5], "club:club_players:NoSuchPlayer"]) == 1
     assert "NoSuchPlayer" in capsys.readouterr().err

@@ -123,6 +123,8 @@ def test_an_agent_is_trained_resumed_and_plays_in_a_room(
     assert (before["event"], before["wrong_per_shift"]) == ("trained", 0)
     trained = checkpoint.load(tmp_path / "agent.training")
     assert network.load(out).info.rules == trained.networks("deep-q")[0].info.rules
+    assert main(command) == 1
+    assert "agent.safetensors exists" in json.loads(capsys.readouterr().out)["message"]
     # Shifts are counted from the start of the training: one more.
     assert main([*command, "--shifts", "3", "--resume"]) == 0
     resumed = checkpoint.load(tmp_path / "agent.training")

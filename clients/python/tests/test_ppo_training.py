@@ -129,6 +129,10 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     assert [line["event"] for line in lines] == ["setup", "evaluation", "evaluation", "evaluation"]
     assert [line["decisions"] for line in lines[1:]] == [0, 256, 512]
 
+    assert command.main([*options, *plan, "--decisions", "256"]) == 1
+    assert "with --resume, replace it with --force" in json.loads(capsys.readouterr().out)["message"]
+    assert network.load(out).info.trained_by == trained.info.trained_by
+
     options = [*options, "--resume"]
     for option, given, stored in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3)):
         assert command.main([*options, f"--{option}", str(given), "--decisions", "1024"]) == 1

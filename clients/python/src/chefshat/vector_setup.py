@@ -101,6 +101,8 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     starts = options.get("starts")
     if starts is not None and (branch is not None or hands is not None):
         raise ValueError("starts excludes branch and hands: each of them says how games begin")
+    if hands is not None and not isinstance(hands, pb.ScriptedShift | dict):
+        raise TypeError(f"hands is a pb.ScriptedShift or a dict of its fields (docs/branching.md), not {type(hands).__name__}")
     if branch is not None and rules is not None:
         raise ValueError("a game that continues a record (branch) has the record's rules: leave rules out")
     if options.get("other_decisions") is not None and decisions != "turns":

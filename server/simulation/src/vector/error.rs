@@ -23,7 +23,7 @@ pub enum StepError {
     },
     /// An illegal action, if that is an error.
     #[error(
-        "row {row} (game {game}, seat {seat}): action {} is not legal; choose one of the row's mask, or set invalid_actions to ASK_AGAIN",
+        "row {row} (game {game}, seat {seat}): action {} is not legal; choose one of the row's mask, or let such decisions be asked again (invalid_actions ASK_AGAIN; in Python invalid=\"ask_again\")",
         action.index()
     )]
     Illegal {

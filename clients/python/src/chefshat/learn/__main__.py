@@ -99,6 +99,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--resume", action="store_true", help="resume from the checkpoint, with its plan; the budget counts from the first start"
     )
+    _force(command)
     command.add_argument("--checkpoint", type=Path, metavar="FILE", help="the checkpoint (default: OUT as .training)")
     command.add_argument(
         "--log", type=Path, metavar="FILE", help="JSON lines of the setup and the evaluations (default: OUT as .jsonl)"
@@ -146,6 +147,10 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--clip", type=_above_zero, default=0.2, help="clip range of the probability ratio")
 
 
+def _force(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--force", action="store_true", help="replace the files of an earlier training")
+
+
 def _common(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=_natural, default=1, help="seed of deals and of random choices")
     join_options.add_server_options(command)
@@ -182,6 +187,7 @@ def _deep_q(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="resume from the checkpoint, with its settings; --shifts counts from the first start",
     )
+    _force(command)
     command.add_argument("--save-every", type=_count, default=50, metavar="SHIFTS", help="Shifts between two writes of both files")
     command.add_argument("--checkpoint", type=Path, metavar="FILE", help="the checkpoint (default: OUT as .training)")
 

@@ -44,6 +44,8 @@ def run(options: argparse.Namespace) -> int:
         for path in (out, state):
             if not path.parent.is_dir():
                 raise ValueError(f"there is no folder {path.parent} to write {path.name} to")
+        if not (options.resume or options.force):
+            runs.refuse_to_replace(out, state)
         played = _train(options, state)
     except Stopped as stopped:
         if options.json:

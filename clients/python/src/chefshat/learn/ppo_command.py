@@ -44,6 +44,8 @@ def run(options: argparse.Namespace) -> int:
     try:
         if not out.parent.is_dir():
             raise ValueError(f"there is no folder {out.parent} to write {out.name} to")
+        if not (options.resume or options.force):
+            runs.refuse_to_replace(out, state, log)
         training = _resume(state, options) if options.resume else _start(options)
         with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
             LOG.info(json.dumps(_setup(trainer.training)))

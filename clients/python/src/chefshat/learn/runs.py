@@ -40,6 +40,15 @@ def existing(training: Path) -> Path:
     return training
 
 
+def refuse_to_replace(*files: Path) -> None:
+    """Raises FileExistsError, saying what to do, if any of the files that a new training would write exists."""
+    for file in files:
+        if file.exists():
+            raise FileExistsError(
+                f"{file} exists: continue that training with --resume, replace it with --force, or give another --out"
+            )
+
+
 def trained_by(before: str, command: str) -> str:
     """Appends a command to those of a resumed training: reproducing it takes all of them.
 
