@@ -1,7 +1,7 @@
 """Every command in the book is run as it is written, but for names, ports and printed values, or has a reason here why it is not.
 
-That all commands have options that exist is checked where they are parsed: `server/cli/src/documents.rs`, `clients/python/tests/test_book.py`,
-`clients/robot/tests/test_book.py`, `tests/xtask/src/book`.
+That all commands have options that exist is checked where they are parsed: `server/cli/src/documents.rs`,
+`clients/python/tests/test_book.py`, `clients/robot/tests/test_book.py`, `tests/xtask/src/main.rs`.
 """
 
 import os
@@ -35,7 +35,7 @@ NOT_RUN = {
     r"protoc ": "CMake runs it for the agent in C++",
     r"build/agent ": "built for the tests in Rust; tests/tests/system/languages.rs plays with it",
     r"(CHEFSHAT_TICKET=TICKET )?node agent\.js ": "clients/node/tests plays with it, also with tickets",
-    r"cargo run -p chefshat-client --example |cargo test ": "a build of its own; Cargo builds the examples, the system tests run the SDK",
+    r"cargo run -p chefshat-client --example |cargo test ": "a build of its own; the system tests run the SDK",
     r"chefshat check-agent ": "agent.py is the reader's; tests/tests/system/examiner.rs examines agents",
     r"chefshat (play|watch) |cargo run --release -- play": "needs a terminal; tests/tests/system/terminal.rs has one",
     r"chefshat table --ticket TICKET$": "needs a person who types; tests/tests/system/attendant.rs",
@@ -45,19 +45,19 @@ NOT_RUN = {
     r"chefshat-robot wizard ": "needs NAOqi; clients/robot/tests has a peer that speaks its protocol",
     r"chefshat-robot (affect|markers) ": "needs a network of Lab Streaming Layer; clients/robot/tests",
     r"python -m chefshat\.lsl ": "needs a network of Lab Streaming Layer; clients/python/tests",
-    r"python (-m chefshat\.(learn|experiments)|benchmarks/) ?": "minutes to hours of learning or measuring; clients/python/tests has short ones",
+    r"python (-m chefshat\.(learn|experiments)|benchmarks/) ?": "minutes to hours; clients/python/tests has short ones",
     r"(RAY_ADDRESS=auto )?python clients/python/samples/cluster/": "needs Ray, with older dependencies: see CONTRIBUTING.md",
-    r"~/club/bin/|python -m chefshat\.players_club ": "needs ChefsHatGym 2, with older dependencies; clients/python/tests has players of its form",
-    r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks of hours of learning",
+    r"~/club/bin/|python -m chefshat\.players_club ": "needs ChefsHatGym 2; clients/python/tests has such players",
+    r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks learned for hours",
     r"chefshat participant delete P07 --data-dir": "the server would have to be stopped; server/cli/tests/cli/participant.rs",
     r"chefshat admin disconnect 17": "the number of a connection; tests/tests/system/operator.rs",
-    r"chefshat import table-3\.csv|chefshat records import table-3": "the reader's table; server/record/tests imports the transcript of the page",
+    r"chefshat import table-3\.csv|chefshat records import table-3": "the reader's table; server/record/tests has the page's",
     r"chefshat verify game\.jsonl --key ": "a key of the reader; server/cli/tests/cli/verify.rs",
     r"chefshat tournament table ": "needs a game at a physical table; tests/tests/system/tournament_tables.rs",
     r"chefshat-robot rehearse( --people 2 --(shifts 1 --mistakes|open)|$)": "minutes; docs/index.md has one that is run",
     r"chefshat-robot robot --room JOINCODE --name Pepe --referee ": "needs a game at a physical table; clients/robot/tests",
     r"chefshat-robot robot --address .*--driver simulated": "a simulated robot moves as slowly as a real one; clients/robot/tests",
-    r"chefshat-robot table shift|chefshat-robot perceive shift": "renders minutes of video; clients/robot/tests renders and reads shorter ones",
+    r"chefshat-robot table shift|chefshat-robot perceive shift": "minutes of video; clients/robot/tests has shorter ones",
     r"chefshat serve --database|chefshat migrate |create(user|db) ": "needs PostgreSQL; test_cluster.py has it",
     r"cargo run --release -p chefshat-cluster ": "a build of its own",
 }
@@ -212,11 +212,13 @@ def test_a_page_that_another_test_types_is_named_there() -> None:
         assert Path(page).name in (ROOT / test).read_text(encoding="utf-8")
 
 
-def test_every_reason_is_needed() -> None:
+def test_every_reason_is_needed_and_names_files_that_exist() -> None:
     """No reason is left from commands that are gone."""
     written = [command for page in PAGES if page not in TYPED_BY for command in commands(page)]
     for pattern in NOT_RUN:
         assert any(re.match(pattern, command) for command in written), pattern
+    for path in re.findall(r"[\w/]+/[\w./]+", " ".join(NOT_RUN.values())):
+        assert (ROOT / path).exists(), path
 
 
 def test_no_command_is_hidden_in_a_block_of_another_language() -> None:

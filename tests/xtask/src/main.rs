@@ -66,6 +66,24 @@ enum Task {
     },
 }
 
+#[test]
+fn the_tasks_that_documents_name_exist() {
+    let root = Places::find().unwrap().root;
+    let mut tasks = 0;
+    for file in book::documents(&root).unwrap() {
+        let text = std::fs::read_to_string(root.join(&file)).unwrap();
+        for line in text.lines().filter(|line| line.starts_with("cargo xtask ")) {
+            let line = line.split('#').next().unwrap_or_default();
+            let arguments = line.split_whitespace().skip(1);
+            if let Err(error) = Cli::try_parse_from(arguments) {
+                panic!("{file}: {line}: {error}");
+            }
+            tasks += 1;
+        }
+    }
+    assert!(tasks > 5, "only {tasks} were found");
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut steps = Steps::default();

@@ -22,6 +22,12 @@ use crate::places::Places;
 use crate::setup::{self, at};
 use crate::steps::Steps;
 
+/// The Markdown files of the source tree.
+#[cfg(test)]
+pub(crate) fn documents(root: &Path) -> Result<Vec<String>, Failure> {
+    files::files(root, "", ".md")
+}
+
 /// Builds and checks the book.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
