@@ -147,6 +147,9 @@ class Reader:
         if SERVE.match(command):
             self.serve(self.exported + command)
             return
+        if re.match(r"chefshat (admin|records prune) ", command) and "CHEFSHAT_TOKEN" not in self.machine.environment:
+            made = self.server.type("chefshat token create --role admin")
+            self.machine.environment["CHEFSHAT_TOKEN"] = copied(r"(chefshat_\w{8}_\S+)", made)
         if "P07" in command and "P07" not in self.machine.values:
             self.machine.type(f"chefshat agent random --name P07 --code {self.code('')}")
             self.machine.values["P07"] = "P07"
@@ -189,9 +192,7 @@ def reader(tmp_path: Path, record: Path) -> Iterator[Reader]:
         folder.mkdir(parents=True)
         shutil.copy(record, folder)
     (machine.folder / "my_module.py").write_text("import chefshat\n\n\nclass Hasty(chefshat.RandomAgent):\n    pass\n")
-    token = copied(r"(chefshat_\w{8}_\S+)", server.type("chefshat token create --role admin"))
     reader.serve("chefshat serve --access open --allow-import")
-    machine.environment["CHEFSHAT_TOKEN"] = token
     machine.type("chefshat records import game.jsonl")
     yield reader
     machine.leave()
