@@ -50,6 +50,7 @@ NOT_RUN = {
     r"~/club/bin/|python -m chefshat\.players_club ": "needs ChefsHatGym 2; clients/python/tests has such players",
     r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks learned for hours",
     r"chefshat participant delete P07 --data-dir": "the server would have to be stopped; server/cli/tests/cli/participant.rs",
+    r"target/release/chefshat render .*\.mp4": "needs ffmpeg; server/cli/tests/cli/render.rs makes films",
     r"chefshat admin disconnect 17": "the number of a connection; tests/tests/system/operator.rs",
     r"chefshat import table-3\.csv|chefshat records import table-3": "the reader's table; server/record/tests has the page's",
     r"chefshat verify game\.jsonl --key ": "a key of the reader; server/cli/tests/cli/verify.rs",
