@@ -25,6 +25,9 @@ import css from "./Replay.module.css";
 /** Duration of a moment at speed 1, milliseconds. */
 const MOMENT_MS = 1000;
 
+/** Key of the annotation with the reason that an agent gave for its decision. */
+const REASON_KEY = "reason";
+
 /** A shorter time would be shown as 0.0 s. */
 const SHOWN_SECONDS = 0.05;
 
@@ -125,6 +128,7 @@ export function Decision({ table, open }: { table: TableState; open: DecisionRec
   const move = moveOf(open.action, table.faces);
   const seconds = Number(open.decisionTimeUs) / 1e6;
   const estimate = open.annotations?.valueEstimate;
+  const reason = open.annotations?.extra[REASON_KEY];
   return (
     <details class={`${css.decision} sheet`} data-part="replay-decision">
       <summary>
@@ -136,6 +140,7 @@ export function Decision({ table, open }: { table: TableState; open: DecisionRec
           {open.hints > 0 && ` · ${words.hints(open.hints)}`}
         </span>
       </summary>
+      {reason && <p data-part="reason">{words.reason(reason)}</p>}
       {open.kind === DecisionKind.TURN && open.actionMask.length === 0 ? (
         <p>{t().table.physical.handUnknown}</p>
       ) : open.kind === DecisionKind.TURN ? (

@@ -25,6 +25,7 @@ export const replay: Texts["replay"] = {
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `Schätzung ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "nach einem Tipp" : `nach ${count} Tipps`),
+  reason: (text) => `Angegebener Grund: ${text}`,
   noTable: "Diese Entscheidung ist kein Zug und hat daher keine Tabelle.",
   analysis: {
     title: "Analyse",

@@ -23,6 +23,7 @@ export const replay = {
   seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
   estimate: (value: number) => `estimate ${value.toFixed(2)}`,
   hints: (count: number) => (count === 1 ? "after a hint" : `after ${count} hints`),
+  reason: (text: string) => `Reason given: ${text}`,
   noTable: "This decision is not a turn, so it has no look-up table.",
   analysis: {
     title: "Analysis",

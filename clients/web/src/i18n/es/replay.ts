@@ -25,6 +25,7 @@ export const replay: Texts["replay"] = {
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `estimación ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "tras una pista" : `tras ${count} pistas`),
+  reason: (text) => `Motivo indicado: ${text}`,
   noTable: "Esta decisión no es un turno y no tiene tabla.",
   analysis: {
     title: "Análisis",

@@ -25,6 +25,7 @@ export const replay: Texts["replay"] = {
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
   estimate: (value) => `stima ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "dopo un suggerimento" : `dopo ${count} suggerimenti`),
+  reason: (text) => `Motivo indicato: ${text}`,
   noTable: "Questa decisione non è un turno e non ha una tabella.",
   analysis: {
     title: "Analisi",
