@@ -1,5 +1,6 @@
 //! The modules: agents ([`Agent`]), connections and calls ([`Client`]), results of games
-//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]), physical tables ([`TableFollower`]). The
+//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]), seats of those who decide slowly
+//! ([`SeatFollower`]), physical tables ([`TableFollower`]). The
 //! messages of the protocol are re-exported as [`v1`]. The crate contains no rules of the game: the
 //! server sends the legal actions.
 #![doc = ""]
@@ -19,6 +20,7 @@ mod random;
 mod repeat;
 mod run;
 mod seat;
+mod seat_follower;
 mod session;
 mod spectate;
 mod table;
@@ -36,6 +38,7 @@ pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
+pub use seat_follower::SeatFollower;
 pub use spectate::{Spectator, Watched};
 pub use table::TableFollower;
 pub use tournaments::TournamentFollower;

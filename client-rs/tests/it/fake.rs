@@ -87,6 +87,8 @@ impl Line {
 
 type Scripted = Pin<Box<dyn Future<Output = ()> + Send>>;
 type PlayScript = Box<dyn FnOnce(Line) -> Scripted + Send>;
+/// The updates of a seat that is followed, message by message; the stream breaks with the last.
+pub(crate) type SeatScript = Vec<Result<Vec<Update>, Status>>;
 /// The responses of a spectator's stream, in order; it ends after the last.
 pub(crate) type WatchScript = Vec<Result<v1::SpectatorServiceWatchResponse, Status>>;
 
@@ -97,6 +99,8 @@ pub(crate) struct Fake {
     plays: Arc<Mutex<VecDeque<PlayScript>>>,
     watches: Arc<Mutex<VecDeque<WatchScript>>>,
     watched_from: Arc<Mutex<Vec<u64>>>,
+    seats: Arc<Mutex<VecDeque<SeatScript>>>,
+    attached: Arc<Mutex<Vec<v1::Attach>>>,
 }
 
 impl Fake {
@@ -114,6 +118,16 @@ impl Fake {
         self.watches.lock().unwrap().push_back(script);
     }
 
+    /// Follows this script on the next stream of a seat that is followed.
+    pub(crate) fn follow(&self, script: SeatScript) {
+        self.seats.lock().unwrap().push_back(script);
+    }
+
+    /// The attachments of seats that are followed, one for each stream.
+    pub(crate) fn attached(&self) -> Vec<v1::Attach> {
+        self.attached.lock().unwrap().clone()
+    }
+
     /// The first event requested on each spectator's stream.
     pub(crate) fn watched_from(&self) -> Vec<u64> {
         self.watched_from.lock().unwrap().clone()
@@ -121,7 +135,9 @@ impl Fake {
 
     /// Whether all scripts have been followed.
     pub(crate) fn is_done(&self) -> bool {
-        self.plays.lock().unwrap().is_empty() && self.watches.lock().unwrap().is_empty()
+        self.plays.lock().unwrap().is_empty()
+            && self.watches.lock().unwrap().is_empty()
+            && self.seats.lock().unwrap().is_empty()
     }
 
     /// Serves on a free port and connects to it.
@@ -159,7 +175,8 @@ pub(crate) async fn connect(address: SocketAddr) -> Client {
 #[tonic::async_trait]
 impl play_service_server::PlayService for Fake {
     type PlayStream = ReceiverStream<Result<v1::PlayResponse, Status>>;
-    type WatchStream = ReceiverStream<Result<v1::PlayServiceWatchResponse, Status>>;
+    type WatchStream =
+        tokio_stream::Iter<std::vec::IntoIter<Result<v1::PlayServiceWatchResponse, Status>>>;
 
     async fn play(
         &self,
@@ -178,9 +195,23 @@ impl play_service_server::PlayService for Fake {
 
     async fn watch(
         &self,
-        _request: Request<v1::PlayServiceWatchRequest>,
+        request: Request<v1::PlayServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        Err(Status::unimplemented("not in this play"))
+        let mut seats = request.into_inner().seats;
+        self.attached.lock().unwrap().append(&mut seats);
+        let script = self.seats.lock().unwrap().pop_front();
+        let script = script.ok_or_else(|| Status::failed_precondition("no script is left"))?;
+        let messages = script.into_iter().map(|message| {
+            let updates = message?.into_iter().map(|update| v1::SeatUpdate {
+                handle: 0,
+                update: Some(update),
+            });
+            Ok(v1::PlayServiceWatchResponse {
+                updates: updates.collect(),
+            })
+        });
+        let messages: Vec<_> = messages.collect();
+        Ok(Response::new(tokio_stream::iter(messages)))
     }
 
     async fn act(
