@@ -25,6 +25,7 @@ mod kind;
 mod lan;
 mod leaderboard;
 mod listen;
+mod mcp;
 mod migrate;
 mod narration;
 mod numbers;
@@ -99,6 +100,8 @@ enum Command {
     Play(tui::play::Play),
     /// Watch a room or a recorded game in this terminal.
     Watch(tui::watch::Watch),
+    /// Let language models play: a Model Context Protocol server.
+    Mcp(mcp::Mcp),
     /// Create, list, watch and close rooms of a server.
     Room(room::RoomCommand),
     /// Attend to a table with real cards: see what it waits for, and report what happens.
@@ -178,6 +181,7 @@ fn run(parsed: config::Parsed<Cli>) -> Result<ExitCode, CommandError> {
         Command::Agent(command) => in_runtime(command.run()),
         Command::Play(command) => in_runtime(command.run()),
         Command::Watch(command) => in_runtime(command.run()),
+        Command::Mcp(command) => in_runtime(command.run()),
         Command::CheckAgent(command) => in_runtime(command.run()),
         Command::Room(command) => in_runtime(command.run()),
         Command::Table(command) => in_runtime(command.run()),

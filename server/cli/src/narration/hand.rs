@@ -22,7 +22,7 @@ pub(crate) struct Stack {
 
 impl Hand {
     /// Makes a hand of cards (F+1 for a joker); cards outside the deck are ignored.
-    pub(super) fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
+    pub(crate) fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
         let mut hand = Self {
             counts: vec![0; faces + 1],
             golden,
@@ -31,7 +31,7 @@ impl Hand {
         hand
     }
 
-    pub(super) fn put(&mut self, cards: &[u32]) {
+    pub(crate) fn put(&mut self, cards: &[u32]) {
         for card in cards {
             if let Some(count) = self.slot(*card) {
                 *count = count.saturating_add(1);

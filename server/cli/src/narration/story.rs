@@ -191,7 +191,7 @@ pub(super) fn cards(play: &v1::Play) -> String {
 }
 
 /// Why the server decided for the seat, in a word; `None` if the seat decided.
-pub(super) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
+pub(crate) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
     match source {
         v1::DecisionSource::Timeout => Some("too late"),
         v1::DecisionSource::Invalid => Some("invalid"),

@@ -360,7 +360,7 @@ impl GameView {
 
     /// Whether a play that comes next contains the Golden card: it opens a Shift if the rules say
     /// so; otherwise it is the last of its face to be played, which only a known hand shows.
-    pub(super) fn plays_golden(&self, play: &v1::Play) -> bool {
+    pub(crate) fn plays_golden(&self, play: &v1::Play) -> bool {
         if play.face != self.faces() {
             return false;
         }

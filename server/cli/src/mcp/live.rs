@@ -1,0 +1,173 @@
+//! What the server has told a seat so far: the state of the game, its events in words, the open
+//! decision. Takes updates, and has no connection or clock: `seat` has them, `text` words the state.
+
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
+use chefshat_engine::ActionSpace;
+
+use super::events;
+use crate::narration::awaited::AwaitedSeat;
+use crate::narration::hand::Hand;
+use crate::narration::view::GameView;
+
+/// An event in words.
+#[derive(Debug)]
+pub(super) struct Told {
+    pub(super) sequence: u64,
+    pub(super) words: String,
+}
+
+/// An open decision.
+#[derive(Debug)]
+pub(super) struct Open {
+    pub(super) request: v1::DecisionRequest,
+    /// When it arrived.
+    since_ms: u64,
+}
+
+impl Open {
+    /// Milliseconds left for the decision, and then in the time bank.
+    pub(super) fn left_ms(&self, now_ms: u64) -> (u64, u64) {
+        let gone = now_ms.saturating_sub(self.since_ms);
+        let (time, bank) = (self.request.time_left_ms, self.request.bank_left_ms);
+        let (time, bank) = (u64::from(time), u64::from(bank));
+        let beyond = gone.saturating_sub(time);
+        (time.saturating_sub(gone), bank.saturating_sub(beyond))
+    }
+}
+
+/// A seat as its participant knows it.
+#[derive(Debug)]
+pub(super) struct Live {
+    pub(super) view: GameView,
+    pub(super) me: Option<u32>,
+    pub(super) told: Vec<Told>,
+    pub(super) open: Option<Open>,
+    pub(super) awaited: Option<AwaitedSeat>,
+    /// Cards that all seats have played in this Shift.
+    pub(super) played: Hand,
+    /// Why no more updates come although the game has not ended.
+    pub(super) lost: Option<String>,
+}
+
+impl Live {
+    /// A seat of a room, before its first update.
+    pub(super) fn new(view: GameView, me: Option<u32>) -> Self {
+        Self {
+            view,
+            me,
+            told: Vec::new(),
+            open: None,
+            awaited: None,
+            played: Hand::default(),
+            lost: None,
+        }
+    }
+
+    /// Number of the last event; 0 before the first.
+    pub(super) fn sequence(&self) -> u64 {
+        self.told.last().map_or(0, |told| told.sequence)
+    }
+
+    /// The numbering of actions.
+    pub(super) fn space(&self) -> ActionSpace {
+        let faces = u8::try_from(self.view.faces()).ok();
+        faces
+            .and_then(ActionSpace::new)
+            .expect("rule sets have 4 to 15 faces")
+    }
+
+    /// Whether the game has ended for this seat.
+    pub(super) fn is_over(&self) -> bool {
+        self.view.end.is_some() || self.lost.is_some()
+    }
+
+    /// Whether a substitute plays for this seat, until it says that it is back.
+    pub(super) fn is_substituted(&self) -> bool {
+        let me = self.me.and_then(|me| self.view.seat(me));
+        !self.is_over() && me.is_some_and(|seat| seat.substituted)
+    }
+
+    /// Whether the participant has to act, or will never have to again.
+    pub(super) fn concerns_me(&self) -> bool {
+        self.open.is_some() || self.is_over()
+    }
+
+    /// Takes an update that arrived at `now_ms`.
+    pub(super) fn take(&mut self, update: Update, now_ms: u64) {
+        match update {
+            Update::Attached(attached) => {
+                self.me = Some(attached.seat);
+                self.open = None;
+                self.awaited = None;
+            }
+            Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
+            Update::Events(batch) => batch.events.iter().for_each(|event| self.event(event)),
+            Update::Decision(request) => {
+                self.awaited = None;
+                self.open = Some(Open {
+                    request,
+                    since_ms: now_ms,
+                });
+            }
+            Update::Result(_)
+            | Update::Refused(_)
+            | Update::Snapshot(_)
+            | Update::Detached(_)
+            | Update::Entered(_) => {}
+        }
+    }
+
+    /// Closes a decision that was answered, unless the next one is open already.
+    pub(super) fn close(&mut self, decision_id: u64) {
+        (self.open).take_if(|open| open.request.decision_id == decision_id);
+    }
+
+    /// Closes the open decision if it is this one or an earlier one.
+    pub(super) fn close_before(&mut self, decision_id: u64) {
+        (self.open).take_if(|open| open.request.decision_id <= decision_id);
+    }
+
+    fn event(&mut self, event: &v1::GameEvent) {
+        if self.is_decided_by(event) {
+            self.open = None;
+        }
+        let words = events::advance(&mut self.view, self.me, event);
+        match &event.kind {
+            Some(Kind::ShiftStarted(_)) => self.played = Hand::default(),
+            Some(Kind::Play(play)) => self.put(play),
+            _ => {}
+        }
+        self.told.push(Told {
+            sequence: event.sequence,
+            words,
+        });
+    }
+
+    fn put(&mut self, play: &v1::Play) {
+        let faces = self.view.faces();
+        let face = std::iter::repeat_n(play.face, usize::try_from(play.quantity).unwrap_or(0));
+        let jokers = std::iter::repeat_n(faces + 1, usize::try_from(play.jokers).unwrap_or(0));
+        let cards: Vec<u32> = face.chain(jokers).collect();
+        if self.played.counts.is_empty() {
+            self.played = Hand::of(usize::try_from(faces).unwrap_or(0), &[], false);
+        }
+        self.played.put(&cards);
+    }
+
+    /// Whether an event shows that the open decision was taken without the participant, by a timeout
+    /// or a substitute, or makes it void. A decision that is still open is asked again.
+    fn is_decided_by(&self, event: &v1::GameEvent) -> bool {
+        match &event.kind {
+            Some(Kind::Play(play)) => Some(play.seat) == self.me,
+            Some(Kind::Pass(pass)) => Some(pass.seat) == self.me,
+            Some(Kind::Correction(correction)) => correction.first_void > 0,
+            Some(
+                Kind::CardsExchanged(_)
+                | Kind::SpecialActionDeclared(_)
+                | Kind::GameEnded(_)
+                | Kind::GameAborted(_),
+            ) => true,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! `chefshat mcp`: a Model Context Protocol server, by which language models take seats.
+
+mod events;
+mod http;
+mod live;
+mod prompt;
+mod resources;
+mod seat;
+mod seats;
+mod server;
+#[cfg(test)]
+mod tests;
+mod text;
+mod tools;
+mod words;
+
+use std::fmt;
+use std::net::SocketAddr;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Args;
+use rmcp::ServiceExt as _;
+use rmcp::service::ServerInitializeError;
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::connect::ServerArg;
+use super::{CommandError, say};
+use seats::{Handles, Seats};
+use server::{Server, Settings};
+
+/// Let language models play: a Model Context Protocol server.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  chefshat mcp --server http://127.0.0.1:50051 --code BCDF2345 --name Claude\n  \
+                  chefshat mcp --listen 127.0.0.1:8000\n\n\
+                  A client such as a desktop assistant starts this program and talks to it over standard input and output (docs/mcp.md). With \
+                  --listen it serves HTTP at /mcp instead."
+)]
+pub(super) struct Mcp {
+    #[command(flatten)]
+    server: ServerArg,
+    /// Join code for `join_room`, if the model gives none.
+    #[arg(long)]
+    code: Option<String>,
+    /// Display name for `join_room`, if the model gives none.
+    #[arg(long, env = "CHEFSHAT_NAME")]
+    name: Option<String>,
+    /// Ticket of a seat to resume.
+    #[arg(
+        long,
+        env = "CHEFSHAT_TICKET",
+        hide_env_values = true,
+        conflicts_with = "listen"
+    )]
+    ticket: Option<String>,
+    /// Serve streamable HTTP at this address instead of standard input and output. Only this
+    /// computer can reach a loopback address; there is no other protection.
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<SocketAddr>,
+    /// With --listen: also answer requests for this host name. By default only for localhost and the
+    /// address.
+    #[arg(long, value_name = "NAME", requires = "listen")]
+    allow_host: Vec<String>,
+    /// With --listen: let pages of this origin call. By default no page may.
+    #[arg(long, value_name = "ORIGIN", requires = "listen")]
+    allow_origin: Vec<String>,
+}
+
+impl Mcp {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let handles = match self.listen {
+            Some(_) => Handles::Random,
+            None => Handles::Counted,
+        };
+        let settings = Arc::new(Settings {
+            seats: Seats::new(self.server, handles),
+            join_code: self.code,
+            name: self.name,
+        });
+        match self.listen {
+            None => {
+                if let Some(ticket) = self.ticket {
+                    settings.seats.resume(ticket).await?;
+                }
+                tokio::select! {
+                    served = over_stdio(settings.clone()) => served?,
+                    asked = asked_to_stop() => asked?,
+                }
+            }
+            Some(address) => {
+                let checks = http::Checks {
+                    hosts: self.allow_host,
+                    origins: self.allow_origin,
+                };
+                http::serve(address, checks, settings.clone()).await?;
+            }
+        }
+        settings.seats.leave_all().await;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Leaves out the ticket.
+impl fmt::Debug for Mcp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Mcp").field(&self.server).finish()
+    }
+}
+
+/// Serves over standard input and output until the client closes them.
+async fn over_stdio(settings: Arc<Settings>) -> Result<(), CommandError> {
+    let server = Server::new(settings);
+    match server.serve(rmcp::transport::stdio()).await {
+        Ok(running) => drop(running.waiting().await?),
+        // It has asked nothing.
+        Err(ServerInitializeError::ConnectionClosed(_)) => {}
+        Err(error) => return Err(error.into()),
+    }
+    Ok(())
+}
+
+/// Waits for SIGINT or SIGTERM.
+///
+/// # Errors
+/// The operating system has no place for the signals.
+async fn asked_to_stop() -> Result<(), CommandError> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+    }
+    Ok(())
+}

@@ -1,0 +1,48 @@
+//! Words of a participant, as the protocol carries them: an expression with the label "say" and a
+//! data URL (RFC 2397). The page and the robots send and read the same.
+
+use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
+
+/// Label of an expression with words.
+pub(super) const SAY: &str = "say";
+/// What precedes the words.
+const PREFIX: &str = "data:,";
+/// Maximum bytes of `media` in the protocol.
+const MAX_MEDIA: usize = 256;
+
+/// The words in `media`; `None` if it refers to something else.
+pub(super) fn from_data_url(media: &str) -> Option<String> {
+    let words = percent_decode_str(media.strip_prefix(PREFIX)?);
+    Some(words.decode_utf8_lossy().into_owned())
+}
+
+/// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
+pub(super) fn to_data_url(words: &str) -> String {
+    let encoded = |words: &str| format!("{PREFIX}{}", utf8_percent_encode(words, NON_ALPHANUMERIC));
+    let mut media = encoded(words);
+    let mut cut = words.to_owned();
+    while media.len() > MAX_MEDIA {
+        cut.pop();
+        media = encoded(&format!("{}…", cut.trim_end()));
+    }
+    media
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_arrive_as_they_were_sent() {
+        for words in ["", "Good luck", "100 % più: forte?", "\"quoted\"\n"] {
+            assert_eq!(from_data_url(&to_data_url(words)).as_deref(), Some(words));
+        }
+        assert_eq!(to_data_url("a b"), "data:,a%20b");
+        let long = to_data_url(&"è ".repeat(99));
+        assert!(
+            long.len() <= MAX_MEDIA && long.ends_with("%E2%80%A6"),
+            "{long}"
+        );
+        assert_eq!(from_data_url("https://example.org/a.wav"), None);
+    }
+}
