@@ -34,6 +34,8 @@ const TABLES = [
   ["Ines", "Pepe", "Rosa", "greedy"],
   ["Karl", "Nino", "Vera", "random"],
 ];
+/** With these deals, Rosa's substitute reaches the final, which then waits for her. */
+const DEAL_SEED = new Uint8Array(32).fill(1);
 
 /** The line that says whom the game waits for, if that seat is away. */
 const AWAY_LINE = '[data-part~="awaited"][data-away]';
@@ -47,12 +49,19 @@ test("two people leave a knockout, substitutes play on, and nobody waits for mor
       name: "Evening cup",
       format: TournamentFormat.KNOCKOUT,
       rules: { preset: "paper", faces: 5, stop: { case: "targetShifts", value: 1 } },
-      policy: { decisionTimeMs: 3_600_000, bankMs: BANK_MS, absenceTimeMs: ABSENCE_MS, paceMs: 0, spectators: true },
+      policy: {
+        decisionTimeMs: 3_600_000,
+        bankMs: BANK_MS,
+        absenceTimeMs: ABSENCE_MS,
+        paceMs: 0,
+        substitute: "greedy",
+        spectators: true,
+      },
       builtInAgents: AGENTS,
       noShowTimeMs: NO_SHOW_MS,
       maxCalls: 1,
       drawSeed: DRAW_SEED,
-      dealSeed: new Uint8Array(32).fill(7),
+      dealSeed: DEAL_SEED,
     },
   });
   const tournamentId = tournament?.tournamentId ?? "";
@@ -111,8 +120,8 @@ test("two people leave a knockout, substitutes play on, and nobody waits for mor
 
   // Every game counted once, and the others played on without those who left.
   const played = await games();
-  expect(played.map(({ round, state }) => [round, state])).toEqual(
-    [1, 1, 2].map((round) => [round, TournamentGameState.COUNTED]),
+  expect(played.map(({ round, state, calls }) => [round, state, calls])).toEqual(
+    [1, 1, 2].map((round) => [round, TournamentGameState.COUNTED, 1]),
   );
   const { standings } = await tournaments.getTournamentResults({ tournamentId });
   expect(standings.map((row) => row.games)).toEqual([2, 2, 2, 2, 1, 1, 1, 1]);
