@@ -21,7 +21,11 @@ use tokio::process::{Child, Command};
 const LONGEST_WORD: usize = 32;
 
 /// A room with one open seat, in which nobody has to hurry.
-pub(crate) async fn room(client: &Client, rules: v1::RuleSet) -> v1::CreateRoomResponse {
+pub(crate) async fn room(
+    client: &Client,
+    rules: v1::RuleSet,
+    visibility: v1::Visibility,
+) -> v1::CreateRoomResponse {
     use v1::seat_config::FilledBy::{BuiltInAgent, ReservedFor};
     let open = ReservedFor(v1::ParticipantKind::Unspecified.into());
     let agents = ["greedy", "random", "greedy"].map(|kind| BuiltInAgent(kind.into()));
@@ -32,6 +36,7 @@ pub(crate) async fn room(client: &Client, rules: v1::RuleSet) -> v1::CreateRoomR
         policy: Some(v1::RoomPolicy {
             decision_time_ms: Some(3_600_000),
             pace_ms: Some(0),
+            visibility: visibility.into(),
             ..v1::RoomPolicy::default()
         }),
         seats: seats
@@ -257,7 +262,7 @@ async fn a_scripted_client_plays_whole_games_with_and_without_a_handshake() {
         },
     ];
     for lifecycle in lifecycles {
-        let made = room(&client, v1::RuleSet::default()).await;
+        let made = room(&client, v1::RuleSet::default(), v1::Visibility::Public).await;
         let child = program(&server, &["--code", &made.join_code], None);
         let mut player = Player::start(child, lifecycle).await;
         let game_id = plays_a_game(&mut player).await;

@@ -18,6 +18,9 @@ use tokio::process::{Child, Command};
 /// The current revision of the protocol.
 const REVISION: &str = "2026-07-28";
 
+/// Headers of a request, beside those that the protocol asks for.
+type Headers<'a> = &'a [(&'a str, &'a str)];
+
 /// The program serving HTTP.
 struct Listening {
     url: String,
@@ -45,12 +48,7 @@ impl Listening {
 
     /// Sends a request of the current revision, which needs no session; returns its status and the
     /// message of the answer.
-    async fn post(
-        &self,
-        headers: &[(&str, &str)],
-        method: &str,
-        params: Value,
-    ) -> (StatusCode, Value) {
+    async fn post(&self, headers: Headers<'_>, method: &str, params: Value) -> (StatusCode, Value) {
         let mut params = params;
         params["_meta"] = json!({
             "io.modelcontextprotocol/protocolVersion": REVISION,
@@ -115,7 +113,7 @@ async fn pages_and_foreign_names_are_refused() {
     let with_exceptions = Listening::start(&server, &excepted).await;
     let foreign = ("host", "games.example");
     let page = ("origin", "https://games.example");
-    let table: [(&[(&str, &str)], bool, bool); 6] = [
+    let table: [(Headers<'_>, bool, bool); 6] = [
         (&[], true, true),
         (&[("host", "localhost")], true, true),
         (&[foreign], false, true),

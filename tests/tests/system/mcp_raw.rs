@@ -130,7 +130,7 @@ async fn clients_of_all_revisions_are_understood() {
 async fn a_resumed_seat_is_played_and_its_ticket_is_never_shown() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let made = room(&client, one_shift()).await;
+    let made = room(&client, one_shift(), v1::Visibility::Private).await;
     let joined = client
         .join_with_code(made.join_code, "Ada")
         .await
@@ -184,11 +184,15 @@ async fn a_resumed_seat_is_played_and_its_ticket_is_never_shown() {
     }
     raw.call("resources/read", json!({"uri": record_of(&text)}))
         .await;
-    raw.call(
-        "resources/read",
-        json!({"uri": format!("{}.jsonl", record_of(&text))}),
-    )
-    .await;
+    // The record of a private game is for those who had a seat.
+    for (uri, part) in [
+        (record_of(&text).to_owned(), "Game over: "),
+        (format!("{}.jsonl", record_of(&text)), "\"reveal\":"),
+    ] {
+        let read = raw.call("resources/read", json!({"uri": uri})).await;
+        let record = read["result"]["contents"][0]["text"].as_str();
+        assert!(record.is_some_and(|it| it.contains(part)), "{uri}: {read}");
+    }
     let (left, _) = raw.tool("leave", json!({})).await;
     assert_eq!(left, "You have left the table.");
     let (none, error) = raw.tool("get_table", json!({})).await;

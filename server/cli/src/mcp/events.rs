@@ -3,8 +3,7 @@
 
 use chefshat_client::v1::{self, game_event::Kind};
 
-use super::live::Told;
-use super::text::{cards, hand, name, subject};
+use super::cards::{cards, hand, name, subject};
 use super::words;
 use crate::narration::hand::Hand;
 use crate::narration::story;
@@ -16,6 +15,13 @@ use crate::numbers::{counted, ordinal};
 const MAX_SAID: usize = 100;
 /// Maximum columns of the label of an expression.
 const MAX_LABEL: usize = 40;
+
+/// An event in words.
+#[derive(Debug)]
+pub(super) struct Told {
+    pub(super) sequence: u64,
+    pub(super) words: String,
+}
 
 /// Applies an event and returns it in words for a reader at seat `me`.
 pub(super) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> String {

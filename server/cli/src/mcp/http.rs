@@ -11,8 +11,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 use super::server::{Server, Settings};
-use super::{asked_to_stop, say};
-use crate::CommandError;
+use crate::{CommandError, say};
 
 /// Path of the endpoint.
 const PATH: &str = "/mcp";
@@ -27,7 +26,7 @@ pub(super) struct Checks {
     pub(super) origins: Vec<String>,
 }
 
-/// Serves until the program is asked to stop.
+/// Serves until `asked_to_stop` is ready.
 ///
 /// # Errors
 /// The address cannot be used.
@@ -35,6 +34,7 @@ pub(super) async fn serve(
     address: SocketAddr,
     checks: Checks,
     settings: Arc<Settings>,
+    asked_to_stop: impl Future<Output = Result<(), CommandError>> + Send + 'static,
 ) -> Result<(), CommandError> {
     let listener = (TcpListener::bind(address).await)
         .map_err(|error| format!("--listen {address}: {error}"))?;
@@ -61,7 +61,7 @@ pub(super) async fn serve(
     let router = Router::new().route_service(PATH, service);
     say(format_args!("listening on http://{address}{PATH}"))?;
     let stopped = async move {
-        if let Err(error) = asked_to_stop().await {
+        if let Err(error) = asked_to_stop.await {
             tracing::error!("signals cannot be received: {error}");
         }
         stop.cancel();

@@ -4,17 +4,10 @@
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::ActionSpace;
 
-use super::events;
+use super::events::{self, Told};
 use crate::narration::awaited::AwaitedSeat;
 use crate::narration::hand::Hand;
 use crate::narration::view::GameView;
-
-/// An event in words.
-#[derive(Debug)]
-pub(super) struct Told {
-    pub(super) sequence: u64,
-    pub(super) words: String,
-}
 
 /// An open decision.
 #[derive(Debug)]

@@ -1,5 +1,6 @@
 //! `chefshat mcp`: a Model Context Protocol server, by which language models take seats.
 
+mod cards;
 mod events;
 mod http;
 mod live;
@@ -24,8 +25,8 @@ use rmcp::ServiceExt as _;
 use rmcp::service::ServerInitializeError;
 use tokio::signal::unix::{SignalKind, signal};
 
+use super::CommandError;
 use super::connect::ServerArg;
-use super::{CommandError, say};
 use seats::{Handles, Seats};
 use server::{Server, Settings};
 
@@ -93,7 +94,7 @@ impl Mcp {
                     hosts: self.allow_host,
                     origins: self.allow_origin,
                 };
-                http::serve(address, checks, settings.clone()).await?;
+                http::serve(address, checks, settings.clone(), asked_to_stop()).await?;
             }
         }
         settings.seats.leave_all().await;

@@ -5,8 +5,7 @@ use chefshat_client::v1::{self, record_line::Line};
 use rmcp::ErrorData;
 use rmcp::model::{ReadResourceResult, Resource, ResourceContents, ResourceTemplate};
 
-use super::events;
-use super::live::Told;
+use super::events::{self, Told};
 use super::seat::REASON;
 use super::seats::Seats;
 use crate::CommandError;

@@ -10,6 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
 
+use super::cards;
 use super::live::Live;
 use super::text;
 use crate::narration::view::GameView;
@@ -168,7 +169,7 @@ impl Seat {
         };
         let words = self.read(|live| {
             let special = live.open.as_ref().map(|open| open.request.special_action());
-            text::action(live.space(), action, special.unwrap_or_default())
+            cards::action(live.space(), action, special.unwrap_or_default())
         });
         let result = (self.client.answer(&*self.ticket, answer).await)
             .map_err(|error| error.message().to_owned())?;
@@ -194,7 +195,7 @@ impl Seat {
         if result.invalid_attempts_left == Some(0) {
             self.live.send_modify(|live| live.close(result.decision_id));
             return format!(
-                "Illegal: {} ({words}): {} No attempts are left, so the server has decided for you. Call wait_for_turn.",
+                "Illegal: {} ({words}): {}. No attempts are left, so the server has decided for you. Call wait_for_turn.",
                 result.action, result.detail
             );
         }
@@ -204,9 +205,9 @@ impl Seat {
         };
         self.read(|live| {
             let request = live.open.as_ref().map(|open| &open.request);
-            let legal = request.map_or_else(String::new, |it| text::options(live.space(), it));
+            let legal = request.map_or_else(String::new, |it| cards::options(live.space(), it));
             let (action, detail) = (result.action, &result.detail);
-            format!("Illegal: {action} ({words}): {detail}{left}\noptions\n{legal}")
+            format!("Illegal: {action} ({words}): {detail}.{left}\noptions\n{legal}")
         })
     }
 

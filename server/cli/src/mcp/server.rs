@@ -82,7 +82,7 @@ impl Server {
             ..v1::ListRoomsRequest::default()
         };
         let page = client.list_rooms(request).await.map_err(in_words)?;
-        let lines: Vec<String> = page.rooms.iter().map(room).collect();
+        let lines: Vec<String> = page.rooms.iter().filter_map(room).collect();
         match lines.is_empty() {
             true => Ok("No rooms.".to_owned()),
             false => Ok(lines.join("\n")),
@@ -257,8 +257,8 @@ async fn with<A: DeserializeOwned>(
     call(arguments.map_err(|error| format!("The arguments do not fit: {error}."))?).await
 }
 
-/// A room in a line.
-fn room(room: &v1::Room) -> String {
+/// A room in a line; `None` if its game is over.
+fn room(room: &v1::Room) -> Option<String> {
     let free = room
         .seats
         .iter()
@@ -267,7 +267,7 @@ fn room(room: &v1::Room) -> String {
     let state = match room.state() {
         v1::RoomState::Waiting => "waiting",
         v1::RoomState::Playing => "playing",
-        _ => "over",
+        _ => return None,
     };
     let name = match room.name.as_str() {
         "" => "unnamed".to_owned(),
@@ -278,10 +278,10 @@ fn room(room: &v1::Room) -> String {
         .as_ref()
         .and_then(|policy| policy.decision_time_ms);
     let time = time.map_or_else(String::new, |ms| format!(", {} s a decision", ms / 1000));
-    format!(
-        "{name}: {state}, {free} of {} seats free{time}",
-        room.seats.len()
-    )
+    let seats = room.seats.len();
+    Some(format!(
+        "{name}: {state}, {free} of {seats} seats free{time}"
+    ))
 }
 
 /// An error for the model. That of the SDK ends with the name of its reason, which helps programs.
