@@ -27,7 +27,10 @@ SERVING = "start a server"
 _NAME = "chefshat.exe" if os.name == "nt" else "chefshat"
 
 
-def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a running server; or install chefshat-native, with which environments need none") -> Path:
+def find_binary(
+    purpose: str = SERVING,
+    instead: str = "; or give the address of a running server; or install chefshat-native, with which environments need none",
+) -> Path:
     """Finds the program: `CHEFSHAT_BIN`, the package chefshat-server, `chefshat` on the PATH, or the repository's latest build.
 
     The repository is the one that contains this package, else the one that contains the working directory.
