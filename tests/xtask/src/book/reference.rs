@@ -368,10 +368,7 @@ fn cell(text: &str) -> String {
 }
 
 fn first_sentence(text: &str) -> &str {
-    let end = [". ", ".\n", ": "]
-        .iter()
-        .filter_map(|end| text.find(end))
-        .min();
+    let end = [". ", ".\n"].iter().filter_map(|end| text.find(end)).min();
     end.map_or(text, |end| &text[..end + 1])
 }
 
