@@ -1,7 +1,7 @@
 // A person's picks, for the open decision or before it for the next turn, and what becomes of them.
 // Clicks on cards and buttons (Hand.tsx, ActionBar.tsx) and the keys of the table end here.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import { announce } from "../../parts/Announcer";
@@ -130,7 +130,8 @@ export function useDeciding(use: DecidingUse): Deciding {
   // Cards picked before the turn stay picked, if they can be played in the same pizza.
   const wish = useRef<{ readonly move: Move | undefined; readonly pizza: string } | undefined>(undefined);
   if (planning) wish.current = { move: holds ? plan.move : move, pizza };
-  useEffect(() => {
+  // Before the browser handles a key: a card that is picked at once stays picked.
+  useLayoutEffect(() => {
     setRemark("");
     const wanted = wish.current?.pizza === pizza ? wish.current.move : undefined;
     wish.current = undefined;
