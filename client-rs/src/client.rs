@@ -318,15 +318,25 @@ impl Client {
             ..v1::AskHint::default()
         };
         identify(&mut ask.request_id);
+        let response = self.act(ticket.into(), Command::Hint(ask)).await?;
+        Ok(response.hint.unwrap_or_default())
+    }
+
+    /// Sends a command for one seat, again if its response is lost.
+    pub(crate) async fn act(
+        &self,
+        ticket: String,
+        command: Command,
+    ) -> Result<v1::ActResponse, Error> {
         let request = v1::ActRequest {
-            ticket: ticket.into(),
-            command: Some(Command::Hint(ask)),
+            ticket,
+            command: Some(command),
         };
-        let response = repeated(|| {
+        repeated(|| {
             let (channel, request) = (self.channel(), request.clone());
             async move { PlayServiceClient::new(channel).act(request).await }
-        });
-        Ok(response.await?.hint.unwrap_or_default())
+        })
+        .await
     }
 
     /// Watches a room from an event number on; 0 and 1 are the first event. Connects when the first

@@ -12,7 +12,6 @@ use crate::client::Client;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::{Error, PlayError, may_retry};
 use crate::options::Entropy;
-use crate::repeat::repeated;
 use crate::v1::act_request::Command;
 use crate::v1::game_event::Kind;
 use crate::v1::play_service_client::PlayServiceClient;
@@ -60,19 +59,6 @@ impl Client {
     pub async fn resume_seat(&self, ticket: impl Into<String>) -> Result<(), Error> {
         let resume = Command::Resume(v1::ResumeSeat {});
         self.act(ticket.into(), resume).await.map(drop)
-    }
-
-    async fn act(&self, ticket: String, command: Command) -> Result<v1::ActResponse, Error> {
-        let request = v1::ActRequest {
-            ticket,
-            command: Some(command),
-        };
-        let service = PlayServiceClient::new(self.channel());
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.act(request).await }
-        })
-        .await
     }
 }
 

@@ -139,12 +139,7 @@ pub(super) fn resolve(file: &str, target: &str) -> Option<String> {
 
 /// Checks the relative links of all Markdown files of the source tree, with their anchors.
 pub(super) fn of_documents(root: &Path) -> Result<(), Failure> {
-    let mut texts = BTreeMap::new();
-    for file in files(root, "", ".md")? {
-        let path = root.join(&file);
-        let text = fs::read_to_string(&path).map_err(|error| at(&path, &error))?;
-        texts.insert(file, text);
-    }
+    let texts = texts(root, ".md", |_| true)?;
     let anchors: BTreeMap<&str, BTreeSet<String>> = texts
         .iter()
         .map(|(file, text)| (file.as_str(), anchors(text)))
@@ -177,8 +172,8 @@ pub(super) fn of_documents(root: &Path) -> Result<(), Failure> {
 
 /// Checks every link and address of a built site: the files and the anchors exist.
 pub(super) fn of_site(site: &Path) -> Result<(), Failure> {
-    let mut pages = BTreeMap::new();
-    collect(site, site, &mut pages).map_err(|error| at(site, &error))?;
+    // The page for unknown addresses is shown at any depth.
+    let pages = texts(site, ".html", |page| page != "404.html")?;
     let ids: BTreeMap<&str, BTreeSet<&str>> = pages
         .iter()
         .map(|(page, html)| (page.as_str(), attributes(html, "id").into_iter().collect()))
@@ -215,25 +210,21 @@ pub(super) fn of_site(site: &Path) -> Result<(), Failure> {
     report(broken, count)
 }
 
-/// Reads the HTML files of a folder and of those in it.
-fn collect(
-    site: &Path,
+/// The texts of the wanted files of a folder and of those in it whose names end like this.
+fn texts(
     folder: &Path,
-    pages: &mut BTreeMap<String, String>,
-) -> std::io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.is_dir() {
-            collect(site, &path, pages)?;
-        } else if path.extension().is_some_and(|ending| ending == "html") {
-            let name = path.strip_prefix(site).unwrap_or(&path);
-            // The page for unknown addresses is shown at any depth.
-            if name != Path::new("404.html") {
-                pages.insert(name.display().to_string(), fs::read_to_string(&path)?);
-            }
+    ending: &str,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<BTreeMap<String, String>, Failure> {
+    let mut texts = BTreeMap::new();
+    for file in files(folder, "", ending)? {
+        if is_wanted(&file) {
+            let path = folder.join(&file);
+            let text = fs::read_to_string(&path).map_err(|error| at(&path, &error))?;
+            texts.insert(file, text);
         }
     }
-    Ok(())
+    Ok(texts)
 }
 
 /// The values of an attribute of all elements of an HTML text.

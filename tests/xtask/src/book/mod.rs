@@ -69,6 +69,6 @@ fn gather(places: &Places, folder: &Path) -> Result<(), Failure> {
     reference::write(&image, &docs.join("reference"))?;
 
     let settings = fs::read_to_string(&settings).map_err(|error| at(&settings, &error))?;
-    let found = pages::names(&docs)?;
+    let found = files::files(&docs, "", ".md")?.into_iter().collect();
     pages::check_order(&settings, &found)
 }

@@ -104,25 +104,6 @@ fn in_book(root: &Path, file: &str, target: &str) -> Result<String, String> {
     Ok(format!("{REPOSITORY}/{kind}/main/{path}{anchor}"))
 }
 
-/// The pages in a folder and in those in it, by their names in the book.
-pub(super) fn names(book: &Path) -> Result<BTreeSet<String>, Failure> {
-    fn visit(folder: &Path, before: &str, names: &mut BTreeSet<String>) -> std::io::Result<()> {
-        for entry in fs::read_dir(folder)? {
-            let entry = entry?;
-            let name = format!("{before}{}", entry.file_name().to_string_lossy());
-            if entry.file_type()?.is_dir() {
-                visit(&entry.path(), &format!("{name}/"), names)?;
-            } else if name.ends_with(".md") {
-                names.insert(name);
-            }
-        }
-        Ok(())
-    }
-    let mut names = BTreeSet::new();
-    visit(book, "", &mut names).map_err(|error| at(book, &error))?;
-    Ok(names)
-}
-
 /// Checks that the order of the pages names exactly the pages that there are.
 pub(super) fn check_order(settings: &str, found: &BTreeSet<String>) -> Result<(), Failure> {
     let quoted = settings.lines().filter(|line| !line.starts_with('#'));
