@@ -128,34 +128,48 @@ pub(crate) fn run(
             steps.skip("node --test", NO_NODE_PACKAGE);
         }
     }
-    steps.programs(tests)?;
+    // A failure stops only what depends on it, so that one run shows all of them.
+    let mut outcomes = vec![steps.programs(tests)];
     if wants(Part::Python) && has_python {
-        lint::python(places, steps)?;
+        outcomes.push(lint::python(places, steps));
         if slow {
-            wheels::run(places, steps, "release", true)?;
+            outcomes.push(wheels::run(places, steps, "release", true));
         }
     }
     if wants(Part::Web) {
         if has_web {
-            web::test(places, steps)?;
-            web::check(places, steps)?;
+            outcomes.push(web::test(places, steps));
+            outcomes.push(web::check(places, steps));
         } else {
             steps.skip("vitest, browser tests, tsc, biome", NO_WEB_PACKAGE);
         }
     }
     if deployment {
-        steps.run("set up proxies and a browser", || {
-            setup::proxies().and_then(|()| setup::chromium())
-        })?;
-        if let Err(failure) = setup::images() {
-            steps.skip("images", &failure.to_string());
-        }
-        let (name, mut command) = pytest(places, DEPLOYMENT, &[]);
+        outcomes.push(test_deployment(places, steps, slow));
+    }
+    let failures: Vec<String> = outcomes
+        .into_iter()
+        .filter_map(|outcome| outcome.err().map(|failure| failure.to_string()))
+        .collect();
+    match failures.as_slice() {
+        [] => Ok(()),
+        failures => Err(Failure::new(failures.join("; "))),
+    }
+}
+
+/// The tests of docker/ and of what the documents tell to type.
+fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(), Failure> {
+    steps.run("set up proxies and a browser", || {
+        setup::proxies().and_then(|()| setup::chromium())
+    })?;
+    if let Err(failure) = setup::images() {
+        steps.skip("images", &failure.to_string());
+    }
+    let (name, mut command) = pytest(places, DEPLOYMENT, &[]);
+    steps.program(&name, &mut command)?;
+    if slow {
+        let (name, mut command) = pytest(places, DEPLOYMENT, &["-m", "slow"]);
         steps.program(&name, &mut command)?;
-        if slow {
-            let (name, mut command) = pytest(places, DEPLOYMENT, &["-m", "slow"]);
-            steps.program(&name, &mut command)?;
-        }
     }
     Ok(())
 }
