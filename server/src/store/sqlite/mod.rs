@@ -14,7 +14,6 @@ mod rows;
 pub(super) mod tests;
 mod writer;
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -33,6 +32,7 @@ pub(in crate::store) use contents::{
     Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
 };
 pub use errors::FILE as DATABASE_FILE;
+use open::FolderLock;
 pub use open::{LOCK_FILE, OpenError};
 
 use super::codec::Codec;
@@ -69,8 +69,7 @@ pub struct SqliteStore {
     writing: Mutex<Option<JoinHandle<()>>>,
     closed: Arc<AtomicBool>,
     metrics: StoreMetrics,
-    /// Locks the data directory for this process.
-    _lock: File,
+    _lock: FolderLock,
 }
 
 impl SqliteStore {

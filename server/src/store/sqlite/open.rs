@@ -84,8 +84,19 @@ pub enum OpenError {
 pub(super) struct Opened {
     pub(super) writer: SqliteConnection,
     pub(super) readers: SqlitePool,
-    /// Locked while it is open.
-    pub(super) lock: File,
+    pub(super) lock: FolderLock,
+}
+
+/// A data directory that this process has locked, until this is dropped or the process ends.
+pub(super) struct FolderLock(pub(super) File);
+
+impl Drop for FolderLock {
+    /// Unlocks it, rather than only closing the file: a process that another thread is just
+    /// starting has a copy of every descriptor until it runs its program.
+    fn drop(&mut self) {
+        // Closing the file is what is left to try.
+        let _ = self.0.unlock();
+    }
 }
 
 /// Lets the next VACUUM make a database that can give back the pages of deleted games.
@@ -221,8 +232,8 @@ fn migrations() -> Migrator {
     )
 }
 
-/// Locks the data directory for this process. The system unlocks it when the process ends.
-fn lock(data_dir: &Path) -> Result<File, OpenError> {
+/// Locks the data directory for this process.
+fn lock(data_dir: &Path) -> Result<FolderLock, OpenError> {
     let path = data_dir.join(LOCK_FILE);
     let io = |source| OpenError::Io {
         path: path.clone(),
@@ -236,7 +247,7 @@ fn lock(data_dir: &Path) -> Result<File, OpenError> {
         .open(&path)
         .map_err(io)?;
     match file.try_lock() {
-        Ok(()) => Ok(file),
+        Ok(()) => Ok(FolderLock(file)),
         Err(std::fs::TryLockError::WouldBlock) => Err(OpenError::InUse(data_dir.to_path_buf())),
         Err(std::fs::TryLockError::Error(error)) => Err(io(error)),
     }

@@ -132,6 +132,17 @@ async fn only_one_server_can_use_a_folder() {
 }
 
 #[tokio::test]
+async fn a_process_that_is_just_starting_does_not_keep_a_folder_locked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = opened(folder.path()).await;
+    let inherited = first._lock.0.try_clone().expect("a second descriptor");
+    first.close().await;
+    drop(first);
+    opened(folder.path()).await.close().await;
+    drop(inherited);
+}
+
+#[tokio::test]
 async fn the_copy_of_every_database_can_shrink() {
     let vacuum = async |folder: &Path, text: &'static str| -> i64 {
         let options = SqliteConnectOptions::new().filename(folder.join(super::super::errors::FILE));
