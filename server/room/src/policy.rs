@@ -61,7 +61,11 @@ impl KindClock {
 }
 
 /// The default absence time of people.
-const ABSENCE_TIME_OF_PEOPLE: Duration = Duration::from_secs(20);
+pub const ABSENCE_TIME_OF_PEOPLE: Duration = Duration::from_secs(20);
+
+/// The same in tournaments, where those at other tables wait too: two absences, one in each of two
+/// games, together hold nobody up for half a minute.
+pub const ABSENCE_TIME_IN_TOURNAMENTS: Duration = Duration::from_secs(12);
 
 /// Default pace of built-in agents and substitutes in a game with people.
 const PACE_WITH_PEOPLE: Duration = Duration::from_secs(1);
@@ -129,26 +133,27 @@ impl Policy {
         Some(time.min(self.decision_time_of(kind)))
     }
 
-    /// Sets the absence times that were not chosen: 20 seconds for people, the decision time for
+    /// Sets the absence times that were not chosen: this one for people, the decision time for
     /// others.
-    pub fn set_default_absence_times(&mut self) {
+    pub fn set_default_absence_times(&mut self, of_people: Duration) {
         if self.absence_time.is_some() {
             return;
         }
         self.absence_time = Some(self.decision_time);
         for clock in &mut self.clocks {
             let standard = match clock.kind {
-                ParticipantKind::Human => Some(ABSENCE_TIME_OF_PEOPLE),
+                ParticipantKind::Human => Some(of_people),
                 _ => clock.decision_time,
             };
             clock.absence_time = clock.absence_time.or(standard);
         }
         let has_people = |clock: &KindClock| clock.kind == ParticipantKind::Human;
-        if !self.clocks.iter().any(has_people) && self.decision_time > ABSENCE_TIME_OF_PEOPLE {
+        if !self.clocks.iter().any(has_people) && self.decision_time > of_people {
             self.clocks.push(KindClock {
+                kind: ParticipantKind::Human,
                 decision_time: None,
                 bank: None,
-                ..KindClock::PEOPLE
+                absence_time: Some(of_people),
             });
         }
     }

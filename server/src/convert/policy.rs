@@ -9,7 +9,9 @@ use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_sc
 use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
 use chefshat_room::journal::ParticipantKind;
-use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy, Visibility};
+use chefshat_room::policy::{
+    ABSENCE_TIME_OF_PEOPLE, AbortPolicy, Durability, KindClock, Policy, Visibility,
+};
 use chefshat_room::{Core, State};
 
 /// A day, the longest time in a policy, milliseconds.
@@ -21,7 +23,7 @@ const DAY_MS: u32 = 86_400_000;
 /// The first field that is out of its range.
 pub fn requested_policy(message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
     let mut policy = policy_from_proto(message)?;
-    policy.set_default_absence_times();
+    policy.set_default_absence_times(ABSENCE_TIME_OF_PEOPLE);
     Ok(policy)
 }
 

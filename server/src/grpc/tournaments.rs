@@ -47,6 +47,7 @@ use crate::tournaments::{
 };
 use chefshat_room::ids::{Id, RequestKey, Token, normal_code, random_bytes};
 use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
 
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;
@@ -243,7 +244,8 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
-        plan.policy.set_default_absence_times();
+        plan.policy
+            .set_default_absence_times(ABSENCE_TIME_IN_TOURNAMENTS);
         let reach = self.recorded.reach();
         reach.check_not_created_elsewhere(request_key, key).await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);

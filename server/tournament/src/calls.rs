@@ -7,8 +7,9 @@
 //! block it, it waits for the no-show time. That counts as a call, and the game is queued again
 //! behind the others. The last call starts it without the absentees. If a participant misses the
 //! last call itself, the game is called once more without it; other absentees are waited for as
-//! before. A game that all participants forfeit, or that is aborted on its last call, is voided.
-//! Those who have left forfeit without being waited for. While the tournament is paused, no game is
+//! before. The no-show time of somebody who left its last game to a substitute counts from when it
+//! went. A game that all participants forfeit, or that is aborted on its last call, is voided. Those
+//! who have left forfeit without being waited for. While the tournament is paused, no game is
 //! called, no wait counts, no round is drawn, and the tournament does not end.
 
 #[cfg(test)]

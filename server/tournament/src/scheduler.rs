@@ -45,9 +45,20 @@ pub(super) struct Scheduler {
     /// By participant that was present when its last game ended: when that was, in milliseconds;
     /// `None` until the next time is seen.
     free_since: BTreeMap<usize, Option<u64>>,
+    /// By participant that was present and is not any more.
+    gone: BTreeMap<usize, Gone>,
     /// Number of checks so far.
     #[cfg(test)]
     pub(super) checks: u64,
+}
+
+/// A participant that has gone.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gone {
+    /// Since when, in milliseconds; `None` until the next time is seen.
+    since: Option<u64>,
+    /// Whether a game has ended meanwhile in which a substitute played for it.
+    left_a_game: bool,
 }
 
 impl Scheduler {
@@ -67,10 +78,14 @@ impl Scheduler {
         present: bool,
     ) {
         self.seat(state);
-        self.present[participant] = present;
+        let was_present = std::mem::replace(&mut self.present[participant], present);
         if !present {
+            if was_present {
+                self.gone.insert(participant, Gone::default());
+            }
             return;
         }
+        self.gone.remove(&participant);
         for index in self.waits_by_participant[participant].clone() {
             let game = &state.games[index];
             self.to_check.insert((game.turn, index));
@@ -98,8 +113,17 @@ impl Scheduler {
                 self.free_since.retain(|who, _| !missing.contains(who));
                 self.on_game_change(state, *game);
             }
-            Change::Counted { game, .. } => {
+            Change::Counted { game, result } => {
                 self.note_free(state, *game);
+                for seat in result
+                    .seats
+                    .iter()
+                    .filter(|seat| seat.statistics.substituted)
+                {
+                    if let Some(gone) = self.gone.get_mut(&seat.participant) {
+                        gone.left_a_game = true;
+                    }
+                }
                 self.on_game_change(state, *game);
             }
             Change::Called { game, .. } => {
@@ -127,6 +151,7 @@ impl Scheduler {
     fn on_new_standing(&mut self, state: &TournamentState, participant: usize) {
         self.seat(state);
         self.free_since.remove(&participant);
+        self.gone.remove(&participant);
         let Some(present) = self.present.get_mut(participant) else {
             return;
         };
@@ -159,21 +184,28 @@ impl Scheduler {
         for since in self.free_since.values_mut() {
             since.get_or_insert(now_ms);
         }
+        for gone in self.gone.values_mut() {
+            gone.since.get_or_insert(now_ms);
+        }
     }
 
-    /// How long a game waits beyond the no-show time, from `since` on: as long as those it waits for
-    /// had to wait for it.
-    pub(super) fn patience(&self, state: &TournamentState, game: &Game, since: u64) -> u64 {
-        let awaited = game
-            .seats
-            .iter()
-            .filter(|&&who| !state.forfeits(game, who) && !self.is_present(state, who));
-        let waited = awaited.filter_map(|who| {
-            let free = *self.free_since.get(who)?;
-            Some(since.saturating_sub(free?))
-        });
-        let longest = waited.max().unwrap_or(0).min(MAX_PATIENCE_MS);
-        longest.saturating_sub(state.settings.no_show_ms)
+    /// From when on the no-show time of a game counts that now has to wait for absent participants.
+    /// Those who had to wait for it themselves are waited for as long as they did. Those who left a
+    /// game to a substitute have been waited for since they went.
+    pub(super) fn awaits_from(&self, state: &TournamentState, game: &Game, now_ms: u64) -> u64 {
+        let from = |who: &usize| match self.gone.get(who) {
+            Some(gone) if gone.left_a_game => gone.since.unwrap_or(now_ms),
+            _ => {
+                let free = self.free_since.get(who).copied().flatten();
+                let waited = now_ms - free.unwrap_or(now_ms).min(now_ms);
+                let patience = waited.min(MAX_PATIENCE_MS);
+                now_ms + patience.saturating_sub(state.settings.no_show_ms)
+            }
+        };
+        let seats = game.seats.iter();
+        let awaited =
+            seats.filter(|&&who| !state.forfeits(game, who) && !self.is_present(state, who));
+        awaited.map(from).max().unwrap_or(now_ms)
     }
 
     /// Handles a game that was called, queued again or ended: its participants may have gained or
@@ -282,10 +314,8 @@ impl Scheduler {
         let (_, index) = checked;
         let game = &state.games[index];
         let before = self.waits.get(&index).copied();
-        let since = match before {
-            Some(since) => since.max(self.open_since),
-            None => now_ms + self.patience(state, game, now_ms),
-        };
+        let since = before.unwrap_or_else(|| self.awaits_from(state, game, now_ms));
+        let since = since.max(self.open_since);
         if now_ms.saturating_sub(since) >= state.settings.no_show_ms {
             self.waits.insert(index, since);
             return true;

@@ -42,6 +42,7 @@ fn end_one(tournament: &mut Tournament, game: usize, ended: Ended) {
 fn played() -> Ended {
     let seats = (1..=4).map(|place| SeatStatistics {
         place,
+        substituted: place == 2,
         ..SeatStatistics::default()
     });
     Ended::Played {
@@ -70,6 +71,7 @@ fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
 struct Scan {
     waits: BTreeMap<usize, u64>,
     full: bool,
+    open_since: u64,
 }
 
 impl Scan {
@@ -92,6 +94,7 @@ impl Scan {
             return None;
         }
         if was_full {
+            self.open_since = now_ms;
             (self.waits.values_mut()).for_each(|since| *since = (*since).max(now_ms));
         }
         for &(_, index) in &state.due {
@@ -100,8 +103,9 @@ impl Scan {
                 Readiness::Busy(_) | Readiness::NoTable => drop(self.waits.remove(&index)),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
-                    let patience = scheduler.patience(state, game, now_ms);
-                    let since = *self.waits.entry(index).or_insert(now_ms + patience);
+                    let from = scheduler.awaits_from(state, game, now_ms);
+                    let from = from.max(self.open_since);
+                    let since = *self.waits.entry(index).or_insert(from);
                     if now_ms.saturating_sub(since) < settings.no_show_ms {
                         continue;
                     }

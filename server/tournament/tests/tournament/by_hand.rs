@@ -415,6 +415,36 @@ fn who_was_away_when_its_last_game_ended_is_not_waited_for_longer() {
 }
 
 #[test]
+fn who_left_a_game_to_a_substitute_is_waited_for_since_it_went() {
+    for (ended_at, waits_until) in [(400, 1_000), (90_000, 90_000)] {
+        let mut tournament = begun(settings(Format::Knockout), 8);
+        follow(&mut tournament, 0);
+        let finalist = *tournament.games()[0].seats.iter().min().unwrap();
+        tournament.set_present(finalist, false);
+        follow(&mut tournament, 0);
+        let Ended::Played { shifts, mut seats } = played_by_number(&tournament, 0) else {
+            unreachable!("it is played");
+        };
+        seats.iter_mut().for_each(|seat| seat.substituted = true);
+        end(&mut tournament, 0, Ended::Played { shifts, seats });
+        play(&mut tournament, 1);
+        let mut returned = tournament.clone();
+
+        let mut changes = follow(&mut tournament, ended_at);
+        if ended_at < waits_until {
+            assert_eq!(called(&changes), []);
+            assert_eq!(tournament.wake_at(), Some(waits_until));
+            changes = follow(&mut tournament, waits_until);
+        }
+        // Both calls are over.
+        assert_eq!(called(&changes), [(2, vec![finalist])]);
+
+        returned.set_present(finalist, true);
+        assert_eq!(called(&follow(&mut returned, ended_at)), [(2, vec![])]);
+    }
+}
+
+#[test]
 fn who_has_not_played_stands_behind_who_has() {
     let mut settings = settings(Format::Knockout);
     settings.max_calls = 1;

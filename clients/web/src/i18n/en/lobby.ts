@@ -200,7 +200,7 @@ export const lobby = {
       timeoutsHint: "After this many in a row, a substitute plays.",
       absence: "Absence, seconds",
       absenceHint:
-        "At each decision, the game waits this long for a seat that is not connected. Then a substitute plays until it returns. Empty: 20 for people, for others the time for a decision.",
+        "At each decision, the game waits this long for a seat that is not connected. Then a substitute plays until it returns. Empty: 20 for people (12 in tournaments), for others the time for a decision.",
       substitute: "Substitute",
       abort: "The game is aborted when",
       aborts: { allLost: "all participants are gone", anyLost: "one participant is gone", never: "never" },

@@ -201,7 +201,7 @@ export const lobby: Texts["lobby"] = {
       timeoutsHint: "Dopo questo numero di seguito gioca un sostituto.",
       absence: "Assenza, secondi",
       absenceHint:
-        "A ogni decisione la partita aspetta per questo tempo un posto non connesso. Poi gioca un sostituto finché torna. Vuoto: 20 per le persone, per gli altri il tempo di una decisione.",
+        "A ogni decisione la partita aspetta per questo tempo un posto non connesso. Poi gioca un sostituto finché torna. Vuoto: 20 per le persone (12 nei tornei), per gli altri il tempo di una decisione.",
       substitute: "Sostituto",
       abort: "La partita è interrotta quando",
       aborts: {
