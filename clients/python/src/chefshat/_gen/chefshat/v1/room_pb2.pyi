@@ -516,17 +516,18 @@ class RoomPolicy(_message.Message):
     absence_time_ms: _builtins.int
     """The absence time: milliseconds that the game waits, at each decision, for a seat that is not
     connected, 0..=86400000; never longer than its time for a decision. By default 20000 for
-    people, for others their decision time. When it is over, the server takes the default decision
-    (DISCONNECTED) and a substitute plays until the seat returns, or the game is aborted by
-    `abort`. It runs from the loss of the connection, or from the start of the decision if that is
-    later; several absences during one decision share it. Outside of tournaments it runs only
-    while another participant, who waits, is connected or sits at the table; otherwise the
-    decision ends when the seat's own time is over. If that ends before the absence time, the
-    decision counts as a timeout. An absence never uses the bank: if the seat returns in time,
-    only the time in which it was connected is taken from it. A special action ends as it would
-    with the seat connected, and substitutes nobody, since others could infer it. After a restart
-    of the server, see ServerRestarted. Unset in games of earlier servers: the decision time and
-    the bank run on while a seat is away, and max_timeouts alone decides when it is substituted.
+    people, in tournaments 12000; for others their decision time. When it is over, the server takes
+    the default decision (DISCONNECTED) and a substitute plays until the seat returns, or the game
+    is aborted by `abort`. It runs from the loss of the connection, or from the start of the
+    decision if that is later; several absences during one decision share it. Outside of
+    tournaments it runs only while another participant, who waits, is connected or sits at the
+    table; otherwise the decision ends when the seat's own time is over. If that ends before the
+    absence time, the decision counts as a timeout. An absence never uses the bank: if the seat
+    returns in time, only the time in which it was connected is taken from it. A special action
+    ends as it would with the seat connected, and substitutes nobody, since others could infer it.
+    After a restart of the server, see ServerRestarted. Unset in games of earlier servers: the
+    decision time and the bank run on while a seat is away, and max_timeouts alone decides when it
+    is substituted.
     """
     chat: _builtins.bool
     """Whether people may write to everybody at the table: an Expression with the label "say" and the
@@ -628,7 +629,8 @@ class KindClock(_message.Message):
     """Milliseconds of the time bank, 0..=86400000; unset: the room's."""
     absence_time_ms: _builtins.int
     """Milliseconds of the absence time, 0..=86400000; unset: the room's. If that is unset too, by
-    default 20000 for people and the decision time of their own clock for others.
+    default 20000 for people (12000 in tournaments), and the decision time of their own clock for
+    others.
     """
     def __init__(
         self,
