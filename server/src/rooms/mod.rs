@@ -33,7 +33,7 @@ use chefshat_room::ids::{Id, normal_code};
 use chefshat_room::journal::{GameHeader, TournamentGame};
 pub use creation::{Created, NewRoom, PartOf, Seating};
 pub use table::CreateError;
-use table::{Entry, Table};
+use table::{Entry, LockedTable, Table};
 
 /// How many join codes are tried for a room or tournament: another one of the cluster may have a code.
 pub(crate) const CODES_TRIED: u32 = 3;
@@ -402,10 +402,8 @@ impl Rooms {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Table> {
-        self.table
-            .lock()
-            .expect("no code that holds this lock can panic")
+    fn lock(&self) -> LockedTable<'_> {
+        LockedTable::new(&self.table)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The table of rooms, in the order of their creation, with look-up by id and join code.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use crate::limits::{Held, Refused};
 use crate::room::Handle;
@@ -42,6 +43,43 @@ pub(super) struct Table {
     /// Rooms that are being created, for which space is reserved, with their units.
     pub(super) in_creation: HashMap<Id, Id>,
     pub(super) shutting_down: bool,
+    /// Removed rooms, until the table is unlocked: the last handle of a room may end it, and a room
+    /// that ends looks into the table.
+    removed: Vec<Entry>,
+}
+
+/// The table while it is locked. What was removed meanwhile is dropped once it is unlocked.
+pub(super) struct LockedTable<'a>(Option<MutexGuard<'a, Table>>);
+
+impl<'a> LockedTable<'a> {
+    pub(super) fn new(table: &'a Mutex<Table>) -> Self {
+        let locked = table.lock();
+        Self(Some(
+            locked.expect("no code that holds this lock can panic"),
+        ))
+    }
+}
+
+impl Deref for LockedTable<'_> {
+    type Target = Table;
+
+    fn deref(&self) -> &Table {
+        self.0.as_ref().expect("locked until it is dropped")
+    }
+}
+
+impl DerefMut for LockedTable<'_> {
+    fn deref_mut(&mut self) -> &mut Table {
+        self.0.as_mut().expect("locked until it is dropped")
+    }
+}
+
+impl Drop for LockedTable<'_> {
+    fn drop(&mut self) {
+        let removed = std::mem::take(&mut self.removed);
+        drop(self.0.take());
+        drop(removed);
+    }
 }
 
 pub(super) struct Entry {
@@ -147,6 +185,7 @@ impl Table {
             if self.codes.get(&entry.header.join_code) == Some(&number) {
                 self.codes.remove(&entry.header.join_code);
             }
+            self.removed.push(entry);
         }
     }
 }

@@ -78,3 +78,27 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
     let found = rooms.by_code(&header.join_code).expect("it is open");
     assert_eq!(found.id(), open);
 }
+
+/// A room that ends looks into the table, so it must not end while the table is locked.
+#[test]
+fn a_room_may_end_with_the_handle_that_the_table_removes() {
+    let runtime = tokio::runtime::Runtime::new().expect("threads");
+    let (rooms, room) = runtime.block_on(async {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms = rooms.expect("threads");
+        let made = rooms.create(NewRoom::for_tests()).await.expect("a room");
+        let room = made.handle.id();
+        (rooms, room)
+    });
+    // Its task is gone; the table has the last handle.
+    drop(runtime);
+    assert!(rooms.header(room).is_some());
+    {
+        let mut table = rooms.lock();
+        let entries = table.by_number.values_mut();
+        entries.for_each(|entry| entry.over = true);
+        table.remove_over();
+    }
+    assert!(rooms.header(room).is_none());
+}
