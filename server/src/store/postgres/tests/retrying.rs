@@ -331,8 +331,11 @@ async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
     let (sent, is_sent) = oneshot::channel();
     let given_up = store.beats.read::<()>(move |connection| {
         async move {
-            let begun = connection.begin().now_or_never();
-            assert!(begun.is_none(), "an answer takes a moment");
+            // An answer usually takes a moment.
+            while let Some(begun) = connection.begin().now_or_never() {
+                let begun = begun.expect("the database answers");
+                begun.rollback().await.expect("the database answers");
+            }
             sent.send(()).expect("the test waits");
             pending().await
         }
