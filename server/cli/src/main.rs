@@ -23,6 +23,7 @@ mod import;
 mod key;
 mod kind;
 mod lan;
+mod language;
 mod leaderboard;
 mod listen;
 mod mcp;

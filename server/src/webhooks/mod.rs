@@ -3,7 +3,6 @@
 //! waits. `settings` says where they go, `post` sends a
 //! single request.
 
-mod post;
 mod settings;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +20,7 @@ use tokio::time::{Instant, sleep, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
-pub use post::{ANSWER_TIME, WebhookError};
+pub use crate::post::{ANSWER_TIME, WebhookError};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
 use crate::clock::since_epoch;

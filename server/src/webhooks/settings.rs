@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::post::{Target, WebhookError};
+use crate::post::{Target, WebhookError};
 
 /// Pause after the first attempt; it doubles with each further one.
 pub const FIRST_PAUSE: Duration = Duration::from_secs(1);

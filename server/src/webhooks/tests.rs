@@ -8,8 +8,8 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::routing::post;
 use tokio::net::TcpListener;
 
-use super::post::Target;
 use super::*;
+use crate::post::Target;
 
 const SECRET: &[u8] = b"a secret of the operator";
 /// How long a test waits for something that must happen.

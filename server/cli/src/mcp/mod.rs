@@ -1,19 +1,12 @@
 //! `chefshat mcp`: a Model Context Protocol server, by which language models take seats.
 
-mod cards;
-mod events;
 mod http;
-mod live;
 mod prompt;
 mod resources;
 mod seat;
 mod seats;
 mod server;
-#[cfg(test)]
-mod tests;
-mod text;
 mod tools;
-mod words;
 
 use std::fmt;
 use std::net::SocketAddr;

@@ -5,10 +5,10 @@ use chefshat_client::v1::{self, record_line::Line};
 use rmcp::ErrorData;
 use rmcp::model::{ReadResourceResult, Resource, ResourceContents, ResourceTemplate};
 
-use super::events::{self, Told};
 use super::seat::REASON;
 use super::seats::Seats;
 use crate::CommandError;
+use crate::language::events::{self, Told};
 use crate::narration::clean;
 use crate::narration::view::GameView;
 

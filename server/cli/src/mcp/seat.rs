@@ -10,9 +10,9 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
 
-use super::cards;
-use super::live::Live;
-use super::text;
+use crate::language::cards;
+use crate::language::live::Live;
+use crate::language::text;
 use crate::narration::view::GameView;
 
 /// Longest wait of a call. Clients give up on calls after about a minute.

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use chefshat_client::{Client, v1};
 use tokio::sync::OnceCell;
 
-use super::live::Live;
 use super::seat::Seat;
 use crate::CommandError;
 use crate::connect::ServerArg;
+use crate::language::live::Live;
 use crate::narration::view::GameView;
 
 /// Maximum number of seats at a time, those of games that are over included.

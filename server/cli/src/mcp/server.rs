@@ -19,7 +19,8 @@ use serde_json::Value;
 use super::seat::{LONGEST_WAIT, Seat};
 use super::seats::Seats;
 use super::tools::{self, AtTable, Express, Join, Play, Wait};
-use super::{prompt, resources, words};
+use super::{prompt, resources};
+use crate::language::words;
 use crate::narration::clean;
 
 /// What a model reads about the server as a whole.

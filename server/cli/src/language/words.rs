@@ -4,20 +4,20 @@
 use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 
 /// Label of an expression with words.
-pub(super) const SAY: &str = "say";
+pub(crate) const SAY: &str = "say";
 /// What precedes the words.
 const PREFIX: &str = "data:,";
 /// Maximum bytes of `media` in the protocol.
 const MAX_MEDIA: usize = 256;
 
 /// The words in `media`; `None` if it refers to something else.
-pub(super) fn from_data_url(media: &str) -> Option<String> {
+pub(crate) fn from_data_url(media: &str) -> Option<String> {
     let words = percent_decode_str(media.strip_prefix(PREFIX)?);
     Some(words.decode_utf8_lossy().into_owned())
 }
 
 /// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
-pub(super) fn to_data_url(words: &str) -> String {
+pub(crate) fn to_data_url(words: &str) -> String {
     let encoded = |words: &str| format!("{PREFIX}{}", utf8_percent_encode(words, NON_ALPHANUMERIC));
     let mut media = encoded(words);
     let mut cut = words.to_owned();

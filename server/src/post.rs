@@ -45,7 +45,7 @@ pub enum WebhookError {
 }
 
 /// A receiver of POST requests.
-pub(super) struct Target {
+pub(crate) struct Target {
     uri: Uri,
     host: String,
     port: u16,
@@ -61,7 +61,7 @@ impl std::fmt::Debug for Target {
 
 impl Target {
     /// Parses an address; `ca`: the file of the authorities to trust instead of the system's.
-    pub(super) fn new(url: &str, ca: Option<&Path>) -> Result<Self, WebhookError> {
+    pub(crate) fn new(url: &str, ca: Option<&Path>) -> Result<Self, WebhookError> {
         let wrong = || WebhookError::Address(url.to_owned());
         let uri: Uri = url.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|host| !host.is_empty());
@@ -93,7 +93,7 @@ impl Target {
     /// # Errors
     /// The receiver cannot be reached, does not answer in time, or answers with another status than
     /// 2xx.
-    pub(super) async fn post<const N: usize>(
+    pub(crate) async fn post<const N: usize>(
         &self,
         body: Bytes,
         headers: [(&'static str, String); N],

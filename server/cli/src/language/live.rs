@@ -11,15 +11,15 @@ use crate::narration::view::GameView;
 
 /// An open decision.
 #[derive(Debug)]
-pub(super) struct Open {
-    pub(super) request: v1::DecisionRequest,
+pub(crate) struct Open {
+    pub(crate) request: v1::DecisionRequest,
     /// When it arrived.
     since_ms: u64,
 }
 
 impl Open {
     /// Milliseconds left for the decision, and then in the time bank.
-    pub(super) fn left_ms(&self, now_ms: u64) -> (u64, u64) {
+    pub(crate) fn left_ms(&self, now_ms: u64) -> (u64, u64) {
         let gone = now_ms.saturating_sub(self.since_ms);
         let (time, bank) = (self.request.time_left_ms, self.request.bank_left_ms);
         let (time, bank) = (u64::from(time), u64::from(bank));
@@ -30,21 +30,21 @@ impl Open {
 
 /// A seat as its participant knows it.
 #[derive(Debug)]
-pub(super) struct Live {
-    pub(super) view: GameView,
-    pub(super) me: Option<u32>,
-    pub(super) told: Vec<Told>,
-    pub(super) open: Option<Open>,
-    pub(super) awaited: Option<AwaitedSeat>,
+pub(crate) struct Live {
+    pub(crate) view: GameView,
+    pub(crate) me: Option<u32>,
+    pub(crate) told: Vec<Told>,
+    pub(crate) open: Option<Open>,
+    pub(crate) awaited: Option<AwaitedSeat>,
     /// Cards that all seats have played in this Shift.
-    pub(super) played: Hand,
+    pub(crate) played: Hand,
     /// Why no more updates come although the game has not ended.
-    pub(super) lost: Option<String>,
+    pub(crate) lost: Option<String>,
 }
 
 impl Live {
     /// A seat of a room, before its first update.
-    pub(super) fn new(view: GameView, me: Option<u32>) -> Self {
+    pub(crate) fn new(view: GameView, me: Option<u32>) -> Self {
         Self {
             view,
             me,
@@ -57,12 +57,12 @@ impl Live {
     }
 
     /// Number of the last event; 0 before the first.
-    pub(super) fn sequence(&self) -> u64 {
+    pub(crate) fn sequence(&self) -> u64 {
         self.told.last().map_or(0, |told| told.sequence)
     }
 
     /// The numbering of actions.
-    pub(super) fn space(&self) -> ActionSpace {
+    pub(crate) fn space(&self) -> ActionSpace {
         let faces = u8::try_from(self.view.faces()).ok();
         faces
             .and_then(ActionSpace::new)
@@ -70,23 +70,23 @@ impl Live {
     }
 
     /// Whether the game has ended for this seat.
-    pub(super) fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.view.end.is_some() || self.lost.is_some()
     }
 
     /// Whether a substitute plays for this seat, until it says that it is back.
-    pub(super) fn is_substituted(&self) -> bool {
+    pub(crate) fn is_substituted(&self) -> bool {
         let me = self.me.and_then(|me| self.view.seat(me));
         !self.is_over() && me.is_some_and(|seat| seat.substituted)
     }
 
     /// Whether the participant has to act, or will never have to again.
-    pub(super) fn concerns_me(&self) -> bool {
+    pub(crate) fn concerns_me(&self) -> bool {
         self.open.is_some() || self.is_over()
     }
 
     /// Takes an update that arrived at `now_ms`.
-    pub(super) fn take(&mut self, update: Update, now_ms: u64) {
+    pub(crate) fn take(&mut self, update: Update, now_ms: u64) {
         match update {
             Update::Attached(attached) => {
                 self.me = Some(attached.seat);
@@ -111,12 +111,12 @@ impl Live {
     }
 
     /// Closes a decision that was answered, unless the next one is open already.
-    pub(super) fn close(&mut self, decision_id: u64) {
+    pub(crate) fn close(&mut self, decision_id: u64) {
         (self.open).take_if(|open| open.request.decision_id == decision_id);
     }
 
     /// Closes the open decision if it is this one or an earlier one.
-    pub(super) fn close_before(&mut self, decision_id: u64) {
+    pub(crate) fn close_before(&mut self, decision_id: u64) {
         (self.open).take_if(|open| open.request.decision_id <= decision_id);
     }
 

@@ -18,13 +18,13 @@ const MAX_LABEL: usize = 40;
 
 /// An event in words.
 #[derive(Debug)]
-pub(super) struct Told {
-    pub(super) sequence: u64,
-    pub(super) words: String,
+pub(crate) struct Told {
+    pub(crate) sequence: u64,
+    pub(crate) words: String,
 }
 
 /// Applies an event and returns it in words for a reader at seat `me`.
-pub(super) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> String {
+pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> String {
     let Some(kind) = &event.kind else {
         return String::new();
     };
@@ -130,7 +130,7 @@ fn standings(view: &GameView, me: Option<u32>, table: &[v1::Standing]) -> String
 }
 
 /// Events in one line for each Shift and each pizza.
-pub(super) fn history<'a>(told: impl IntoIterator<Item = &'a Told>) -> String {
+pub(crate) fn history<'a>(told: impl IntoIterator<Item = &'a Told>) -> String {
     let mut text = String::new();
     for Told { words, .. } in told.into_iter().filter(|it| !it.words.is_empty()) {
         if words.starts_with("Shift ") && !text.is_empty() {

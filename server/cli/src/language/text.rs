@@ -17,7 +17,7 @@ use crate::narration::view::{End, GameView};
 use crate::numbers::ordinal;
 
 /// What happened after an event, then the open decision, or whom the game waits for.
-pub(super) fn since(live: &Live, after: u64, now_ms: u64) -> String {
+pub(crate) fn since(live: &Live, after: u64, now_ms: u64) -> String {
     let mut text = format!("seq {}", live.sequence());
     let news = history(live.told.iter().filter(|it| it.sequence > after));
     if !news.is_empty() {
@@ -48,7 +48,7 @@ fn now(live: &Live, now_ms: u64) -> String {
 }
 
 /// Why no further decision comes; `None` while the game runs.
-pub(super) fn over(live: &Live) -> Option<String> {
+pub(crate) fn over(live: &Live) -> Option<String> {
     let lost = live
         .lost
         .as_deref()
@@ -185,7 +185,7 @@ fn left(live: &Live) -> String {
 }
 
 /// The whole table.
-pub(super) fn table(live: &Live, now_ms: u64) -> String {
+pub(crate) fn table(live: &Live, now_ms: u64) -> String {
     let view = &live.view;
     let mut lines = vec![format!("seq {}", live.sequence())];
     if view.started {
