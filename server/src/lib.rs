@@ -16,7 +16,7 @@ pub mod limits;
 pub mod metrics;
 pub mod outbox;
 pub mod participants;
-mod post;
+pub mod post;
 pub mod proxies;
 pub mod record_writer;
 pub mod retention;

@@ -1,4 +1,5 @@
-//! Sends one POST request over a connection of its own, with or without TLS.
+//! Sends JSON in one POST request over a connection of its own, with or without TLS: webhooks, and
+//! questions to language models.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -6,7 +7,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use http::{HeaderName, Request, StatusCode, Uri, header};
-use http_body_util::Full;
+use http_body_util::{BodyExt as _, Full, Limited};
 use hyper::client::conn::http1;
 use hyper_util::rt::TokioIo;
 use rustls::pki_types::pem::PemObject as _;
@@ -18,17 +19,14 @@ use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 use tokio_util::task::AbortOnDropHandle;
 
-/// How long a receiver may take to answer.
-pub const ANSWER_TIME: Duration = Duration::from_secs(10);
-
-/// Why webhooks cannot be sent.
+/// Why a request has no answer.
 #[derive(Debug, thiserror::Error)]
-pub enum WebhookError {
+pub enum PostError {
     /// The address is not one.
-    #[error("{0:?} is not an address for webhooks; an example is https://example.org/chefshat")]
+    #[error("{0:?} is not an address; an example is https://example.org/chefshat")]
     Address(String),
     /// The authorities cannot be read.
-    #[error("the certificate authorities for webhooks cannot be read: {0}")]
+    #[error("the certificate authorities cannot be read: {0}")]
     Authorities(String),
     /// The connection failed.
     #[error("{0}")]
@@ -36,16 +34,30 @@ pub enum WebhookError {
     /// The exchange failed.
     #[error("{0}")]
     Http(#[from] hyper::Error),
+    /// The answer has more bytes than this, or ends early.
+    #[error("the answer has more than {0} bytes, or ends early")]
+    Body(usize),
     /// The receiver answered with another status than 2xx.
-    #[error("the receiver answered {0}")]
-    Status(StatusCode),
+    #[error("the receiver answered {}", .0.status)]
+    Status(Answer),
     /// The receiver did not answer in time.
     #[error("no answer within {} s", .0.as_secs())]
     Timeout(Duration),
 }
 
+/// An answer.
+#[derive(Debug)]
+pub struct Answer {
+    /// Its status.
+    pub status: StatusCode,
+    /// When to try again, if the receiver says so in seconds.
+    pub retry_after: Option<Duration>,
+    /// Its body.
+    pub body: Bytes,
+}
+
 /// A receiver of POST requests.
-pub(crate) struct Target {
+pub struct Target {
     uri: Uri,
     host: String,
     port: u16,
@@ -60,9 +72,13 @@ impl std::fmt::Debug for Target {
 }
 
 impl Target {
-    /// Parses an address; `ca`: the file of the authorities to trust instead of the system's.
-    pub(crate) fn new(url: &str, ca: Option<&Path>) -> Result<Self, WebhookError> {
-        let wrong = || WebhookError::Address(url.to_owned());
+    /// Parses an address, http or https; `ca`: the file of the authorities to trust instead of the
+    /// system's.
+    ///
+    /// # Errors
+    /// The address or the file cannot be used.
+    pub fn new(url: &str, ca: Option<&Path>) -> Result<Self, PostError> {
+        let wrong = || PostError::Address(url.to_owned());
         let uri: Uri = url.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|host| !host.is_empty());
         let host = host.ok_or_else(wrong)?;
@@ -88,16 +104,22 @@ impl Target {
         })
     }
 
-    /// Posts a JSON body with further headers.
+    /// Posts a JSON body with further headers. The answer has at most `longest` bytes and arrives
+    /// within `time`.
     ///
     /// # Errors
-    /// The receiver cannot be reached, does not answer in time, or answers with another status than
-    /// 2xx.
-    pub(crate) async fn post<const N: usize>(
+    /// The receiver cannot be reached, does not answer in time, answers with another status than 2xx
+    /// or with a longer body.
+    ///
+    /// # Panics
+    /// A header has characters that headers cannot have.
+    pub async fn post<const N: usize>(
         &self,
-        body: Bytes,
+        body: impl Into<Bytes>,
         headers: [(&'static str, String); N],
-    ) -> Result<(), WebhookError> {
+        time: Duration,
+        longest: usize,
+    ) -> Result<Answer, PostError> {
         let path = self.uri.path_and_query().map_or("/", |path| path.as_str());
         let authority = self.uri.authority().map_or("", |it| it.as_str());
         // Without a user and password.
@@ -113,42 +135,57 @@ impl Target {
             request = request.header(HeaderName::from_static(name), value);
         }
         let request = request
-            .body(Full::new(body))
+            .body(Full::new(body.into()))
             .expect("the parts have been checked");
-        let answered = timeout(ANSWER_TIME, self.exchange(request)).await;
-        let status = answered.map_err(|_| WebhookError::Timeout(ANSWER_TIME))??;
-        match status.is_success() {
-            true => Ok(()),
-            false => Err(WebhookError::Status(status)),
+        let answered = timeout(time, self.exchange(request, longest)).await;
+        let answer = answered.map_err(|_| PostError::Timeout(time))??;
+        match answer.status.is_success() {
+            true => Ok(answer),
+            false => Err(PostError::Status(answer)),
         }
     }
 
-    async fn exchange(&self, request: Request<Full<Bytes>>) -> Result<StatusCode, WebhookError> {
+    async fn exchange(
+        &self,
+        request: Request<Full<Bytes>>,
+        longest: usize,
+    ) -> Result<Answer, PostError> {
         let stream = TcpStream::connect((self.host.as_str(), self.port)).await?;
         match &self.tls {
-            None => exchange_over(stream, request).await,
+            None => exchange_over(stream, request, longest).await,
             Some((connector, name)) => {
                 let stream = connector.connect(name.clone(), stream).await?;
-                exchange_over(stream, request).await
+                exchange_over(stream, request, longest).await
             }
         }
     }
 }
 
-/// The status of the answer to a request.
+/// The answer to a request.
 async fn exchange_over(
     stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
     request: Request<Full<Bytes>>,
-) -> Result<StatusCode, WebhookError> {
+    longest: usize,
+) -> Result<Answer, PostError> {
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
     let _running = AbortOnDropHandle::new(tokio::spawn(connection));
-    let response = sender.send_request(request).await?;
-    Ok(response.status())
+    let (head, body) = sender.send_request(request).await?.into_parts();
+    let retry_after = head.headers.get(header::RETRY_AFTER);
+    let retry_after = retry_after.and_then(|it| it.to_str().ok()?.trim().parse().ok());
+    let body = match Limited::new(body, longest).collect().await {
+        Ok(body) => body.to_bytes(),
+        Err(_) if head.status.is_success() => return Err(PostError::Body(longest)),
+        Err(_) => Bytes::new(),
+    };
+    Ok(Answer {
+        status: head.status,
+        retry_after: retry_after.map(Duration::from_secs),
+        body,
+    })
 }
 
-fn connector(ca: Option<&Path>) -> Result<TlsConnector, WebhookError> {
-    let unreadable =
-        |problem: &dyn std::fmt::Display| WebhookError::Authorities(problem.to_string());
+fn connector(ca: Option<&Path>) -> Result<TlsConnector, PostError> {
+    let unreadable = |problem: &dyn std::fmt::Display| PostError::Authorities(problem.to_string());
     let mut roots = RootCertStore::empty();
     match ca {
         Some(path) => {

@@ -1,4 +1,5 @@
-//! `chefshat agent`: plays as a built-in agent, or as the player of a record, through the Rust SDK.
+//! `chefshat agent`: plays as a built-in agent, as the player of a record, or as a language model,
+//! through the Rust SDK.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,23 +13,27 @@ use chefshat_record::jsonl;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
+use super::llm::{self, LanguageModel, LlmArgs};
 use super::remote::{MAX_PACE_MS, RemoteAgent, seed_for};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
 
-/// Play on a server as a built-in agent.
+/// Play on a server as a built-in agent or a language model.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat agent greedy --server http://127.0.0.1:50051 --code BCDF2345\n  \
                   chefshat agent random --code-file ./join-code --name Rolf --seed 7\n  \
+                  chefshat agent llm --endpoint http://127.0.0.1:8080/v1 --model qwen3 --code BCDF2345\n  \
                   chefshat agent replay --record 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --seat 2 --code BCDF2345\n\n\
                   replay imitates the player who had that seat in a recorded game: where it sees exactly what the player saw, it takes the \
                   same action, otherwise the action from the most similar situation (docs/branching.md).\n\n\
+                  llm lets a language model play, on any server with the usual chat API (docs/mcp.md).\n\n\
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
     /// The agent: random, random_unmasked, greedy, trained, monte_carlo (searches on all cores; with
-    /// a budget: monte_carlo:50ms), or replay (imitates the player of a record).
+    /// a budget: monte_carlo:50ms), replay (imitates the player of a record), or llm (a language
+    /// model).
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]
@@ -49,7 +54,7 @@ pub(super) struct AgentCommand {
         required_if_eq("agent", BuiltInAgent::REPLAY)
     )]
     seat: Option<u32>,
-    /// Display name. Default: the agent's.
+    /// Display name. Default: the agent's or model's.
     #[arg(long)]
     name: Option<String>,
     /// Kind of participant.
@@ -67,6 +72,8 @@ pub(super) struct AgentCommand {
     /// Print one JSON line per game.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    llm: LlmArgs,
 }
 
 /// The agent as named on the command line.
@@ -74,6 +81,13 @@ pub(super) struct AgentCommand {
 enum AgentArg {
     Named(NamedAgent),
     Replay,
+    Llm,
+}
+
+/// Who plays.
+enum Player {
+    BuiltIn(Box<RemoteAgent>),
+    Model(Box<LanguageModel>),
 }
 
 impl AgentArg {
@@ -82,6 +96,7 @@ impl AgentArg {
             Self::Named(NamedAgent::Kind(kind)) => kind.name(),
             Self::Named(NamedAgent::MonteCarlo(_)) => MonteCarlo::NAME,
             Self::Replay => BuiltInAgent::REPLAY,
+            Self::Llm => llm::NAME,
         }
     }
 }
@@ -91,18 +106,33 @@ impl AgentCommand {
         if self.games > 1 && !self.join_args.has_code_file() {
             return Err("a code or ticket is valid for one game; to play more --games, give a --code-file that gets new codes".into());
         }
-        let mut agent = self.remote_agent()?;
+        let mut player = self.player()?;
         let client = self.server.connect_patiently().await?;
         let mut last_code = None;
         let mut all_finished = true;
         for _ in 0..self.games {
             let ticket = self.ticket(&client, &mut last_code).await?;
-            let played = client.play(ticket, &mut agent).await;
+            let played = match &mut player {
+                Player::BuiltIn(agent) => client.play(ticket, agent.as_mut()).await,
+                Player::Model(model) => client.play(ticket, model.as_mut()).await,
+            };
             all_finished &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
+            let spent = match &player {
+                Player::BuiltIn(_) => None,
+                Player::Model(model) => Some(model.spent()),
+            };
             if self.json {
-                say(as_json(&played))?;
+                let mut line = as_json(&played);
+                if let Some(spent) = spent {
+                    line["tokens"] = spent.tokens.into();
+                    line["decisions"] = spent.decisions.into();
+                    line["fallbacks"] = spent.fallbacks.into();
+                }
+                say(line)?;
             } else {
-                say(in_words(&played))?;
+                let spent =
+                    spent.map_or_else(String::new, |spent| format!(", {}", spent.in_words()));
+                say(format!("{}{spent}", in_words(&played)))?;
             }
         }
         Ok(if all_finished {
@@ -110,6 +140,22 @@ impl AgentCommand {
         } else {
             ExitCode::FAILURE
         })
+    }
+
+    fn player(&self) -> Result<Player, CommandError> {
+        if let AgentArg::Llm = self.agent {
+            if self.record.is_some() || self.seat.is_some() {
+                return Err("--record and --seat are for the agent replay".into());
+            }
+            let seed = seed_for("chefshat agent llm", self.seed);
+            let pace = Duration::from_millis(self.pace_ms);
+            let model = self.llm.agent(seed, self.seed, pace)?;
+            return Ok(Player::Model(Box::new(model)));
+        }
+        if self.llm.names_a_model() {
+            return Err("--endpoint and --model are for the agent llm".into());
+        }
+        self.remote_agent().map(Box::new).map(Player::BuiltIn)
     }
 
     fn remote_agent(&self) -> Result<RemoteAgent, CommandError> {
@@ -124,7 +170,9 @@ impl AgentCommand {
                 let agent = BuiltInAgent::replay(player_of(record, seat)?);
                 Ok(RemoteAgent::new(agent, pace))
             }
-            (AgentArg::Replay, ..) => Err("replay needs --record and --seat".into()),
+            (AgentArg::Replay | AgentArg::Llm, ..) => {
+                Err("replay needs --record and --seat".into())
+            }
         }
     }
 
@@ -138,11 +186,15 @@ impl AgentCommand {
             Pass::Ticket(ticket) => return Ok(ticket),
             Pass::Code(code) => code,
         };
-        let name = self.name.as_deref().unwrap_or(self.agent.name());
+        let name = match (&self.name, self.agent) {
+            (Some(name), _) => name.clone(),
+            (None, AgentArg::Llm) => self.llm.display_name(),
+            (None, agent) => agent.name().to_owned(),
+        };
         let joined = client
             .join(v1::JoinRoomRequest {
                 join_code: code.clone(),
-                name: name.to_owned(),
+                name: name.clone(),
                 kind: v1::ParticipantKind::from(self.kind_of).into(),
                 ..v1::JoinRoomRequest::default()
             })
@@ -167,12 +219,19 @@ fn agent_arg(name: &str) -> Result<AgentArg, String> {
     if name == BuiltInAgent::REPLAY {
         return Ok(AgentArg::Replay);
     }
+    if name == llm::NAME {
+        return Ok(AgentArg::Llm);
+    }
     name.parse()
         .map(AgentArg::Named)
         .map_err(|error| match error {
             AgentNameError::Unknown(_) => {
                 let known = NamedAgent::NAMES.join(", ");
-                format!("use one of {known}, {}", BuiltInAgent::REPLAY)
+                format!(
+                    "use one of {known}, {}, {}",
+                    BuiltInAgent::REPLAY,
+                    llm::NAME
+                )
             }
             AgentNameError::MonteCarlo(error) => error.to_string(),
         })

@@ -26,6 +26,7 @@ mod lan;
 mod language;
 mod leaderboard;
 mod listen;
+mod llm;
 mod mcp;
 mod migrate;
 mod narration;

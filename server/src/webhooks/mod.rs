@@ -1,7 +1,7 @@
 //! Webhooks: what happens on the server, as signed POST requests to an address of the operator's.
 //! Events wait in a bounded queue and one task delivers them in order, so no room or tournament ever
-//! waits. `settings` says where they go, `post` sends a
-//! single request.
+//! waits. `settings` says where they go, `crate::post` sends
+//! a single request.
 
 mod settings;
 
@@ -20,13 +20,13 @@ use tokio::time::{Instant, sleep, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
-pub use crate::post::{ANSWER_TIME, WebhookError};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
 use crate::clock::since_epoch;
 use crate::convert::SERVER_VERSION;
 use crate::limits::LogPace;
 use crate::metrics::{Metrics, WebhookOutcome};
+use crate::post::PostError;
 
 /// Most events that wait for delivery. Further ones are dropped and counted.
 pub const MAX_WAITING: usize = 1_024;
@@ -36,6 +36,8 @@ pub const MAX_ATTEMPTS: u32 = 10;
 pub const MAX_PAUSE: Duration = Duration::from_secs(60);
 /// How long a server that stops delivers what still waits.
 const LAST_DELIVERIES: Duration = Duration::from_secs(4);
+/// How long a receiver may take to answer.
+pub const ANSWER_TIME: Duration = Duration::from_secs(10);
 /// Lines of the log about failures in a minute.
 const LINES_PER_MINUTE: u32 = 10;
 
@@ -217,14 +219,22 @@ impl Queue {
 }
 
 impl Delivery {
-    async fn send(&self, event: &Event) -> Result<(), WebhookError> {
+    async fn send(&self, event: &Event) -> Result<(), PostError> {
         let timestamp = since_epoch().as_secs();
         let signature = signature(&self.settings.secret, timestamp, &event.body);
         let headers = [
             ("chefshat-delivery", event.id.clone()),
             ("chefshat-signature", signature),
         ];
-        self.settings.target.post(event.body.clone(), headers).await
+        let target = &self.settings.target;
+        match target
+            .post(event.body.clone(), headers, ANSWER_TIME, 0)
+            .await
+        {
+            // Only the status matters.
+            Ok(_) | Err(PostError::Body(_)) => Ok(()),
+            Err(problem) => Err(problem),
+        }
     }
 }
 

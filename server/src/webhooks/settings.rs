@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::post::{Target, WebhookError};
+use crate::post::{PostError, Target};
 
 /// Pause after the first attempt; it doubles with each further one.
 pub const FIRST_PAUSE: Duration = Duration::from_secs(1);
@@ -32,7 +32,7 @@ impl WebhookSettings {
     ///
     /// # Errors
     /// The address or the file cannot be used.
-    pub fn new(url: &str, secret: &[u8], ca: Option<&Path>) -> Result<Self, WebhookError> {
+    pub fn new(url: &str, secret: &[u8], ca: Option<&Path>) -> Result<Self, PostError> {
         Ok(Self {
             target: Arc::new(Target::new(url, ca)?),
             secret: secret.into(),

@@ -178,11 +178,12 @@ async fn a_certificate_must_be_of_a_trusted_authority() {
     let url = format!("https://localhost:{port}/");
     let post = async |ca: &std::path::Path| {
         let target = Target::new(&url, Some(ca)).expect("an address");
-        target.post(Bytes::from_static(b"{}"), []).await
+        let body = Bytes::from_static(b"{}");
+        target.post(body, [], ANSWER_TIME, 1_000).await
     };
     post(&own).await.expect("received");
     let refused = post(&others).await.expect_err("not trusted");
-    assert!(matches!(refused, WebhookError::Io(_)), "{refused:?}");
+    assert!(matches!(refused, PostError::Io(_)), "{refused:?}");
     for wrong in [
         "",
         "example.org",
@@ -191,6 +192,6 @@ async fn a_certificate_must_be_of_a_trusted_authority() {
         "http:///x",
     ] {
         let refused = Target::new(wrong, Some(&own)).expect_err(wrong);
-        assert!(matches!(refused, WebhookError::Address(_)), "{wrong}");
+        assert!(matches!(refused, PostError::Address(_)), "{wrong}");
     }
 }

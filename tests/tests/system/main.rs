@@ -18,6 +18,7 @@ mod faults;
 mod instruments;
 mod languages;
 mod lists;
+mod llm;
 mod mcp;
 mod mcp_http;
 mod mcp_raw;

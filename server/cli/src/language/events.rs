@@ -21,21 +21,30 @@ const MAX_LABEL: usize = 40;
 pub(crate) struct Told {
     pub(crate) sequence: u64,
     pub(crate) words: String,
+    /// Whether a Shift begins with it.
+    pub(crate) begins_shift: bool,
 }
 
 /// Applies an event and returns it in words for a reader at seat `me`.
-pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> String {
-    let Some(kind) = &event.kind else {
-        return String::new();
+pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> Told {
+    let words = match &event.kind {
+        None => String::new(),
+        // The names come with the beginning of the game; other words need the state before the event.
+        Some(kind @ Kind::GameStarted(_)) => {
+            view.apply(event);
+            told(view, me, kind)
+        }
+        Some(kind) => {
+            let words = told(view, me, kind);
+            view.apply(event);
+            words
+        }
     };
-    // Most words need the state before the event; the names come with the beginning of the game.
-    if let Kind::GameStarted(_) = kind {
-        view.apply(event);
-        return told(view, me, kind);
+    Told {
+        sequence: event.sequence,
+        words,
+        begins_shift: matches!(event.kind, Some(Kind::ShiftStarted(_))),
     }
-    let words = told(view, me, kind);
-    view.apply(event);
-    words
 }
 
 /// An event in words, from the state before it.

@@ -124,16 +124,13 @@ impl Live {
         if self.is_decided_by(event) {
             self.open = None;
         }
-        let words = events::advance(&mut self.view, self.me, event);
+        let told = events::advance(&mut self.view, self.me, event);
         match &event.kind {
             Some(Kind::ShiftStarted(_)) => self.played = Hand::default(),
             Some(Kind::Play(play)) => self.put(play),
             _ => {}
         }
-        self.told.push(Told {
-            sequence: event.sequence,
-            words,
-        });
+        self.told.push(told);
     }
 
     fn put(&mut self, play: &v1::Play) {

@@ -1,4 +1,5 @@
-//! A table in words, for language models. docs/mcp.md describes the text form line by line.
+//! A table in words, for language models: what `chefshat mcp` answers and `chefshat agent llm` asks.
+//! docs/mcp.md describes the text form line by line.
 
 pub(crate) mod cards;
 pub(crate) mod events;
@@ -7,3 +8,23 @@ pub(crate) mod live;
 mod tests;
 pub(crate) mod text;
 pub(crate) mod words;
+
+/// Key of the annotation with the reason for a decision.
+pub(crate) const REASON: &str = "reason";
+/// Maximum bytes of a reason. Annotations of a decision have at most 4 KiB.
+const MAX_REASON_BYTES: usize = 3_500;
+
+/// The rules that a model needs at the table, in short. docs/rules.md has all of them.
+pub(crate) const RULES: &str = "\
+The rules in short: get rid of your cards first. A lower number is rarer and beats a higher one. A play is cards of one number; a joker (J) counts as one \
+more of them, and a joker alone is the weakest play. You must play a lower number than the board shows, and at least as many cards, or pass; a pass \
+counts until the pizza is done. When everybody else has passed, the board is cleared and whoever played last leads with anything. 11* is the Golden \
+card, which opens the Shift. Places give 5, 3, 1 and 0 points; the game ends after the Shift in which somebody has 15. Between Shifts, the last two give \
+their rarest cards to the first two, who give back any.";
+
+/// A reason as its annotation has it; `None` if it says nothing.
+pub(crate) fn reason(words: &str) -> Option<String> {
+    let words = words.trim();
+    let fits = &words[..words.floor_char_boundary(MAX_REASON_BYTES)];
+    (!fits.is_empty()).then(|| fits.to_owned())
+}

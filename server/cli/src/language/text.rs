@@ -184,10 +184,21 @@ fn left(live: &Live) -> String {
     format!("left {}", seats.collect::<Vec<_>>().join(", "))
 }
 
-/// The whole table.
+/// What happened in this Shift, then the whole table, for a reader who remembers nothing.
+pub(crate) fn decision(live: &Live, now_ms: u64) -> String {
+    let shift = live.told.iter().rposition(|told| told.begins_shift);
+    let news = history(live.told.iter().skip(shift.unwrap_or(0)));
+    format!("{news}\n{}", state(live, now_ms))
+}
+
+/// The number of the last event, then the whole table.
 pub(crate) fn table(live: &Live, now_ms: u64) -> String {
+    format!("seq {}\n{}", live.sequence(), state(live, now_ms))
+}
+
+fn state(live: &Live, now_ms: u64) -> String {
     let view = &live.view;
-    let mut lines = vec![format!("seq {}", live.sequence())];
+    let mut lines = Vec::new();
     if view.started {
         lines.push(format!("shift {} pizza {}", view.shift, view.pizza));
         let points = (0u32..).zip(&view.seats).map(|(seat, it)| {

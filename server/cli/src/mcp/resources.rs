@@ -5,10 +5,10 @@ use chefshat_client::v1::{self, record_line::Line};
 use rmcp::ErrorData;
 use rmcp::model::{ReadResourceResult, Resource, ResourceContents, ResourceTemplate};
 
-use super::seat::REASON;
 use super::seats::Seats;
 use crate::CommandError;
-use crate::language::events::{self, Told};
+use crate::language::REASON;
+use crate::language::events;
 use crate::narration::clean;
 use crate::narration::view::GameView;
 
@@ -169,12 +169,11 @@ fn in_text(lines: &[v1::RecordLine]) -> String {
                     .map(|it| clean(it, MAX_REASON));
             }
             Line::Event(event) => {
-                let mut words = events::advance(&mut view, None, event);
+                let mut event = events::advance(&mut view, None, event);
                 if let Some(reason) = reason.take() {
-                    words = format!("{words} ({reason})");
+                    event.words = format!("{} ({reason})", event.words);
                 }
-                let sequence = event.sequence;
-                told.push(Told { sequence, words });
+                told.push(event);
             }
             _ => {}
         }

@@ -10,19 +10,14 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
 
-use crate::language::cards;
 use crate::language::live::Live;
-use crate::language::text;
+use crate::language::{self, cards, text};
 use crate::narration::view::GameView;
 
 /// Longest wait of a call. Clients give up on calls after about a minute.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(25);
 /// How long a seat that has just been taken waits for the answer of the server.
 const ATTACH_TIMEOUT: Duration = Duration::from_secs(10);
-/// Maximum bytes of a reason. Annotations of a decision have at most 4 KiB.
-const MAX_REASON_BYTES: usize = 3_500;
-/// Key of the annotation with the reason for a decision.
-pub(super) const REASON: &str = "reason";
 
 /// A seat, followed until it is dropped.
 pub(super) struct Seat {
@@ -153,14 +148,10 @@ impl Seat {
             return Err(over);
         }
         let annotations = reason
-            .map(str::trim)
-            .filter(|it| !it.is_empty())
-            .map(|reason| {
-                let reason = reason[..reason.floor_char_boundary(MAX_REASON_BYTES)].to_owned();
-                v1::Annotations {
-                    extra: [(REASON.to_owned(), reason)].into(),
-                    ..v1::Annotations::default()
-                }
+            .and_then(language::reason)
+            .map(|reason| v1::Annotations {
+                extra: [(language::REASON.to_owned(), reason)].into(),
+                ..v1::Annotations::default()
             });
         let answer = v1::Answer {
             decision_id,

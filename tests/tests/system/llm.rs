@@ -1,0 +1,392 @@
+//! `chefshat agent llm` with a scripted endpoint, which may lie, stall, talk nonsense or cost more
+//! than there is: the game goes on without it.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bytes::Bytes;
+use chefshat_client::{count_in, nth_in, v1};
+use chefshat_proto::v1::seat_config::FilledBy;
+use chefshat_tests::{TestServer, one_shift, patiently, set_up};
+use http::{HeaderMap, Response, StatusCode};
+use http_body_util::{BodyExt as _, Full};
+use hyper_util::rt::TokioIo;
+use serde_json::{Value, json};
+use tokio::net::TcpListener;
+use tokio::process::Command;
+
+use crate::played::{EndedGame, built_in, until_over};
+
+/// The key of the endpoint.
+const KEY: &str = "sk-test-0123";
+/// The model's seat.
+const SEAT: u32 = 0;
+
+/// What an endpoint answers to the question with this number, from 0, with these messages.
+type Script = fn(usize, &[Value]) -> Said;
+
+/// An answer.
+enum Said {
+    /// A completion with this text that took so many tokens.
+    Text(String, u64),
+    /// A status and a body.
+    Other(StatusCode, Vec<u8>),
+    /// None, ever.
+    Nothing,
+}
+
+/// A question as it arrived.
+struct Asked {
+    headers: HeaderMap,
+    body: Value,
+}
+
+/// Serves a script. Returns the address and what arrives.
+async fn endpoint(script: Script) -> (String, Arc<Mutex<Vec<Asked>>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let port = listener.local_addr().expect("bound").port();
+    let asked: Arc<Mutex<Vec<Asked>>> = Arc::default();
+    let questions = asked.clone();
+    tokio::spawn(async move {
+        while let Ok((stream, _)) = listener.accept().await {
+            let questions = questions.clone();
+            let answer = move |request: http::Request<hyper::body::Incoming>| {
+                let questions = questions.clone();
+                async move {
+                    assert_eq!(request.uri().path(), "/v1/chat/completions");
+                    let (head, body) = request.into_parts();
+                    let body = body.collect().await?.to_bytes();
+                    let body: Value = serde_json::from_slice(&body).expect("JSON");
+                    let said = {
+                        let mut questions = questions.lock().expect("no panic");
+                        let messages = body["messages"].as_array().expect("messages");
+                        let said = script(questions.len(), messages);
+                        let headers = head.headers;
+                        questions.push(Asked { headers, body });
+                        said
+                    };
+                    let response = match said {
+                        Said::Text(text, tokens) => Response::new(Bytes::from(
+                            json!({
+                                "choices": [{"message": {"role": "assistant", "content": text}}],
+                                "usage": {"total_tokens": tokens},
+                            })
+                            .to_string(),
+                        )),
+                        Said::Other(status, body) => {
+                            let mut response = Response::new(Bytes::from(body));
+                            *response.status_mut() = status;
+                            response
+                                .headers_mut()
+                                .insert("retry-after", "0".parse().expect("a value"));
+                            response
+                        }
+                        Said::Nothing => std::future::pending().await,
+                    };
+                    Ok::<_, hyper::Error>(response.map(Full::new))
+                }
+            };
+            tokio::spawn(
+                hyper::server::conn::http1::Builder::new()
+                    .serve_connection(TokioIo::new(stream), hyper::service::service_fn(answer)),
+            );
+        }
+    });
+    (format!("http://127.0.0.1:{port}/v1"), asked)
+}
+
+/// The ids of the options in the last message.
+fn options(messages: &[Value]) -> Vec<u32> {
+    let last = messages.last().and_then(|it| it["content"].as_str());
+    let (_, options) = last
+        .and_then(|it| it.rsplit_once("options\n"))
+        .expect("options");
+    let ids = options
+        .lines()
+        .map(|line| line.split_once('=').expect("an option").0);
+    ids.map(|id| id.parse().expect("an id")).collect()
+}
+
+/// The first option, in the words of a model that explains itself.
+fn honest(_: usize, messages: &[Value]) -> Said {
+    let action = options(messages)[0];
+    let text = format!(
+        "<think>{{cards}}</think>\n```json\n{{\"action\": {action}, \"reason\": \"the first of them\"}}\n```"
+    );
+    Said::Text(text, 500)
+}
+
+/// A game of one Shift in which the model has the first seat.
+struct Played {
+    game: EndedGame,
+    /// What the program printed.
+    result: Value,
+    asked: Arc<Mutex<Vec<Asked>>>,
+}
+
+impl Played {
+    /// The model's decisions with more than one legal action, with their annotations.
+    fn choices(&self) -> Vec<(&v1::DecisionRecord, BTreeMap<&str, &str>)> {
+        let decisions = self.game.decisions().into_iter();
+        let own = decisions.filter(|it| it.seat == SEAT && count_in(&it.action_mask) > 1);
+        let annotated = own.map(|decision| {
+            let extra = decision.annotations.as_ref().map(|it| it.extra.iter());
+            let extra = extra.into_iter().flatten();
+            let extra = extra.map(|(key, words)| (key.as_str(), words.as_str()));
+            (decision, extra.collect())
+        });
+        annotated.collect()
+    }
+
+    /// Why the fallback decided, by decision; `None` where it did not.
+    fn fallbacks(&self) -> Vec<Option<String>> {
+        let choices = self.choices().into_iter();
+        let why = choices.map(|(_, said)| said.get("fallback").map(|&it| it.to_owned()));
+        why.collect()
+    }
+
+    fn questions(&self) -> usize {
+        self.asked.lock().expect("no panic").len()
+    }
+
+    /// Checks that the model's seat decided in time, and that the program counts as the record does.
+    fn check(&self) {
+        let fallbacks = self.fallbacks();
+        let fallen = fallbacks.iter().flatten().count();
+        assert_eq!(self.result["event"], "result", "{}", self.result);
+        assert_eq!(self.result["decisions"], fallbacks.len());
+        assert_eq!(self.result["fallbacks"], fallen);
+        for (decision, said) in self.choices() {
+            assert_eq!(decision.source(), v1::DecisionSource::Agent, "{said:?}");
+            assert_eq!(said["model"], "ada/test-1");
+        }
+    }
+}
+
+async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Played {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (url, asked) = endpoint(script).await;
+    let others = (0..3).map(|_| built_in("greedy"));
+    let open = v1::SeatConfig {
+        filled_by: Some(FilledBy::ReservedFor(v1::ParticipantKind::Agent.into())),
+        ..v1::SeatConfig::default()
+    };
+    let created = client.create_room(v1::CreateRoomRequest {
+        rules: Some(one_shift()),
+        policy: Some(v1::RoomPolicy {
+            decision_time_ms: Some(u32::try_from(decision_time.as_millis()).expect("short")),
+            max_invalid_attempts: Some(3),
+            ..v1::RoomPolicy::default()
+        }),
+        seats: std::iter::once(open).chain(others).collect(),
+        ..v1::CreateRoomRequest::default()
+    });
+    let created = created.await.expect("a room");
+    let mut command = Command::new(set_up("CHEFSHAT_BIN"));
+    command.args(["agent", "llm", "--server", &server.url(), "--json"]);
+    command.args(["--code", &created.join_code, "--seed", "7"]);
+    command
+        .args(["--endpoint", &url, "--model", "ada/test-1"])
+        .args(arguments);
+    command.env("CHEFSHAT_LLM_KEY", KEY).kill_on_drop(true);
+    let output = patiently("the game", command.output())
+        .await
+        .expect("it runs");
+    let problems = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{problems}");
+    assert!(!problems.contains(KEY), "{problems}");
+    let result = serde_json::from_slice(&output.stdout).expect("a line of JSON");
+    let room = created.room.expect("a room");
+    let game = until_over(&client, room.room_id).await;
+    assert_eq!(game.room.seats[0].name, "test-1");
+    let played = Played {
+        game,
+        result,
+        asked,
+    };
+    played.check();
+    played
+}
+
+/// Time enough for decisions on a busy machine.
+const AMPLE: Duration = Duration::from_secs(600);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_plays_and_its_reasons_are_recorded() {
+    let played = play(honest, AMPLE, &["--temperature", "0.5"]).await;
+    let choices = played.choices();
+    assert!(choices.len() > 3, "{}", choices.len());
+    assert_eq!(played.questions(), choices.len());
+    assert_eq!(played.result["tokens"], 500 * choices.len());
+    for (decision, said) in &choices {
+        let first = nth_in(&decision.action_mask, 0).map(|id| id.0);
+        assert_eq!(Some(decision.action), first);
+        assert_eq!(
+            (said["reason"], said["tokens"]),
+            ("the first of them", "500")
+        );
+        assert_eq!(said.get("fallback"), None);
+    }
+    for asked in played.asked.lock().expect("no panic").iter() {
+        assert_eq!(asked.headers["authorization"], format!("Bearer {KEY}"));
+        assert_eq!(asked.body["model"], "ada/test-1");
+        assert_eq!(asked.body["temperature"], 0.5);
+        assert_eq!(asked.body["seed"], 7);
+        let roles = asked.body["messages"].as_array().expect("messages").iter();
+        assert_eq!(
+            roles.map(|it| &it["role"]).collect::<Vec<_>>(),
+            ["system", "user"]
+        );
+        assert!(!asked.body.to_string().contains(KEY));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn illegal_answers_are_told_and_counted() {
+    let lies: Script = |number, messages| match messages {
+        [_, _] => Said::Text(r#"{"action": 77777, "reason": "trust me"}"#.to_owned(), 0),
+        [.., told] => {
+            let told = told["content"].as_str().expect("words");
+            assert!(told.starts_with("Illegal: 77777: "), "{told}");
+            honest(number, messages)
+        }
+        [] => unreachable!("there is a question"),
+    };
+    let played = play(lies, AMPLE, &[]).await;
+    let choices = played.choices();
+    for (decision, said) in &choices {
+        assert_eq!(decision.invalid_attempts, [77777]);
+        assert_eq!(said["reason"], "the first of them");
+    }
+    assert_eq!(played.questions(), 2 * choices.len());
+    // What it says about its tokens is not believed.
+    assert!(played.result["tokens"].as_u64() > Some(500 * choices.len() as u64));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn only_illegal_answers_end_with_the_fallback() {
+    let lies: Script = |_, _| Said::Text(r#"{"action": 77777}"#.to_owned(), 0);
+    let played = play(lies, AMPLE, &["--fallback", "random", "--retries", "9"]).await;
+    let choices = played.choices();
+    for (decision, said) in &choices {
+        assert!(said["fallback"].starts_with("random: "), "{said:?}");
+        // A third one would have left the decision to the server.
+        assert!(decision.invalid_attempts.len() <= 2, "{decision:?}");
+    }
+    assert!(!choices[0].0.invalid_attempts.is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn without_usable_answers_the_fallback_plays_and_soon_nobody_asks_any_more() {
+    let nonsense: Script = |_, _| Said::Text("I fold. {\"action\": \"fold\"}".to_owned(), 900);
+    let endless: Script = |_, _| Said::Other(StatusCode::OK, vec![b' '; 3 << 20]);
+    let forbidden: Script = |_, _| Said::Other(StatusCode::UNAUTHORIZED, b"no".to_vec());
+    let broken: Script = |_, _| Said::Other(StatusCode::OK, b"<html>".to_vec());
+    let cases: [(Script, usize, &str); 4] = [
+        (nonsense, 2, "no action in the answer"),
+        (endless, 2, "the answer has more than"),
+        // Asking again would be the same again.
+        (forbidden, 1, "the endpoint answered 401"),
+        (broken, 1, "the answer is not a chat completion"),
+    ];
+    for (script, attempts, why) in cases {
+        let played = play(script, AMPLE, &["--retries", "1"]).await;
+        let fallbacks = played.fallbacks();
+        assert!(fallbacks.len() > 3, "{}", fallbacks.len());
+        for (number, fallback) in fallbacks.iter().enumerate() {
+            let said = fallback.as_ref().expect("the fallback decides");
+            let expected = match number {
+                0..3 => why,
+                _ => "no usable answers before in this Shift",
+            };
+            assert!(said.starts_with(&format!("greedy: {expected}")), "{said}");
+        }
+        assert_eq!(played.questions(), 3 * attempts);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_busy_endpoint_is_asked_again() {
+    let busy: Script = |number, messages| match number % 2 {
+        0 => Said::Other(StatusCode::TOO_MANY_REQUESTS, Vec::new()),
+        _ => honest(number, messages),
+    };
+    let played = play(busy, AMPLE, &[]).await;
+    assert_eq!(played.fallbacks().iter().flatten().count(), 0);
+    assert_eq!(played.questions(), 2 * played.choices().len());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_does_not_answer_in_time_is_not_waited_for() {
+    let played = play(|_, _| Said::Nothing, Duration::from_secs(4), &[]).await;
+    let fallbacks = played.fallbacks();
+    assert!(fallbacks.iter().all(Option::is_some), "{fallbacks:?}");
+    assert!(played.questions() <= 9);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_budget_ends_and_the_game_goes_on() {
+    let played = play(honest, AMPLE, &["--budget", "1200"]).await;
+    let fallbacks = played.fallbacks();
+    assert_eq!(fallbacks[..3], [None, None, None]);
+    assert!(fallbacks.len() > 3, "{}", fallbacks.len());
+    for fallback in &fallbacks[3..] {
+        let expected = "greedy: the budget of 1200 tokens is spent";
+        assert_eq!(fallback.as_deref(), Some(expected));
+    }
+    assert_eq!(played.result["tokens"], 1500);
+}
+
+#[tokio::test]
+async fn what_cannot_be_asked_is_refused_before_a_seat_is_taken() {
+    let refused = async |arguments: &[&str], key: &str| {
+        let mut command = Command::new(set_up("CHEFSHAT_BIN"));
+        command
+            .args(["agent"])
+            .args(arguments)
+            .args(["--code", "BCDF2345"]);
+        command.env("CHEFSHAT_LLM_KEY", key).kill_on_drop(true);
+        let output = patiently("the program", command.output())
+            .await
+            .expect("it runs");
+        assert!(!output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let cases: [(&[&str], &str, &str); 5] = [
+        (&["llm"], "", "--endpoint <URL>"),
+        (
+            &["llm", "--endpoint", "here", "--model", "m"],
+            "",
+            "an example is http://127.0.0.1:8080/v1",
+        ),
+        (
+            &["llm", "--endpoint", "http://127.0.0.1:1", "--model", "m"],
+            "a\nb",
+            "a key has letters",
+        ),
+        (
+            &[
+                "llm",
+                "--endpoint",
+                "http://127.0.0.1:1",
+                "--model",
+                "m",
+                "--temperature",
+                "3",
+            ],
+            "",
+            "from 0 to 2",
+        ),
+        (
+            &["greedy", "--model", "m"],
+            "",
+            "--endpoint and --model are for the agent llm",
+        ),
+    ];
+    for (arguments, key, expected) in cases {
+        let said = refused(arguments, key).await;
+        assert!(said.contains(expected), "{arguments:?}: {said}");
+    }
+}
