@@ -164,7 +164,7 @@ impl StreamKind {
 pub struct Metrics {
     registry: Mutex<Registry>,
     rooms: [Gauge; 4],
-    seats: [Gauge; 3],
+    seats: [Gauge; 4],
     spectators: Gauge,
     streams: [Gauge; 5],
     connections: Gauge,
@@ -187,7 +187,7 @@ impl Default for Metrics {
         let mut registry = Registry::default();
         let all = registry.sub_registry_with_prefix(PREFIX);
         let rooms = ["waiting", "playing", "finished", "aborted"];
-        let kinds = ["agent", "human", "robot"];
+        let kinds = ["agent", "human", "robot", "model"];
         Self {
             rooms: labelled(all, "rooms", "Listed rooms", "state", rooms),
             seats: labelled(
@@ -311,6 +311,7 @@ impl Metrics {
             ParticipantKind::Agent => 0,
             ParticipantKind::Human => 1,
             ParticipantKind::Robot => 2,
+            ParticipantKind::Model => 3,
         };
         Counted::new(&self.seats[index])
     }

@@ -68,12 +68,14 @@ test("kinds, clocks and seeds are sent as picked and typed", () => {
     otherClocks: true,
     agentSeconds: "0,5",
     robotSeconds: "20",
+    modelSeconds: "90",
     drawSeed: `0a${"ff".repeat(31)}`,
   });
-  expect(settings.kinds).toEqual([ParticipantKind.HUMAN, ParticipantKind.AGENT]);
+  expect(settings.kinds).toEqual([ParticipantKind.HUMAN, ParticipantKind.AGENT, ParticipantKind.MODEL]);
   expect(settings.policy?.clocks.map(({ kind, decisionTimeMs, bankMs }) => [kind, decisionTimeMs, bankMs])).toEqual([
     [ParticipantKind.AGENT, 500, 0],
     [ParticipantKind.ROBOT, 20_000, 0],
+    [ParticipantKind.MODEL, 90_000, 0],
   ]);
   expect([settings.drawSeed.length, settings.drawSeed[0], settings.drawSeed[1], settings.dealSeed.length]).toEqual([
     32, 10, 255, 0,
@@ -115,7 +117,7 @@ test.each<[Partial<TournamentForm>, object]>([
     { rounds: { bounds: [1, 1000] }, maxCalls: "notWhole" },
   ],
   [{ builtIn: { greedy: "1000", random: "100" } }, { builtIn: "tooMany" }],
-  [{ people: false, agents: false, robots: false }, { people: "nobody" }],
+  [{ people: false, agents: false, robots: false, models: false }, { people: "nobody" }],
   [{ drawSeed: "abc" }, { drawSeed: "notASeed" }],
 ])("of %j is wrong: %j", (changed, problems) => {
   expect(problemsOf(form(changed))).toEqual(problems);

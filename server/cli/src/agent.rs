@@ -7,14 +7,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::kind::KindArg;
-use chefshat_agents::{AgentNameError, BuiltInAgent, MonteCarlo, NamedAgent, RecordedPlayer};
+use chefshat_agents::{BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
-use super::llm::{self, LanguageModel, LlmArgs};
-use super::remote::{MAX_PACE_MS, RemoteAgent, seed_for};
+use super::llm::LlmArgs;
+use super::player::{Player, PlayerArg, player_arg};
+use super::remote::{MAX_PACE_MS, RemoteAgent};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
 
@@ -57,9 +58,9 @@ pub(super) struct AgentCommand {
     /// Display name. Default: the agent's or model's.
     #[arg(long)]
     name: Option<String>,
-    /// Kind of participant.
-    #[arg(long, value_enum, default_value_t = KindArg::Agent)]
-    kind_of: KindArg,
+    /// Kind of participant. Default: agent, and model for llm.
+    #[arg(long, value_enum)]
+    kind_of: Option<KindArg>,
     /// Seed of the agent's choices, for repeatable games.
     #[arg(long)]
     seed: Option<u64>,
@@ -79,26 +80,8 @@ pub(super) struct AgentCommand {
 /// The agent as named on the command line.
 #[derive(Debug, Clone, Copy)]
 enum AgentArg {
-    Named(NamedAgent),
+    Player(PlayerArg),
     Replay,
-    Llm,
-}
-
-/// Who plays.
-enum Player {
-    BuiltIn(Box<RemoteAgent>),
-    Model(Box<LanguageModel>),
-}
-
-impl AgentArg {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Named(NamedAgent::Kind(kind)) => kind.name(),
-            Self::Named(NamedAgent::MonteCarlo(_)) => MonteCarlo::NAME,
-            Self::Replay => BuiltInAgent::REPLAY,
-            Self::Llm => llm::NAME,
-        }
-    }
 }
 
 impl AgentCommand {
@@ -112,27 +95,11 @@ impl AgentCommand {
         let mut all_finished = true;
         for _ in 0..self.games {
             let ticket = self.ticket(&client, &mut last_code).await?;
-            let played = match &mut player {
-                Player::BuiltIn(agent) => client.play(ticket, agent.as_mut()).await,
-                Player::Model(model) => client.play(ticket, model.as_mut()).await,
-            };
+            let played = client.play(ticket, player.agent()).await;
             all_finished &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
-            let spent = match &player {
-                Player::BuiltIn(_) => None,
-                Player::Model(model) => Some(model.spent()),
-            };
-            if self.json {
-                let mut line = as_json(&played);
-                if let Some(spent) = spent {
-                    line["tokens"] = spent.tokens.into();
-                    line["decisions"] = spent.decisions.into();
-                    line["fallbacks"] = spent.fallbacks.into();
-                }
-                say(line)?;
-            } else {
-                let spent =
-                    spent.map_or_else(String::new, |spent| format!(", {}", spent.in_words()));
-                say(format!("{}{spent}", in_words(&played)))?;
+            match self.json {
+                true => say(player.as_json(as_json(&played)))?,
+                false => say(player.in_words(&in_words(&played)))?,
             }
         }
         Ok(if all_finished {
@@ -143,36 +110,18 @@ impl AgentCommand {
     }
 
     fn player(&self) -> Result<Player, CommandError> {
-        if let AgentArg::Llm = self.agent {
-            if self.record.is_some() || self.seat.is_some() {
-                return Err("--record and --seat are for the agent replay".into());
-            }
-            let seed = seed_for("chefshat agent llm", self.seed);
-            let pace = Duration::from_millis(self.pace_ms);
-            let model = self.llm.agent(seed, self.seed, pace)?;
-            return Ok(Player::Model(Box::new(model)));
-        }
-        if self.llm.names_a_model() {
-            return Err("--endpoint and --model are for the agent llm".into());
-        }
-        self.remote_agent().map(Box::new).map(Player::BuiltIn)
-    }
-
-    fn remote_agent(&self) -> Result<RemoteAgent, CommandError> {
-        let (seed, pace) = (
-            seed_for("chefshat agent", self.seed),
-            Duration::from_millis(self.pace_ms),
-        );
+        let pace = Duration::from_millis(self.pace_ms);
         match (self.agent, &self.record, self.seat) {
-            (AgentArg::Named(agent), None, None) => Ok(RemoteAgent::named(agent, seed, pace)),
-            (AgentArg::Named(_), ..) => Err("--record and --seat are for the agent replay".into()),
+            (AgentArg::Player(player), None, None) => {
+                let players = player.players(&self.llm, self.seed, pace)?;
+                Ok(players.player("chefshat agent"))
+            }
+            (AgentArg::Player(_), ..) => Err("--record and --seat are for the agent replay".into()),
             (AgentArg::Replay, Some(record), Some(seat)) => {
                 let agent = BuiltInAgent::replay(player_of(record, seat)?);
-                Ok(RemoteAgent::new(agent, pace))
+                Ok(RemoteAgent::new(agent, pace).into())
             }
-            (AgentArg::Replay | AgentArg::Llm, ..) => {
-                Err("replay needs --record and --seat".into())
-            }
+            (AgentArg::Replay, ..) => Err("replay needs --record and --seat".into()),
         }
     }
 
@@ -186,16 +135,17 @@ impl AgentCommand {
             Pass::Ticket(ticket) => return Ok(ticket),
             Pass::Code(code) => code,
         };
-        let name = match (&self.name, self.agent) {
-            (Some(name), _) => name.clone(),
-            (None, AgentArg::Llm) => self.llm.display_name(),
-            (None, agent) => agent.name().to_owned(),
+        let (standard, kind) = match self.agent {
+            AgentArg::Player(player) => (player.display_name(&self.llm), player.kind()),
+            AgentArg::Replay => (BuiltInAgent::REPLAY.to_owned(), KindArg::Agent),
         };
+        let name = self.name.clone().unwrap_or(standard);
+        let kind = self.kind_of.unwrap_or(kind);
         let joined = client
             .join(v1::JoinRoomRequest {
                 join_code: code.clone(),
                 name: name.clone(),
-                kind: v1::ParticipantKind::from(self.kind_of).into(),
+                kind: v1::ParticipantKind::from(kind).into(),
                 ..v1::JoinRoomRequest::default()
             })
             .await?;
@@ -216,25 +166,12 @@ impl AgentCommand {
 }
 
 fn agent_arg(name: &str) -> Result<AgentArg, String> {
-    if name == BuiltInAgent::REPLAY {
-        return Ok(AgentArg::Replay);
+    match name == BuiltInAgent::REPLAY {
+        true => Ok(AgentArg::Replay),
+        false => player_arg(name)
+            .map(AgentArg::Player)
+            .map_err(|problem| format!("{problem}, {}", BuiltInAgent::REPLAY)),
     }
-    if name == llm::NAME {
-        return Ok(AgentArg::Llm);
-    }
-    name.parse()
-        .map(AgentArg::Named)
-        .map_err(|error| match error {
-            AgentNameError::Unknown(_) => {
-                let known = NamedAgent::NAMES.join(", ");
-                format!(
-                    "use one of {known}, {}, {}",
-                    BuiltInAgent::REPLAY,
-                    llm::NAME
-                )
-            }
-            AgentNameError::MonteCarlo(error) => error.to_string(),
-        })
 }
 
 /// Loads the player of a seat of a record.

@@ -23,7 +23,7 @@ Examples:
   chefshat export game.jsonl --out dataset --layout chefshatgym";
 
 /// Names of the kinds of players in the tables.
-const KINDS: [&str; 4] = ["agent", "human", "robot", "built_in"];
+const KINDS: [&str; 5] = ["agent", "human", "robot", "model", "built_in"];
 
 /// Export records as a dataset: Parquet, CSV or JSON Lines, with a dataset card.
 #[derive(Debug, Args)]

@@ -12,6 +12,8 @@ pub(super) enum KindArg {
     Human,
     /// A robot.
     Robot,
+    /// A language model.
+    Model,
 }
 
 impl From<KindArg> for ParticipantKind {
@@ -20,6 +22,7 @@ impl From<KindArg> for ParticipantKind {
             KindArg::Agent => Self::Agent,
             KindArg::Human => Self::Human,
             KindArg::Robot => Self::Robot,
+            KindArg::Model => Self::Model,
         }
     }
 }

@@ -34,6 +34,7 @@ mod numbers;
 mod output;
 mod pages;
 mod participant;
+mod player;
 mod policy_args;
 mod progress;
 mod ratings;

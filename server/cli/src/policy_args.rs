@@ -129,7 +129,9 @@ fn clock(words: &str) -> Result<v1::KindClock, String> {
             bank_ms: rest.first().copied(),
             absence_time_ms: rest.get(1).copied(),
         }),
-        _ => Err("use agent, human or robot, a colon, and milliseconds per decision".to_owned()),
+        _ => Err(
+            "use agent, human, robot or model, a colon, and milliseconds per decision".to_owned(),
+        ),
     }
 }
 

@@ -198,7 +198,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "agent_kind",
         Type::Text,
-        "Kind of player: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server); null where `agent` is.",
+        "Kind of player: `agent` (a program), `human`, `robot`, `model` (a language model) or `built_in` (an agent of the server); null where `agent` is.",
         |row| row.player().map(|player| player.kind).into(),
     ),
     Column::new(
@@ -498,7 +498,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "shown_kind",
         Type::Text,
-        "What everybody else saw, `robot` or `agent`, where a person played the seat as that (Wizard of Oz); null for all others, and where `agent` is.",
+        "What everybody else saw, `robot`, `agent` or `model`, where a person played the seat as that (Wizard of Oz); null for all others, and where `agent` is.",
         |row| row.player().and_then(|player| player.shown_kind).into(),
     ),
 ];

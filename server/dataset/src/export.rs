@@ -23,7 +23,7 @@ pub struct Filter {
     pub finished_only: bool,
     /// Only games of rooms with this name.
     pub room_name: Option<String>,
-    /// Only games with at least one player of this kind: `agent`, `human`, `robot` or `built_in`.
+    /// Only games with at least one player of this kind: `agent`, `human`, `robot`, `model` or `built_in`.
     pub player_kind: Option<String>,
 }
 

@@ -69,7 +69,7 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
     Column::new(
         "agent_kind",
         Type::Text,
-        "Kind of participant: `agent`, `human`, `robot` or `built_in`; null if the seat was free.",
+        "Kind of participant: `agent`, `human`, `robot`, `model` or `built_in`; null if the seat was free.",
         |row| row.player.as_ref().map(|player| player.kind).into(),
     ),
     Column::new(
@@ -177,7 +177,7 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
     Column::new(
         "shown_kind",
         Type::Text,
-        "What everybody else saw, `robot` or `agent`, where a person played the seat as that (Wizard of Oz); null for all others.",
+        "What everybody else saw, `robot`, `agent` or `model`, where a person played the seat as that (Wizard of Oz); null for all others.",
         |row| {
             row.player
                 .as_ref()

@@ -42,7 +42,7 @@ pub(super) const COLUMNS: &[Column<SampleRow>] = &[
     Column::new(
         "agent_kind",
         Type::Text,
-        "Kind of participant: `agent`, `human` or `robot`.",
+        "Kind of participant: `agent`, `human`, `robot` or `model`.",
         |row| row.player.kind.into(),
     ),
     Column::new(

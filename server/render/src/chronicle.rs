@@ -35,6 +35,8 @@ pub enum ParticipantKind {
     Robot,
     /// A program.
     Agent,
+    /// A language model.
+    Model,
     /// The built-in agent of this name.
     BuiltIn(String),
 }
@@ -326,6 +328,7 @@ fn participant_kind(kind: v1::ParticipantKind, built_in: &str) -> ParticipantKin
         v1::ParticipantKind::Agent => ParticipantKind::Agent,
         v1::ParticipantKind::Human => ParticipantKind::Person,
         v1::ParticipantKind::Robot => ParticipantKind::Robot,
+        v1::ParticipantKind::Model => ParticipantKind::Model,
     }
 }
 

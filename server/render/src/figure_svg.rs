@@ -114,6 +114,7 @@ impl Painter {
             ParticipantKind::Unspecified => "player",
             ParticipantKind::Person => "person",
             ParticipantKind::Robot => "robot",
+            ParticipantKind::Model => "language model",
             ParticipantKind::Agent => "agent",
             ParticipantKind::BuiltIn(_) => "built-in agent",
         };

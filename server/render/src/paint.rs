@@ -65,6 +65,7 @@ const SYMBOLS: &[(&str, &str)] = symbols![
     "plate",
     "kind-agent",
     "kind-built-in",
+    "kind-model",
     "kind-open",
     "kind-person",
     "kind-robot",

@@ -223,6 +223,7 @@ fn label(painter: &Painter, shown: &SeatScene, width: f32) -> (&'static str, Str
         ParticipantKind::Unspecified => ("kind-open", "player".to_owned(), "player"),
         ParticipantKind::Person => ("kind-person", "person".to_owned(), "person"),
         ParticipantKind::Robot => ("kind-robot", "robot".to_owned(), "robot"),
+        ParticipantKind::Model => ("kind-model", "model".to_owned(), "model"),
         ParticipantKind::Agent => ("kind-agent", "agent".to_owned(), "agent"),
         ParticipantKind::BuiltIn(agent) => {
             ("kind-built-in", format!("built-in {agent}"), agent.as_str())

@@ -51,6 +51,14 @@ pub struct KindClock {
 }
 
 impl KindClock {
+    /// The default times for language models, which think before they answer.
+    pub const MODELS: Self = Self {
+        kind: ParticipantKind::Model,
+        decision_time: Some(Duration::from_secs(60)),
+        bank: Some(Duration::from_secs(300)),
+        absence_time: Some(Duration::from_secs(60)),
+    };
+
     /// The default times for people.
     pub const PEOPLE: Self = Self {
         kind: ParticipantKind::Human,
@@ -189,7 +197,7 @@ impl Default for Policy {
             spectator_delay_decisions: 0,
             spectators_see_hands: false,
             durability: Durability::Durable,
-            clocks: vec![KindClock::PEOPLE],
+            clocks: vec![KindClock::PEOPLE, KindClock::MODELS],
             one_seat_per_client: false,
             visibility: Visibility::Public,
             hints: false,

@@ -17,6 +17,7 @@ pub fn kind_from_proto(
         Ok(v1::ParticipantKind::Agent) => Ok(Some(ParticipantKind::Agent)),
         Ok(v1::ParticipantKind::Human) => Ok(Some(ParticipantKind::Human)),
         Ok(v1::ParticipantKind::Robot) => Ok(Some(ParticipantKind::Robot)),
+        Ok(v1::ParticipantKind::Model) => Ok(Some(ParticipantKind::Model)),
         Err(_) => Err(FieldProblem::new(
             field,
             format!("{kind} is not a kind of participant"),
@@ -31,6 +32,7 @@ pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
         Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
         Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
         Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
+        Some(ParticipantKind::Model) => v1::ParticipantKind::Model,
     }
     .into()
 }

@@ -73,6 +73,7 @@ pub(super) fn shown_name(
                 ParticipantKind::Agent => "Agent",
                 ParticipantKind::Human => "Player",
                 ParticipantKind::Robot => "Robot",
+                ParticipantKind::Model => "Model",
             };
             (format!("{word} {number}"), Some(kind))
         }

@@ -8,7 +8,6 @@ use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_sc
 
 use super::agent::agent_from_proto;
 use super::kind::{kind_from_proto, kind_to_proto};
-use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{
     ABSENCE_TIME_OF_PEOPLE, AbortPolicy, Durability, KindClock, Policy, Visibility,
 };
@@ -171,7 +170,7 @@ fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
 }
 
 /// Clocks for kinds of participants, each kind at most once. A time set for the room applies to
-/// everybody, people included. [`Policy::set_default_absence_times`] completes them.
+/// everybody, people and language models included. [`Policy::set_default_absence_times`] completes them.
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
     for message in &policy.clocks {
@@ -188,18 +187,20 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
         });
     }
     let chosen = policy.decision_time_ms.is_some() || policy.bank_ms.is_some();
-    let is_of_people = |clock: &&mut KindClock| clock.kind == ParticipantKind::Human;
-    match clocks.iter_mut().find(is_of_people) {
-        _ if chosen => {}
-        None => clocks.push(KindClock {
-            absence_time: None,
-            ..KindClock::PEOPLE
-        }),
-        Some(clock) => {
-            let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
-            if absence_alone && clock.absence_time.is_some() {
-                (clock.decision_time, clock.bank) =
-                    (KindClock::PEOPLE.decision_time, KindClock::PEOPLE.bank);
+    if chosen {
+        return Ok(clocks);
+    }
+    for standard in [KindClock::PEOPLE, KindClock::MODELS] {
+        match clocks.iter_mut().find(|clock| clock.kind == standard.kind) {
+            None => clocks.push(KindClock {
+                absence_time: None,
+                ..standard
+            }),
+            Some(clock) => {
+                let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
+                if absence_alone && clock.absence_time.is_some() {
+                    (clock.decision_time, clock.bank) = (standard.decision_time, standard.bank);
+                }
             }
         }
     }
@@ -235,10 +236,12 @@ fn in_range(
 
 #[cfg(test)]
 mod tests {
+    use chefshat_room::journal::ParticipantKind;
+
     use super::*;
 
     #[test]
-    fn people_have_more_time_by_default() {
+    fn people_and_language_models_have_more_time_by_default() {
         let policy = Policy::default();
         let times = |kind| {
             (
@@ -246,13 +249,10 @@ mod tests {
                 policy.bank_of(Some(kind)),
             )
         };
-        assert_eq!(
-            times(ParticipantKind::Human),
-            (
-                Duration::from_millis(60_000),
-                Duration::from_millis(300_000)
-            )
-        );
+        for kind in [ParticipantKind::Human, ParticipantKind::Model] {
+            let expected = (Duration::from_secs(60), Duration::from_secs(300));
+            assert_eq!(times(kind), expected);
+        }
         assert_eq!(
             times(ParticipantKind::Agent),
             (Duration::from_millis(10_000), Duration::from_millis(60_000))
@@ -285,26 +285,41 @@ mod tests {
             };
         let (human, robot) = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
         // The decision time and absence time of the room, its clocks, and the decision and absence
-        // times of people, robots and agents that follow.
+        // times of people, robots, agents and models that follow.
         let cases = [
             (
                 None,
                 None,
                 vec![],
-                [(60_000, 20_000), (10_000, 10_000), (10_000, 10_000)],
+                [
+                    (60_000, 20_000),
+                    (10_000, 10_000),
+                    (10_000, 10_000),
+                    (60_000, 60_000),
+                ],
             ),
-            (Some(5_000), None, vec![], [(5_000, 5_000); 3]),
+            (Some(5_000), None, vec![], [(5_000, 5_000); 4]),
             (
                 Some(90_000),
                 None,
                 vec![],
-                [(90_000, 20_000), (90_000, 90_000), (90_000, 90_000)],
+                [
+                    (90_000, 20_000),
+                    (90_000, 90_000),
+                    (90_000, 90_000),
+                    (90_000, 90_000),
+                ],
             ),
             (
                 None,
                 Some(3_000),
                 vec![],
-                [(60_000, 3_000), (10_000, 3_000), (10_000, 3_000)],
+                [
+                    (60_000, 3_000),
+                    (10_000, 3_000),
+                    (10_000, 3_000),
+                    (60_000, 3_000),
+                ],
             ),
             (
                 None,
@@ -313,13 +328,18 @@ mod tests {
                     clock_of(human, None, Some(7_000)),
                     clock_of(robot, Some(30_000), None),
                 ],
-                [(60_000, 7_000), (30_000, 30_000), (10_000, 10_000)],
+                [
+                    (60_000, 7_000),
+                    (30_000, 30_000),
+                    (10_000, 10_000),
+                    (60_000, 60_000),
+                ],
             ),
             (
                 None,
                 Some(0),
                 vec![clock_of(human, Some(4_000), Some(50_000))],
-                [(4_000, 4_000), (10_000, 0), (10_000, 0)],
+                [(4_000, 4_000), (10_000, 0), (10_000, 0), (60_000, 0)],
             ),
         ];
         for (decision_time_ms, absence_time_ms, clocks, expected) in cases {
@@ -334,6 +354,7 @@ mod tests {
                 ParticipantKind::Human,
                 ParticipantKind::Robot,
                 ParticipantKind::Agent,
+                ParticipantKind::Model,
             ]
             .map(|kind| {
                 let absence = policy.absence_time_of(Some(kind)).expect("it has one");

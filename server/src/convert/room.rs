@@ -47,13 +47,13 @@ pub fn fills_from_proto(
                 reserved_for: kind_from_proto("seats", *kind)?,
             }),
             Some(FilledBy::Wizard(kind)) => match kind_from_proto("seats", *kind)? {
-                shown @ Some(ParticipantKind::Robot | ParticipantKind::Agent) => Ok(Fill::Open {
+                Some(ParticipantKind::Human) | None => Err(FieldProblem::new(
+                    "seats",
+                    "`wizard` is the kind that others see: ROBOT, AGENT or MODEL",
+                )),
+                shown => Ok(Fill::Open {
                     reserved_for: shown,
                 }),
-                _ => Err(FieldProblem::new(
-                    "seats",
-                    "`wizard` is the kind that others see: ROBOT or AGENT",
-                )),
             },
             Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
             Some(FilledBy::AtTable(kind)) => kind_from_proto("seats", *kind)?

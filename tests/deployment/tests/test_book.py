@@ -37,7 +37,7 @@ NOT_RUN = {
     r"(CHEFSHAT_TICKET=TICKET )?node agent\.js ": "clients/node/tests plays with it, also with tickets",
     r"cargo run -p chefshat-client --example |cargo test ": "a build of its own; the system tests run the SDK",
     r"npx @modelcontextprotocol/inspector ": "fetches the inspector; tests/tests/system/mcp_http.rs has another client",
-    r"chefshat agent llm ": "needs a server of language models; tests/tests/system/llm.rs scripts one",
+    r"chefshat (agent|tournament join --agent) llm ": "needs a server of language models; tests/tests/system/llm.rs scripts one",
     r"chefshat check-agent ": "agent.py is the reader's; tests/tests/system/examiner.rs examines agents",
     r"chefshat (play|watch) |cargo run --release -- play": "needs a terminal; tests/tests/system/terminal.rs has one",
     r"chefshat table --ticket TICKET$": "needs a person who types; tests/tests/system/attendant.rs",

@@ -37,6 +37,7 @@ enum Said {
 }
 
 /// A question as it arrived.
+#[derive(Debug)]
 struct Asked {
     headers: HeaderMap,
     body: Value,
@@ -117,6 +118,14 @@ fn honest(_: usize, messages: &[Value]) -> Said {
     Said::Text(text, 500)
 }
 
+/// `chefshat` with these arguments and the key of the endpoint.
+fn chefshat(arguments: &[&str], key: &str) -> Command {
+    let mut command = Command::new(set_up("CHEFSHAT_BIN"));
+    command.args(arguments);
+    command.env("CHEFSHAT_LLM_KEY", key).kill_on_drop(true);
+    command
+}
+
 /// A game of one Shift in which the model has the first seat.
 struct Played {
     game: EndedGame,
@@ -170,7 +179,7 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
     let (url, asked) = endpoint(script).await;
     let others = (0..3).map(|_| built_in("greedy"));
     let open = v1::SeatConfig {
-        filled_by: Some(FilledBy::ReservedFor(v1::ParticipantKind::Agent.into())),
+        filled_by: Some(FilledBy::ReservedFor(v1::ParticipantKind::Model.into())),
         ..v1::SeatConfig::default()
     };
     let created = client.create_room(v1::CreateRoomRequest {
@@ -184,13 +193,11 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
         ..v1::CreateRoomRequest::default()
     });
     let created = created.await.expect("a room");
-    let mut command = Command::new(set_up("CHEFSHAT_BIN"));
-    command.args(["agent", "llm", "--server", &server.url(), "--json"]);
+    let mut command = chefshat(&["agent", "llm", "--server", &server.url(), "--json"], KEY);
     command.args(["--code", &created.join_code, "--seed", "7"]);
     command
         .args(["--endpoint", &url, "--model", "ada/test-1"])
         .args(arguments);
-    command.env("CHEFSHAT_LLM_KEY", KEY).kill_on_drop(true);
     let output = patiently("the game", command.output())
         .await
         .expect("it runs");
@@ -339,15 +346,118 @@ async fn the_budget_ends_and_the_game_goes_on() {
     assert_eq!(played.result["tokens"], 1500);
 }
 
+/// The participants of a tournament, their programs and their kinds.
+const PARTICIPANTS: [(&str, v1::ParticipantKind); 4] = [
+    ("honest", v1::ParticipantKind::Model),
+    ("nonsense", v1::ParticipantKind::Model),
+    ("Gustav", v1::ParticipantKind::Agent),
+    ("Rolf", v1::ParticipantKind::Robot),
+];
+
+#[tokio::test(flavor = "multi_thread")]
+async fn models_agents_and_a_robot_play_a_tournament() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let model = v1::ParticipantKind::Model;
+    let settings = v1::TournamentSettings {
+        name: "Models".into(),
+        format: v1::TournamentFormat::RoundRobin.into(),
+        rounds: 2,
+        rules: Some(one_shift()),
+        start_when_joined: 4,
+        policy: Some(v1::RoomPolicy {
+            clocks: vec![v1::KindClock {
+                kind: model.into(),
+                decision_time_ms: Some(600_000),
+                ..v1::KindClock::default()
+            }],
+            ..v1::RoomPolicy::default()
+        }),
+        ..v1::TournamentSettings::default()
+    };
+    let made = client.create_tournament(settings).await.expect("created");
+    let tournament_id = made.tournament.expect("a tournament").tournament_id;
+    let nonsense: Script = |_, _| Said::Text("I fold.".to_owned(), 10);
+    let scripts = [honest, nonsense].map(endpoint);
+    let [(honest, _), (nonsense, _)] = futures::future::join_all(scripts)
+        .await
+        .try_into()
+        .expect("two");
+    let arguments = [
+        vec![
+            "--agent",
+            "llm",
+            "--endpoint",
+            &honest,
+            "--model",
+            "ada/honest",
+        ],
+        vec![
+            "--agent",
+            "llm",
+            "--endpoint",
+            &nonsense,
+            "--model",
+            "nonsense",
+            "--retries",
+            "0",
+        ],
+        vec!["--agent", "greedy", "--name", "Gustav"],
+        vec!["--agent", "greedy", "--name", "Rolf", "--kind-of", "robot"],
+    ];
+    let running = arguments.map(|arguments| {
+        let mut command = chefshat(&["tournament", "join", "--server", &server.url()], KEY);
+        command
+            .args(["--code", &made.join_code, "--json"])
+            .args(arguments);
+        command.output()
+    });
+    let outputs = patiently("the tournament", futures::future::join_all(running)).await;
+    let mut told = outputs.into_iter().map(|output| {
+        let output = output.expect("it runs");
+        let problems = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{problems}");
+        let lines = serde_json::Deserializer::from_slice(&output.stdout).into_iter();
+        lines
+            .map(|line| line.expect("JSON"))
+            .collect::<Vec<Value>>()
+    });
+    let tournament = client.tournament(tournament_id).await.expect("it is known");
+    let participants = tournament.participants;
+    for (name, kind) in PARTICIPANTS {
+        let entry = participants.iter().find(|it| it.name == name);
+        assert_eq!(entry.expect("it took part").kind(), kind, "{name}");
+        let told = told.next().expect("its program");
+        let [games @ .., over] = &told[..] else {
+            panic!("{told:?}")
+        };
+        assert_eq!((games.len(), &over["event"]), (2, &json!("over")));
+        for game in games {
+            let asked = game["decisions"].as_u64();
+            assert_eq!(asked.is_some(), kind == model, "{game}");
+            let fallbacks = if name == "nonsense" {
+                asked
+            } else {
+                asked.map(|_| 0)
+            };
+            assert_eq!(game["fallbacks"].as_u64(), fallbacks, "{game}");
+        }
+    }
+    let request = v1::GetLeaderboardRequest {
+        kind: model.into(),
+        ..v1::GetLeaderboardRequest::default()
+    };
+    let board = client.leaderboard(request).await.expect("a leaderboard");
+    let mut names: Vec<_> = board.rated.iter().map(|it| it.name.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["honest", "nonsense"]);
+}
+
 #[tokio::test]
 async fn what_cannot_be_asked_is_refused_before_a_seat_is_taken() {
     let refused = async |arguments: &[&str], key: &str| {
-        let mut command = Command::new(set_up("CHEFSHAT_BIN"));
-        command
-            .args(["agent"])
-            .args(arguments)
-            .args(["--code", "BCDF2345"]);
-        command.env("CHEFSHAT_LLM_KEY", key).kill_on_drop(true);
+        let mut command = chefshat(&["agent"], key);
+        command.args(arguments).args(["--code", "BCDF2345"]);
         let output = patiently("the program", command.output())
             .await
             .expect("it runs");

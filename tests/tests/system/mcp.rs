@@ -27,7 +27,7 @@ pub(crate) async fn room(
     visibility: v1::Visibility,
 ) -> v1::CreateRoomResponse {
     use v1::seat_config::FilledBy::{BuiltInAgent, ReservedFor};
-    let open = ReservedFor(v1::ParticipantKind::Unspecified.into());
+    let open = ReservedFor(v1::ParticipantKind::Model.into());
     let agents = ["greedy", "random", "greedy"].map(|kind| BuiltInAgent(kind.into()));
     let seats = std::iter::once(open).chain(agents);
     let request = v1::CreateRoomRequest {

@@ -131,10 +131,13 @@ async fn a_resumed_seat_is_played_and_its_ticket_is_never_shown() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let made = room(&client, one_shift(), v1::Visibility::Private).await;
-    let joined = client
-        .join_with_code(made.join_code, "Ada")
-        .await
-        .expect("a free seat");
+    let request = v1::JoinRoomRequest {
+        join_code: made.join_code,
+        name: "Ada".into(),
+        kind: v1::ParticipantKind::Model.into(),
+        ..v1::JoinRoomRequest::default()
+    };
+    let joined = client.join(request).await.expect("a free seat");
     let mut raw = Raw::start(program(&server, &[], Some(&joined.ticket)));
     raw.initialize("2025-06-18").await;
     let (mut text, _) = raw.tool("get_table", json!({})).await;

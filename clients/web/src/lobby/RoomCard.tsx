@@ -76,6 +76,9 @@ export function RoomStateChip({ room }: { room: Room }) {
   }
 }
 
+/** Kinds of participants with the clock of people, or perhaps. */
+const PERHAPS_PEOPLE = [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN];
+
 /** The length of a game and the time per decision, in one line. */
 export function rulesInShort(room: Room): string {
   const words = t().lobby.rooms;
@@ -84,12 +87,7 @@ export function rulesInShort(room: Room): string {
   if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
   if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
   const withPeople = room.seats.some(({ kind, reservedFor, builtInAgent, atTable }) => {
-    return (
-      builtInAgent === "" &&
-      !atTable &&
-      (kind || reservedFor) !== ParticipantKind.AGENT &&
-      (kind || reservedFor) !== ParticipantKind.ROBOT
-    );
+    return builtInAgent === "" && !atTable && PERHAPS_PEOPLE.includes(kind || reservedFor);
   });
   // At a table with real cards only remote participants have a clock.
   const timed = room.seats.some(({ atTable, builtInAgent }) => !atTable && builtInAgent === "");

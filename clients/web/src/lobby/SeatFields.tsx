@@ -21,6 +21,7 @@ export function SeatFields({ form, faults, change, agents }: FormProps & { agent
     "anybody",
     "agent",
     "robot",
+    "model",
     ...(real ? [] : (["wizard"] as const)),
     ...agents.map((agent): SeatChoice => `built-in ${agent}`).filter((choice) => !real || choice !== SEARCHING),
   ];
@@ -93,6 +94,8 @@ function choiceWord(choice: SeatChoice, real: boolean): string {
       return real ? words.remoteAgent : words.agent;
     case "robot":
       return real ? words.remoteRobot : words.robot;
+    case "model":
+      return real ? words.remoteModel : words.model;
     case "wizard":
       return words.wizard;
     default:

@@ -14,7 +14,7 @@ export const MAX_NAME = 64;
  * fills it.
  */
 export type SeatChoice = Remote | AtTable | `built-in ${string}`;
-type Remote = "human" | "robot" | "wizard" | "agent" | "anybody";
+type Remote = "human" | "robot" | "model" | "wizard" | "agent" | "anybody";
 export type AtTable = "at-table human" | "at-table robot";
 
 /** The form; numbers as typed. */
@@ -122,6 +122,7 @@ function threeOf(builtInAgents: readonly string[]): string[] {
 const KINDS = {
   human: ParticipantKind.HUMAN,
   robot: ParticipantKind.ROBOT,
+  model: ParticipantKind.MODEL,
   agent: ParticipantKind.AGENT,
   anybody: ParticipantKind.UNSPECIFIED,
 };
@@ -136,6 +137,7 @@ function seatConfig(choice: SeatChoice, name: string) {
       return { filledBy: { case: "wizard" as const, value: KINDS.robot } };
     case "human":
     case "robot":
+    case "model":
     case "agent":
     case "anybody":
       return { filledBy: { case: "reservedFor" as const, value: KINDS[choice] } };

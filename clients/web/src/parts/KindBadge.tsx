@@ -1,5 +1,5 @@
-// The kind of a participant: person, robot or agent, always as a drawing and a word. A built-in
-// agent has a drawing of its own; its name is shown elsewhere.
+// The kind of a participant: person, robot, agent or language model, always as a drawing and a
+// word. A built-in agent has a drawing of its own; its name is shown elsewhere.
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -28,6 +28,7 @@ const symbols: Record<ParticipantKind, string> = {
   [ParticipantKind.AGENT]: "kind-agent",
   [ParticipantKind.HUMAN]: "kind-person",
   [ParticipantKind.ROBOT]: "kind-robot",
+  [ParticipantKind.MODEL]: "kind-model",
 };
 
 /** A kind in a word. */
@@ -40,6 +41,8 @@ export function kindWord(kind: ParticipantKind): string {
       return words.human;
     case ParticipantKind.ROBOT:
       return words.robot;
+    case ParticipantKind.MODEL:
+      return words.model;
     default:
       return words.open;
   }

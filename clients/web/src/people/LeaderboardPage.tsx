@@ -27,6 +27,7 @@ const KINDS = {
   human: ParticipantKind.HUMAN,
   robot: ParticipantKind.ROBOT,
   agent: ParticipantKind.AGENT,
+  model: ParticipantKind.MODEL,
 };
 const MIN_GAMES = ["1", "5", "20", "100"] as const;
 

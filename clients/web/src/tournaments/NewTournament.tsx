@@ -95,6 +95,7 @@ function Clocks(props: FormProps) {
           <>
             <Typed {...props} name="agentSeconds" label={words.agentSeconds} />
             <Typed {...props} name="robotSeconds" label={words.robotSeconds} />
+            <Typed {...props} name="modelSeconds" label={words.modelSeconds} />
           </>
         )}
       </div>

@@ -102,7 +102,7 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
       <fieldset class={tournamentsCss.newTournamentGroup}>
         <legend>{words.kinds}</legend>
         <div class={tournamentsCss.newTournamentKinds}>
-          {(["people", "agents", "robots"] as const).map((kind) => (
+          {(["people", "agents", "robots", "models"] as const).map((kind) => (
             <CheckField
               key={kind}
               label={words.kind[kind]}

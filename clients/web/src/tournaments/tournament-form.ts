@@ -31,6 +31,7 @@ export interface TournamentForm extends GameForm {
   people: boolean;
   agents: boolean;
   robots: boolean;
+  models: boolean;
   maxParticipants: string;
   physicalTables: string;
   start: "byHand" | "joined" | "time";
@@ -41,10 +42,11 @@ export interface TournamentForm extends GameForm {
   maxCalls: string;
   maxParallel: string;
   filler: string;
-  /** Whether agents and robots have their own times. */
+  /** Whether agents, robots and language models have their own times. */
   otherClocks: boolean;
   agentSeconds: string;
   robotSeconds: string;
+  modelSeconds: string;
   /** 64 hexadecimal digits, or empty. */
   drawSeed: string;
   dealSeed: string;
@@ -74,6 +76,7 @@ export function newTournament(agents: readonly string[]): TournamentForm {
     people: true,
     agents: true,
     robots: true,
+    models: true,
     maxParticipants: "64",
     physicalTables: "0",
     start: "byHand",
@@ -86,6 +89,7 @@ export function newTournament(agents: readonly string[]): TournamentForm {
     otherClocks: false,
     agentSeconds: "10",
     robotSeconds: "30",
+    modelSeconds: "60",
     drawSeed: "",
     dealSeed: "",
   };
@@ -128,7 +132,7 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   if (form.rounds.trim() !== "") whole.push(["rounds", [1, 1000]]);
   if (form.start === "joined") whole.push(["startWhen", [2, MAX_PARTICIPANTS]]);
   const seconds: [TournamentField, Bounds][] = [["noShowSeconds", [1, 86_400]]];
-  if (form.otherClocks) seconds.push(["agentSeconds", [0.01, 86_400]], ["robotSeconds", [0.01, 86_400]]);
+  if (form.otherClocks) seconds.push(["agentSeconds", [0.01, 86_400]], ["robotSeconds", [0.01, 86_400]], ["modelSeconds", [0.01, 86_400]]);
   for (const [field, bounds] of whole) problems[field] = wholeProblem(String(form[field]), bounds);
   for (const [field, bounds] of seconds) problems[field] = secondsProblem(String(form[field]), bounds);
   const wrong = Object.values(form.builtIn).find(isNoCount);
@@ -137,7 +141,7 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   for (const seed of ["drawSeed", "dealSeed"] as const)
     if (form[seed].trim() !== "" && !/^[0-9a-f]{64}$/i.test(form[seed].trim())) problems[seed] = "notASeed";
   if (Number(form.physicalTables) > 0 && form.opening !== "golden") problems.opening = "realOpening";
-  if (!form.people && !form.agents && !form.robots) problems.people = "nobody";
+  if (!form.people && !form.agents && !form.robots && !form.models) problems.people = "nobody";
   if (form.start === "time" && !(Date.parse(form.startAt) > Date.now())) problems.startAt = "startPassed";
   if (form.name.trim() === "") problems.name = "nameMissing";
   return problemsAlone(problems);
@@ -166,6 +170,7 @@ export function settingsOf(form: TournamentForm): MessageInitShape<typeof Tourna
     ? [
         { kind: ParticipantKind.AGENT, decisionTimeMs: milliseconds(form.agentSeconds), bankMs: 0 },
         { kind: ParticipantKind.ROBOT, decisionTimeMs: milliseconds(form.robotSeconds), bankMs: 0 },
+        { kind: ParticipantKind.MODEL, decisionTimeMs: milliseconds(form.modelSeconds), bankMs: 0 },
       ]
     : [];
   const joined = form.start === "joined" ? Number(form.startWhen) : 0;
@@ -227,12 +232,13 @@ const DEALS = {
 
 /** Kinds that may join; none are listed if all may. */
 function kindsOf(form: TournamentForm): ParticipantKind[] {
-  const { people, agents, robots } = form;
-  if (people && agents && robots) return [];
+  const { people, agents, robots, models } = form;
+  if (people && agents && robots && models) return [];
   return [
     ...(people ? [ParticipantKind.HUMAN] : []),
     ...(agents ? [ParticipantKind.AGENT] : []),
     ...(robots ? [ParticipantKind.ROBOT] : []),
+    ...(models ? [ParticipantKind.MODEL] : []),
   ];
 }
 

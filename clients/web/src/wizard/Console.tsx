@@ -18,9 +18,12 @@ import css from "./Console.module.css";
 import { MAX_LINES, robotGesture, storedLines, storeLines } from "./lines";
 import { drawn, paceOf, storedPace, storePace } from "./pace";
 
+/** What a person may play a seat as. */
+const PLAYED: readonly ParticipantKind[] = [ParticipantKind.ROBOT, ParticipantKind.AGENT, ParticipantKind.MODEL];
+
 /** Whether the person at this page plays the seat as something else. */
 export function isWizard(seat: SeatState | undefined): boolean {
-  return seat !== undefined && (seat.kind === ParticipantKind.ROBOT || seat.kind === ParticipantKind.AGENT);
+  return seat !== undefined && PLAYED.includes(seat.kind);
 }
 
 interface ConsoleProps {

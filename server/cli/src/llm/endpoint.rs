@@ -62,7 +62,7 @@ pub(super) enum EndpointError {
 
 /// A server of language models.
 #[derive(Debug)]
-pub(super) struct Endpoint {
+pub(crate) struct Endpoint {
     target: Target,
     key: Option<String>,
     model: String,

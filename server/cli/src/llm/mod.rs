@@ -6,6 +6,7 @@
 mod endpoint;
 mod reply;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use chefshat_agents::{AgentKind, NamedAgent};
@@ -19,9 +20,9 @@ use crate::CommandError;
 use crate::language::live::Live;
 use crate::language::{self, RULES, cards, text};
 use crate::narration::view::GameView;
-use crate::numbers::grouped;
 use crate::remote::{RemoteAgent, named_agent};
-use endpoint::{Endpoint, EndpointError, Message};
+pub(crate) use endpoint::Endpoint;
+use endpoint::{EndpointError, Message};
 use reply::Reply;
 
 /// The name of the agent on the command line.
@@ -99,17 +100,11 @@ impl LlmArgs {
             .collect()
     }
 
-    /// The agent. `seed`: of the fallback's choices; `model_seed`: sent to the endpoint; `pace`: of
-    /// the fallback.
+    /// Where the model is asked. `seed`: sent with each question.
     ///
     /// # Errors
     /// The endpoint cannot be used as given.
-    pub(crate) fn agent(
-        &self,
-        seed: [u8; 32],
-        model_seed: Option<u64>,
-        pace: Duration,
-    ) -> Result<LanguageModel, CommandError> {
+    pub(crate) fn endpoint(&self, seed: Option<u64>) -> Result<Arc<Endpoint>, CommandError> {
         let address = self.endpoint.as_deref().unwrap_or_default();
         let key = std::env::var(KEY_VARIABLE)
             .ok()
@@ -117,8 +112,18 @@ impl LlmArgs {
         let mut endpoint = Endpoint::new(address, key, self.model.as_deref().unwrap_or_default())?;
         endpoint.answer_tokens = self.answer_tokens;
         endpoint.temperature = self.temperature;
-        endpoint.seed = model_seed;
-        Ok(LanguageModel {
+        endpoint.seed = seed;
+        Ok(Arc::new(endpoint))
+    }
+
+    /// The agent. `seed` and `pace`: of the fallback.
+    pub(crate) fn agent(
+        &self,
+        endpoint: Arc<Endpoint>,
+        seed: [u8; 32],
+        pace: Duration,
+    ) -> LanguageModel {
+        LanguageModel {
             endpoint,
             budget: self.budget,
             retries: self.retries,
@@ -131,7 +136,7 @@ impl LlmArgs {
             answered: None,
             silent: 0,
             said: v1::Annotations::default(),
-        })
+        }
     }
 }
 
@@ -146,22 +151,10 @@ pub(crate) struct Spent {
     pub(crate) fallbacks: u64,
 }
 
-impl Spent {
-    /// As a line for people.
-    pub(crate) fn in_words(self) -> String {
-        format!(
-            "{} tokens for {} decisions, {} of them by the fallback",
-            grouped(self.tokens),
-            grouped(self.decisions),
-            grouped(self.fallbacks)
-        )
-    }
-}
-
 /// A language model that plays a seat.
 #[derive(Debug)]
 pub(crate) struct LanguageModel {
-    endpoint: Endpoint,
+    endpoint: Arc<Endpoint>,
     budget: u64,
     retries: u32,
     fallback: RemoteAgent,

@@ -96,7 +96,7 @@ impl Server {
         let request = v1::JoinRoomRequest {
             join_code: code.ok_or("Give the join_code; the host of the room has it.")?,
             name: name.unwrap_or_else(|| DEFAULT_NAME.to_owned()),
-            kind: v1::ParticipantKind::Agent.into(),
+            kind: v1::ParticipantKind::Model.into(),
             seat: join.seat,
             ..v1::JoinRoomRequest::default()
         };

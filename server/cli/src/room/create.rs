@@ -35,8 +35,8 @@ pub(super) struct Create {
     server: ServerArg,
     /// How to fill the next seat: random, greedy, trained or monte_carlo (played by the server),
     /// replay:GAME-ID:SEAT (imitates the player who had that seat, from 0, in a recorded game), each
-    /// optionally with =NAME for another name; open, agent, human or robot (who may join); wizard (a
-    /// person who plays as a robot, and joins as one); or, with --physical, table=NAME or
+    /// optionally with =NAME for another name; open, agent, human, robot or model (who may join);
+    /// wizard (a person who plays as a robot, and joins as one); or, with --physical, table=NAME or
     /// table_robot=NAME (a person or a robot at the table). Several seats as in human*3. Repeatable;
     /// seats not listed are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seats)]
@@ -284,7 +284,7 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
         Err(AgentNameError::Unknown(_)) => {
             let known = NamedAgent::NAMES.join(", ");
             Err(format!(
-                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot, wizard"
+                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot, model, wizard"
             ))
         }
         Err(error) => Err(error.to_string()),
@@ -328,6 +328,7 @@ fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
         v1::ParticipantKind::Unspecified,
         v1::ParticipantKind::Agent,
         v1::ParticipantKind::Robot,
+        v1::ParticipantKind::Model,
         v1::ParticipantKind::Human,
     ];
     let free = |kind: v1::ParticipantKind| {
@@ -342,6 +343,10 @@ fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
             v1::ParticipantKind::Robot => {
                 let command = format!("chefshat agent greedy {there} --kind-of robot");
                 (" for robots", command)
+            }
+            v1::ParticipantKind::Model => {
+                let command = format!("chefshat agent llm {there} --endpoint URL --model NAME");
+                (" for language models", command)
             }
             v1::ParticipantKind::Human => {
                 let page = format!("{server}/join/{code}");

@@ -1,33 +1,36 @@
-//! `chefshat tournament join`: takes part with a built-in agent, through the Rust SDK, until the
-//! tournament is over.
+//! `chefshat tournament join`: takes part with a built-in agent or a language model, through the
+//! Rust SDK, until the tournament is over.
 
 use std::process::ExitCode;
 use std::time::Duration;
 
 use crate::kind::KindArg;
-use chefshat_agents::NamedAgent;
 use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
 use super::super::connect::{JoinArgs, Pass, ServerArg};
+use super::super::llm::LlmArgs;
 use super::super::numbers::counted;
-use super::super::remote::{MAX_PACE_MS, RemoteAgent, named_agent, seed_for};
+use super::super::player::{Player, PlayerArg, player_arg};
+use super::super::remote::MAX_PACE_MS;
 use super::super::{CommandError, say};
 use super::tables::{NO_GAME_COUNTED, place_in_words};
 use super::words::state;
 
-/// Take part with a built-in agent, until the tournament is over.
+/// Take part with a built-in agent or a language model, until the tournament is over.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament join --agent greedy --name Gustav --code BCDF2345\n  \
-                  chefshat tournament join --agent trained --games 8 --code-file ./join-code --json\n\n\
+                  chefshat tournament join --agent trained --games 8 --code-file ./join-code --json\n  \
+                  chefshat tournament join --agent llm --endpoint http://127.0.0.1:8080/v1 --model qwen3 --code BCDF2345\n\n\
                   Exit code: 0 when the tournament finished, 1 when it was closed or the place in it was lost."
 )]
 pub(super) struct Join {
-    /// The agent: random, random_unmasked, greedy or trained.
-    #[arg(long, value_parser = named_agent, value_name = "KIND")]
-    agent: NamedAgent,
+    /// The agent: random, random_unmasked, greedy, trained, monte_carlo, or llm (a language model,
+    /// which plays one game at a time).
+    #[arg(long, value_parser = player_arg, value_name = "KIND")]
+    agent: PlayerArg,
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
@@ -35,9 +38,9 @@ pub(super) struct Join {
     /// Display name, unique in the tournament. Default: the agent's.
     #[arg(long)]
     name: Option<String>,
-    /// Kind of participant.
-    #[arg(long, value_enum, default_value_t = KindArg::Agent)]
-    kind_of: KindArg,
+    /// Kind of participant. Default: agent, and model for llm.
+    #[arg(long, value_enum)]
+    kind_of: Option<KindArg>,
     /// Maximum number of games at a time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     games: u32,
@@ -50,6 +53,8 @@ pub(super) struct Join {
     /// Print one JSON line per game, and one at the end.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    llm: LlmArgs,
 }
 
 /// A new place in a tournament.
@@ -60,6 +65,11 @@ struct Place {
 
 impl Join {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        if self.games > 1 && matches!(self.agent, PlayerArg::Llm) {
+            return Err("a language model plays one game at a time: leave out --games".into());
+        }
+        let pace = Duration::from_millis(self.pace_ms);
+        let players = self.agent.players(&self.llm, self.seed, pace)?;
         let client = self.server.connect_patiently().await?;
         let (ticket, place) = match self.join_args.pass(None).await? {
             Pass::Ticket(ticket) => (ticket, None),
@@ -70,10 +80,10 @@ impl Join {
         };
         let mut games = 0_u64;
         let make = |_: &v1::Attached| {
-            let seed = seed_for(&format!("chefshat tournament join {games}"), self.seed);
+            let player = players.player(&format!("chefshat tournament join {games}"));
             games += 1;
             Teller {
-                agent: RemoteAgent::named(self.agent, seed, Duration::from_millis(self.pace_ms)),
+                player,
                 json: self.json,
             }
         };
@@ -96,12 +106,14 @@ impl Join {
         client: &Client,
         code: String,
     ) -> Result<(String, Place), CommandError> {
-        let name = self.name.clone().unwrap_or_else(|| self.agent.name());
+        let name = self.name.clone();
+        let name = name.unwrap_or_else(|| self.agent.display_name(&self.llm));
+        let kind = self.kind_of.unwrap_or(self.agent.kind());
         let joined = client
             .join_tournament(v1::JoinTournamentRequest {
                 join_code: code,
                 name: name.clone(),
-                kind: v1::ParticipantKind::from(self.kind_of).into(),
+                kind: v1::ParticipantKind::from(kind).into(),
                 max_games: self.games,
                 // Each game has its own agent.
                 stateless: true,
@@ -147,29 +159,38 @@ impl Join {
     }
 }
 
-/// An agent that reports the ends of its games.
+/// A player that reports the ends of its games.
 struct Teller {
-    agent: RemoteAgent,
+    player: Player,
     json: bool,
 }
 
 impl Agent for Teller {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
-        self.agent.decide(request)
+        self.player.agent().decide(request)
+    }
+
+    fn annotate(&mut self) -> Option<v1::Annotations> {
+        self.player.agent().annotate()
     }
 
     fn on_attached(&mut self, attached: &v1::Attached) {
-        self.agent.on_attached(attached);
+        self.player.agent().on_attached(attached);
     }
 
     fn on_event(&mut self, event: &v1::GameEvent) {
-        self.agent.on_event(event);
+        self.player.agent().on_event(event);
+    }
+
+    fn on_result(&mut self, result: &v1::AnswerResult) {
+        self.player.agent().on_result(result);
     }
 
     fn on_game_over(&mut self, outcome: &Outcome) {
+        self.player.agent().on_game_over(outcome);
         let printed = match self.json {
-            true => say(outcome_json(outcome)),
-            false => say(outcome_in_words(outcome)),
+            true => say(self.player.as_json(outcome_json(outcome))),
+            false => say(self.player.in_words(&outcome_in_words(outcome))),
         };
         if let Err(error) = printed {
             // The agent plays on even if nobody listens.

@@ -142,6 +142,7 @@ pub(crate) fn symbol(kind: v1::ParticipantKind) -> (&'static str, &'static str) 
     match kind {
         v1::ParticipantKind::Human => ("☺", "person"),
         v1::ParticipantKind::Robot => ("▣", "robot"),
+        v1::ParticipantKind::Model => ("✦", "model"),
         v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified => ("◆", "agent"),
     }
 }

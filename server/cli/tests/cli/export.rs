@@ -226,7 +226,7 @@ fn mistakes_are_explained() {
         ("--layout chefshatgym --format parquet", "always CSV"),
         (
             "--with cat",
-            "possible values: agent, human, robot, built_in",
+            "possible values: agent, human, robot, model, built_in",
         ),
         (
             "--force --with human",

@@ -8,6 +8,7 @@ pub fn kind_name(kind: ParticipantKind) -> &'static str {
     match kind {
         ParticipantKind::Human => "human",
         ParticipantKind::Robot => "robot",
+        ParticipantKind::Model => "model",
         ParticipantKind::Agent | ParticipantKind::Unspecified => "agent",
     }
 }
@@ -18,6 +19,7 @@ pub fn kind_from_name(name: &str) -> Option<ParticipantKind> {
         ParticipantKind::Agent,
         ParticipantKind::Human,
         ParticipantKind::Robot,
+        ParticipantKind::Model,
     ];
     kinds.into_iter().find(|kind| kind_name(*kind) == name)
 }

@@ -209,7 +209,7 @@ impl Settings {
         let named = self.players.keys().copied().eq((0..).take(players));
         if !named {
             return Err(at(format!(
-                "before the first Shift, each of the seats 0..={} needs one row `human`, `robot` or `agent` with a name as its value",
+                "before the first Shift, each of the seats 0..={} needs one row `human`, `robot`, `agent` or `model` with a name as its value",
                 players - 1
             )));
         }

@@ -139,10 +139,11 @@ struct ReportedForm {
 }
 
 /// The numbers of kinds, sources and reasons. A released number never changes.
-pub(super) const KINDS: [(u32, ParticipantKind); 3] = [
+pub(super) const KINDS: [(u32, ParticipantKind); 4] = [
     (1, ParticipantKind::Agent),
     (2, ParticipantKind::Human),
     (3, ParticipantKind::Robot),
+    (4, ParticipantKind::Model),
 ];
 const SOURCES: [(u32, Source); 7] = [
     (1, Source::Agent),

@@ -9,7 +9,7 @@ export const people: Texts["people"] = {
   title: "Bestenliste",
   text: "Alle, die auf diesem Server eine gewertete Partie gespielt haben. Namen sind frei gewählt und nicht geschützt.",
   ratedGames: (games) => plural(games, { one: "# gewertete Partie", other: "# gewertete Partien" }),
-  kinds: { label: "Wer", all: "Alle", human: "Personen", robot: "Roboter", agent: "Agenten" },
+  kinds: { label: "Wer", all: "Alle", human: "Personen", robot: "Roboter", agent: "Agenten", model: "Sprachmodelle" },
   minGames: {
     label: "Mit mindestens",
     games: (games) => plural(games, { one: "# Partie", other: "# Partien" }),

@@ -313,10 +313,11 @@ export const table: Texts["table"] = {
     here: "verbunden",
     notHere: "hat Platz genommen, ist aber nicht verbunden",
     waitsFor: {
-      [ParticipantKind.UNSPECIFIED]: "frei für alle: eine Person, einen Roboter oder einen Agenten",
+      [ParticipantKind.UNSPECIFIED]: "frei für alle: eine Person, einen Roboter, einen Agenten oder ein Sprachmodell",
       [ParticipantKind.HUMAN]: "wartet auf eine Person",
       [ParticipantKind.ROBOT]: "wartet auf einen Roboter",
       [ParticipantKind.AGENT]: "wartet auf einen Agenten",
+      [ParticipantKind.MODEL]: "wartet auf ein Sprachmodell",
     },
     ways: "So kommen andere dazu",
     invited: "Wer den Raum erstellt hat, lädt die anderen mit einer Adresse oder einem Beitrittscode ein.",

@@ -52,7 +52,7 @@ export const common = {
       "This removes your seats, your places in tournaments, the rooms and tournaments you created, your name and your settings from this device. You cannot get them back.",
     forgetDo: "Forget everything",
   },
-  kinds: { agent: "agent", human: "person", robot: "robot", builtIn: "built-in agent", open: "free" },
+  kinds: { agent: "agent", human: "person", robot: "robot", model: "model", builtIn: "built-in agent", open: "free" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cook", waiter: "Waiter", dishwasher: "Dishwasher" },
   faces: [
     "truffle",

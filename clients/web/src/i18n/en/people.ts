@@ -8,7 +8,7 @@ export const people = {
   title: "Leaderboard",
   text: "Everyone who has played a rated game on this server. Players choose their own names; names are not protected.",
   ratedGames: (games: number) => plural(games, { one: "# rated game", other: "# rated games" }),
-  kinds: { label: "Who", all: "Everyone", human: "People", robot: "Robots", agent: "Agents" },
+  kinds: { label: "Who", all: "Everyone", human: "People", robot: "Robots", agent: "Agents", model: "Language models" },
   minGames: { label: "With at least", games: (games: number) => plural(games, { one: "# game", other: "# games" }) },
   none: "Nobody has played a rated game here yet.",
   noneOfThese: "Nobody matches these filters. Choose fewer games, or everyone.",

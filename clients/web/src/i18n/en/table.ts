@@ -308,10 +308,11 @@ export const table = {
     here: "connected",
     notHere: "seated, but not connected",
     waitsFor: {
-      [ParticipantKind.UNSPECIFIED]: "waiting for anyone: a person, a robot or an agent",
+      [ParticipantKind.UNSPECIFIED]: "waiting for anyone: a person, a robot, an agent or a language model",
       [ParticipantKind.HUMAN]: "waiting for a person",
       [ParticipantKind.ROBOT]: "waiting for a robot",
       [ParticipantKind.AGENT]: "waiting for an agent",
+      [ParticipantKind.MODEL]: "waiting for a language model",
     },
     ways: "How others join",
     invited: "The creator of the room invites the others with an address or a join code.",

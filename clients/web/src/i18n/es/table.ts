@@ -313,10 +313,11 @@ export const table: Texts["table"] = {
     here: "conectado",
     notHere: "sentado, pero sin conexión",
     waitsFor: {
-      [ParticipantKind.UNSPECIFIED]: "esperando a cualquiera: una persona, un robot o un agente",
+      [ParticipantKind.UNSPECIFIED]: "esperando a cualquiera: una persona, un robot, un agente o un modelo de lenguaje",
       [ParticipantKind.HUMAN]: "esperando a una persona",
       [ParticipantKind.ROBOT]: "esperando a un robot",
       [ParticipantKind.AGENT]: "esperando a un agente",
+      [ParticipantKind.MODEL]: "esperando a un modelo de lenguaje",
     },
     ways: "Cómo entran los demás",
     invited: "Quien creó la sala invita a los demás con una dirección o un código de acceso.",

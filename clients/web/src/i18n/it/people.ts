@@ -9,7 +9,7 @@ export const people: Texts["people"] = {
   title: "Classifica",
   text: "Chiunque abbia giocato una partita valutata su questo server. Ognuno sceglie il proprio nome; i nomi non sono protetti.",
   ratedGames: (games) => plural(games, { one: "# partita valutata", other: "# partite valutate" }),
-  kinds: { label: "Chi", all: "Tutti", human: "Persone", robot: "Robot", agent: "Agenti" },
+  kinds: { label: "Chi", all: "Tutti", human: "Persone", robot: "Robot", agent: "Agenti", model: "Modelli linguistici" },
   minGames: { label: "Con almeno", games: (games) => plural(games, { one: "# partita", other: "# partite" }) },
   none: "Qui nessuno ha ancora giocato una partita valutata.",
   noneOfThese: "Nessuno corrisponde a questi filtri. Scegli meno partite, o tutti.",

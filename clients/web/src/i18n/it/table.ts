@@ -313,10 +313,11 @@ export const table: Texts["table"] = {
     here: "connesso",
     notHere: "seduto, ma non connesso",
     waitsFor: {
-      [ParticipantKind.UNSPECIFIED]: "in attesa di chiunque: una persona, un robot o un agente",
+      [ParticipantKind.UNSPECIFIED]: "in attesa di chiunque: una persona, un robot, un agente o un modello linguistico",
       [ParticipantKind.HUMAN]: "in attesa di una persona",
       [ParticipantKind.ROBOT]: "in attesa di un robot",
       [ParticipantKind.AGENT]: "in attesa di un agente",
+      [ParticipantKind.MODEL]: "in attesa di un modello linguistico",
     },
     ways: "Come entrano gli altri",
     invited: "Chi ha creato la stanza invita gli altri con un indirizzo o un codice d’ingresso.",

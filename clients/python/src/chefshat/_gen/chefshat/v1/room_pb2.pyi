@@ -29,11 +29,13 @@ class _ParticipantKindEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Parti
     PARTICIPANT_KIND_UNSPECIFIED: _ParticipantKind.ValueType  # 0
     """Not specified. As a reservation: any kind."""
     PARTICIPANT_KIND_AGENT: _ParticipantKind.ValueType  # 1
-    """A program."""
+    """A program that is not a language model."""
     PARTICIPANT_KIND_HUMAN: _ParticipantKind.ValueType  # 2
     """A person."""
     PARTICIPANT_KIND_ROBOT: _ParticipantKind.ValueType  # 3
     """A robot."""
+    PARTICIPANT_KIND_MODEL: _ParticipantKind.ValueType  # 4
+    """A language model."""
 
 class ParticipantKind(_ParticipantKind, metaclass=_ParticipantKindEnumTypeWrapper):
     """The kind of a participant."""
@@ -41,11 +43,13 @@ class ParticipantKind(_ParticipantKind, metaclass=_ParticipantKindEnumTypeWrappe
 PARTICIPANT_KIND_UNSPECIFIED: ParticipantKind.ValueType  # 0
 """Not specified. As a reservation: any kind."""
 PARTICIPANT_KIND_AGENT: ParticipantKind.ValueType  # 1
-"""A program."""
+"""A program that is not a language model."""
 PARTICIPANT_KIND_HUMAN: ParticipantKind.ValueType  # 2
 """A person."""
 PARTICIPANT_KIND_ROBOT: ParticipantKind.ValueType  # 3
 """A robot."""
+PARTICIPANT_KIND_MODEL: ParticipantKind.ValueType  # 4
+"""A language model."""
 Global___ParticipantKind: _TypeAlias = ParticipantKind  # noqa: Y015
 
 class _Durability:
@@ -325,9 +329,9 @@ class SeatConfig(_message.Message):
     the player does is reported. Only in a physical room.
     """
     wizard: Global___ParticipantKind.ValueType
-    """A person who plays as a participant of this kind, ROBOT or AGENT (Wizard of Oz), and joins as
-    one, with the room's join code. To everybody in the room and to spectators the seat is as
-    with `reserved_for`, also after the end. Only the record says what it was
+    """A person who plays as a participant of this kind, ROBOT, AGENT or MODEL (Wizard of Oz), and
+    joins as one, with the room's join code. To everybody in the room and to spectators the seat
+    is as with `reserved_for`, also after the end. Only the record says what it was
     (`Participant.shown_kind`). The game is not rated. Not in physical rooms.
     """
     name: _builtins.str
@@ -451,13 +455,13 @@ class RoomPolicy(_message.Message):
     ABSENCE_TIME_MS_FIELD_NUMBER: _builtins.int
     CHAT_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
-    """Milliseconds for a decision, 10..=86400000; by default 10000, for people 60000. A
-    special action has the longest time of any seat that participants can take, for every holder of
-    the jokers, and no bank.
+    """Milliseconds for a decision, 10..=86400000; by default 10000, for people and language
+    models 60000. A special action has the longest time of any seat that participants can take, for
+    every holder of the jokers, and no bank.
     """
     bank_ms: _builtins.int
     """The time bank: milliseconds that each seat may use beyond that in the game, 0..=86400000; by
-    default 60000, for people 300000.
+    default 60000, for people and language models 300000.
     """
     max_invalid_attempts: _builtins.int
     """Invalid attempts at one decision after which the server takes the default decision, 1..=1000;
@@ -536,9 +540,9 @@ class RoomPolicy(_message.Message):
     """
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
-        """Other times for some kinds of participants, each kind at most once. People have the default
-        times for people unless their clock, decision_time_ms or bank_ms is set; a clock that sets
-        absence_time_ms alone leaves them as they are.
+        """Other times for some kinds of participants, each kind at most once. People and language
+        models have their default times unless the clock of their kind, decision_time_ms or bank_ms is
+        set; a clock that sets absence_time_ms alone leaves them as they are.
         """
 
     def __init__(
