@@ -27,11 +27,7 @@ class Images:
 
     def __init__(self, storage: Path, cache: Path) -> None:
         """Uses an empty folder for the images, and a folder for base systems that is kept between runs."""
-        if os.geteuid() != 0:
-            pytest.skip("only root can build images here")
-        for program in ("buildah", "debootstrap"):
-            if shutil.which(program, path=f"{os.environ['PATH']}:/usr/sbin") is None:
-                pytest.skip(f"{program} is not installed")
+        require("buildah", "debootstrap")
         self._storage, self._cache = storage, cache
         # Temporary files include the caches of builds.
         temporary = storage / "tmp"
@@ -51,9 +47,7 @@ class Images:
         if not system.exists():
             part = self._cache / f"{name}.part"
             shutil.rmtree(part, ignore_errors=True)
-            release = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().splitlines() if "=" in line)
-            include = ",".join(["ca-certificates", "libstdc++6", *packages])
-            run(["debootstrap", "--variant=minbase", f"--include={include}", release["VERSION_CODENAME"], str(part)])
+            debian(part, "ca-certificates", "libstdc++6", *packages)
             shutil.copy(_AUTHORITIES, part / _AUTHORITIES.relative_to("/"))
             for path, text in scripts.items():
                 script = part / path
@@ -67,6 +61,10 @@ class Images:
         stripped = self._storage / "chefshat"
         run(["strip", "-o", str(stripped), str(file)])
         return self._image("binary", {stripped: "/chefshat"}, [])
+
+    def load(self, file: Path) -> str:
+        """Loads the image of a file, as docker does."""
+        return self._run("pull", "--quiet", f"docker-archive:{file}")
 
     def _image(self, name: str, files: dict[Path, str], configuration: list[str]) -> str:
         container = self._run("from", "scratch")
@@ -133,6 +131,22 @@ class Container:
         process = self.start(*command, environment=environment)
         output, _ = process.communicate(timeout=PATIENCE_S)
         return process.returncode, output
+
+
+def require(*programs: str) -> None:
+    """Skips the test without these programs or without root, whom they need."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can make systems and images here")
+    for program in programs:
+        if shutil.which(program, path=f"{os.environ['PATH']}:/usr/sbin") is None:
+            pytest.skip(f"{program} is not installed")
+
+
+def debian(folder: Path, *packages: str) -> None:
+    """Makes a minimal Debian of the release of this machine, with further packages."""
+    release = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().splitlines() if "=" in line)
+    include = [f"--include={','.join(packages)}"] if packages else []
+    run(["debootstrap", "--variant=minbase", *include, release["VERSION_CODENAME"], str(folder)])
 
 
 def stop(process: subprocess.Popen[str], number: int = signal.SIGTERM) -> tuple[int, str]:

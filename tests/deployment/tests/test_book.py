@@ -24,6 +24,7 @@ PAGES = ["README.md", "proto/README.md", *(f"docs/{page.name}" for page in sorte
 TYPED_BY = {
     "docs/access.md": "tests/deployment/tests/test_friends.py",
     "docs/pictures.md": "server/cli/tests/cli/render.rs",
+    "docs/releases.md": "tests/deployment/tests/test_release.py",
 }
 
 #: What sets up a machine: `cargo xtask test` has done it.

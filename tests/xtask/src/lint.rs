@@ -10,6 +10,10 @@ use crate::steps::Steps;
 use crate::web;
 use crate::{arrows, book, circles};
 
+/// The protocol of the last release, which later ones only add to: `buf build proto
+/// --exclude-source-info`. A file and not a tag, since archives and shallow clones have no tags.
+const RELEASED_PROTOCOL: &str = "proto/frozen/v1.binpb";
+
 /// What is off by default and still checked and tested, in one build with the rest.
 pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
 
@@ -23,6 +27,8 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
 
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
+    let kept = ["breaking", "proto", "--against", RELEASED_PROTOCOL];
+    steps.program("buf breaking", tool(places, "buf").args(kept))?;
     book::check_and_build(places, steps)?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
     for name in ["compose", "compose.proxy", "compose.cluster"] {

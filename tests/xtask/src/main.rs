@@ -1,7 +1,7 @@
 //! `cargo xtask`: sets up and runs the tests of all languages, runs the linters, builds the
-//! page, the book and wheels.
+//! page, the book, wheels and releases.
 //!
-//! The command line is here; [`lint`], [`test`], [`book`], [`web`] and [`wheels`] are the tasks, [`setup`] prepares them.
+//! The command line is here; [`lint`], [`test`], [`book`], [`web`], [`wheels`] and [`dist`] are the tasks, [`setup`] prepares them.
 //! It depends on no crate of the project: it only starts other programs, and builds even if they do
 //! not.
 
@@ -9,6 +9,7 @@ mod arrows;
 mod book;
 mod circles;
 mod command;
+mod dist;
 mod failure;
 mod lint;
 mod places;
@@ -18,6 +19,7 @@ mod test;
 mod web;
 mod wheels;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -64,6 +66,16 @@ enum Task {
         #[arg(long = "try")]
         try_them: bool,
     },
+    /// Make a release of the commit that is checked out, into `target/artefacts`: archives, a Debian
+    /// package, an image, wheels, crates, bills of materials, checksums.
+    Dist {
+        /// Sign the checksums with this SSH key, a file.
+        #[arg(long, value_name = "FILE")]
+        key: Option<PathBuf>,
+        /// Install each part on a bare system, without Rust and this repository, and use it.
+        #[arg(long = "try")]
+        try_them: bool,
+    },
 }
 
 #[test]
@@ -93,6 +105,7 @@ fn main() -> ExitCode {
         Task::Book => book::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
         Task::Wheels { profile, try_them } => wheels::run(&places, &mut steps, &profile, try_them),
+        Task::Dist { key, try_them } => dist::run(&places, &mut steps, key.as_deref(), try_them),
     });
     print!("{}", steps.summary());
     match outcome {

@@ -143,6 +143,11 @@ impl Places {
         self.target.join("wheels")
     }
 
+    /// Where a release is put.
+    pub(crate) fn dist(&self) -> PathBuf {
+        self.target.join("artefacts")
+    }
+
     /// The book, as a folder of HTML.
     pub(crate) fn book(&self) -> PathBuf {
         self.target.join("book")

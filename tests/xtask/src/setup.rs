@@ -14,6 +14,9 @@ use crate::places::Places;
 /// The version of cargo-deny for which deny.toml is written.
 const CARGO_DENY: &str = "0.20.2";
 
+/// What lists the contents of a release.
+const CARGO_CYCLONEDX: &str = "0.5.9";
+
 /// Oldest major version of Node that the packages support.
 const OLDEST_NODE: u32 = 20;
 
@@ -245,12 +248,22 @@ pub(crate) fn images() -> Result<(), Failure> {
     Ok(())
 }
 
-/// cargo-deny: from the path if it has the right version, else built here. Returns its command.
+/// cargo-deny, which checks licences and sources. Returns its command.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
-    let wanted = format!("cargo-deny {CARGO_DENY}");
-    let own = places.cargo_tools().join("bin/cargo-deny");
-    for program in [own.as_path(), Path::new("cargo-deny")] {
-        if read(Command::new(program).arg("--version")).is_ok_and(|version| version == wanted) {
+    cargo_tool(places, "cargo-deny", CARGO_DENY)
+}
+
+/// cargo-cyclonedx, which lists what a binary contains. Returns its command.
+pub(crate) fn cargo_cyclonedx(places: &Places) -> Result<Command, Failure> {
+    cargo_tool(places, "cargo-cyclonedx", CARGO_CYCLONEDX)
+}
+
+/// A program for Cargo: from the path if it has this version, else built here.
+fn cargo_tool(places: &Places, name: &str, version: &str) -> Result<Command, Failure> {
+    let own = places.cargo_tools().join("bin").join(name);
+    for program in [own.as_path(), Path::new(name)] {
+        let said = read(Command::new(program).arg("--version"));
+        if said.is_ok_and(|said| said.ends_with(&format!(" {version}"))) {
             return Ok(Command::new(program));
         }
     }
@@ -258,15 +271,8 @@ pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     // seconds.
     let build = places.cargo_tools().join("build");
     let mut install = cargo();
-    install.args([
-        "install",
-        "cargo-deny",
-        "--locked",
-        "--debug",
-        "--quiet",
-        "--version",
-        CARGO_DENY,
-    ]);
+    install.args(["install", name, "--locked", "--debug", "--quiet"]);
+    install.args(["--version", version]);
     run(install
         .arg("--root")
         .arg(places.cargo_tools())

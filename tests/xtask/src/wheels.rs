@@ -17,6 +17,8 @@ const PLATFORM: &str = "manylinux_2_17";
 
 /// The packages built by maturin, from Rust.
 const BUILT_FROM_RUST: [&str; 2] = ["clients/python/native", "clients/python/server"];
+/// The packages in Python alone.
+const PURE: [&str; 2] = ["clients/python", "clients/robot"];
 
 /// Builds the page and all wheels with one of Cargo's profiles; then optionally tries them.
 pub(crate) fn run(
@@ -43,9 +45,11 @@ pub(crate) fn run(
         maturin.args(["--zig", "--compatibility", PLATFORM]);
         steps.program(&format!("wheel of {package}"), &mut maturin)?;
     }
-    let mut hatchling = tool(places, "hatchling", "clients/python");
-    hatchling.args(["build", "-t", "wheel", "-d"]).arg(&wheels);
-    steps.program("wheel of clients/python", &mut hatchling)?;
+    for package in PURE {
+        let mut hatchling = tool(places, "hatchling", package);
+        hatchling.args(["build", "-t", "wheel", "-d"]).arg(&wheels);
+        steps.program(&format!("wheel of {package}"), &mut hatchling)?;
+    }
     steps.run("auditwheel", || {
         built(&wheels)?
             .iter()
@@ -118,7 +122,7 @@ fn is_pure(wheel: &Path) -> bool {
 }
 
 /// The wheels in a folder, sorted.
-fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     fs::create_dir_all(folder).map_err(|error| at(folder, &error))?;
     let entries = fs::read_dir(folder).map_err(|error| at(folder, &error))?;
     let mut wheels: Vec<PathBuf> = entries
@@ -130,7 +134,7 @@ fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// A program of the builders' environment, in a folder of the source tree.
-fn tool(places: &Places, name: &str, folder: &str) -> Command {
+pub(crate) fn tool(places: &Places, name: &str, folder: &str) -> Command {
     let programs = places.wheel_tools().join("bin");
     let mut command = Command::new(programs.join(name));
     let path = std::env::var_os("PATH").unwrap_or_default();

@@ -1,0 +1,234 @@
+"""The files of a release, each tried on a system that has nothing else, by the commands of docs/releases.md as they are written.
+
+`cargo xtask dist --try` runs this, and names the folder of the release in CHEFSHAT_DIST. It needs root, debootstrap and buildah.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import chefshat
+import pytest
+from chefshat import RandomAgent
+from images import ROOT, Images, debian, end, require, run, until
+
+DIST = Path(os.environ.get("CHEFSHAT_DIST", ""))
+VERSION = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
+PAGE = (ROOT / "docs/releases.md").read_text()
+#: How long a command may take, seconds.
+PATIENCE_S = 1800.0
+
+pytestmark = pytest.mark.skipif(
+    not os.environ.get("CHEFSHAT_DIST"), reason="CHEFSHAT_DIST is not set: name the folder of a release"
+)
+
+
+def block(words: str) -> str:
+    """The commands of the page in the block that begins with these words."""
+    blocks: list[str] = re.findall(r"^```sh\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    (found,) = [block for block in blocks if block.startswith(words)]
+    return found
+
+
+class System:
+    """A minimal Debian, in which somebody has downloaded files."""
+
+    folder = "root/download"
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def download(self, *files: Path) -> None:
+        """Puts files into the folder of the person."""
+        (self.root / self.folder).mkdir(exist_ok=True)
+        for file in files:
+            shutil.copy(file, self.root / self.folder)
+
+    def type(self, commands: str, **environment: str) -> str:
+        """Types commands, which must succeed. Returns what they print."""
+        process = self.start(f"cd /{self.folder}; {commands}", **environment)
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, output
+        return output
+
+    def start(self, commands: str, **environment: str) -> subprocess.Popen[str]:
+        """Types commands, which may run for long."""
+        path = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+        return subprocess.Popen(
+            ["chroot", str(self.root), "/bin/bash", "-e", "-c", commands],
+            env={"PATH": path, "HOME": "/root", **environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+
+def bare(folder: Path, *packages: str) -> Iterator[System]:
+    """A minimal Debian with further packages."""
+    require("debootstrap")
+    debian(folder, *packages)
+    yield System(folder)
+    shutil.rmtree(folder)
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> Iterator[System]:
+    """A minimal Debian."""
+    yield from bare(tmp_path / "system")
+
+
+@pytest.fixture
+def python_system(tmp_path: Path) -> Iterator[System]:
+    """A minimal Debian with Python."""
+    yield from bare(tmp_path / "system", "python3-venv")
+
+
+def test_the_checksums_and_the_signature_are_right(tmp_path: Path) -> None:
+    for file in DIST.iterdir():
+        shutil.copy(file, tmp_path)
+    listed = {line.split()[1] for line in (tmp_path / "SHA256SUMS").read_text().splitlines()}
+    assert listed == {file.name for file in DIST.iterdir()} - {"SHA256SUMS", "SHA256SUMS.sig"}
+    check, verify = block("sha256sum").splitlines()
+    assert subprocess.run(check, shell=True, cwd=tmp_path).returncode == 0
+    if not (tmp_path / "SHA256SUMS.sig").exists():
+        pytest.skip("the release is not signed")
+    # The signature contains the key, which a person would have from elsewhere.
+    found = subprocess.run(
+        "ssh-keygen -Y check-novalidate -n chefshat-release -s SHA256SUMS.sig < SHA256SUMS",
+        shell=True,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "Good" in found.stdout, verify
+
+
+def test_the_program_of_the_archive_plays(system: System) -> None:
+    system.download(DIST / f"chefshat-{VERSION}-x86_64-linux.tar.gz")
+    output = system.type(block("tar -xzf"))
+    assert "place" in output, output
+    folder = system.root / system.folder / f"chefshat-{VERSION}-x86_64-linux"
+    assert len(list((folder / "man").iterdir())) > 20
+    assert {file.name for file in (folder / "completions").iterdir()} == {"chefshat", "_chefshat", "chefshat.fish"}
+
+
+def test_the_debian_package_has_a_service(system: System) -> None:
+    system.download(DIST / f"chefshat_{VERSION}_amd64.deb")
+    assert "place" in system.type(block("sudo dpkg").replace("sudo ", ""))
+    assert VERSION in system.type("chefshat --version")
+    unit = system.type("cat /lib/systemd/system/chefshat.service")
+    (start,) = re.findall(r"^ExecStart=(.*)$", unit, re.MULTILINE)
+    # As systemd would start it.
+    address = f"127.197.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}:50051"
+    as_user = f"setpriv --reuid=chefshat --regid=chefshat --clear-groups {start} --listen {address}"
+    server = system.start(f"exec {as_user}", CHEFSHAT_DATA_DIR="/var/lib/chefshat")
+    try:
+        while "ok" not in system.type("chefshat health || true", CHEFSHAT_SERVER=f"http://{address}"):
+            assert server.poll() is None, server.communicate()
+        play(address)
+    finally:
+        server.terminate()
+    output, _ = server.communicate(timeout=PATIENCE_S)
+    assert server.returncode == 0, output
+    (owner,) = {file.owner() for file in (system.root / "var/lib/chefshat").rglob("games.sqlite3")} - {None}
+    assert owner
+    system.type("dpkg --remove chefshat")
+    assert list((system.root / "var/lib/chefshat/records").iterdir())
+    assert (system.root / "etc/chefshat/chefshat.toml").exists()
+
+
+def test_the_wheels_work_without_a_network(python_system: System, tmp_path: Path) -> None:
+    wheels = sorted(DIST.glob("*.whl"))
+    assert len(wheels) == 4
+    house = tmp_path / "house"
+    sdk = next(wheel for wheel in wheels if wheel.name.startswith("chefshat-"))
+    run(
+        [sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(house), "--find-links", str(DIST), f"{sdk}[envs]", "pip"]
+    )
+    shutil.copytree(house, python_system.root / "house")
+    python_system.download(*wheels, ROOT / "clients/python/tools/try_wheels.py")
+    offline = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": "/house"}
+    output = python_system.type(block("python3 -m venv"), **offline)
+    assert "action_mask" in output, output
+    assert "place" in output, output
+    activated = ". .venv/bin/activate; export PATH; "
+    python_system.type(f"{activated} pip install ./chefshat_robot-*.whl; chefshat-robot --help; python -I try_wheels.py", **offline)
+
+
+def test_the_image_plays(tmp_path: Path) -> None:
+    images = Images(tmp_path, tmp_path)
+    try:
+        image = images.load(DIST / f"chefshat-{VERSION}-image.tar")
+        configuration = images.configuration(image)
+        assert configuration["User"] == "65532:65532"
+        assert configuration["Env"] == ["CHEFSHAT_DATA_DIR=/data", "CHEFSHAT_LISTEN=0.0.0.0:50051"]
+        address = f"127.196.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}:50051"
+        environment = {"CHEFSHAT_LISTEN": address, "CHEFSHAT_SERVER": f"http://{address}"}
+        container = images.container(image)
+        code, output = container.run("demo", environment=environment)
+        assert code == 0, output
+        server = container.start(environment=environment)
+        try:
+            until(server, container, environment)
+            play(address)
+        finally:
+            end(server)
+    finally:
+        images.close()
+
+
+def test_an_agent_is_built_from_the_crates(tmp_path: Path) -> None:
+    for name in ("proto", "client"):
+        run(["tar", "-xzf", str(DIST / f"chefshat-{name}-{VERSION}.crate"), "-C", str(tmp_path)])
+    folder = tmp_path / f"chefshat-client-{VERSION}"
+    proto = json.dumps(str(tmp_path / f"chefshat-proto-{VERSION}"))
+    build = ["cargo", "build", "--quiet", "--example", "random_agent", "--config", f"patch.crates-io.chefshat-proto.path={proto}"]
+    environment = os.environ | {"CARGO_TARGET_DIR": str(tmp_path / "target")}
+    subprocess.run(build, cwd=folder, env=environment, check=True, timeout=PATIENCE_S)
+    assert (tmp_path / "target/debug/examples/random_agent").exists()
+
+
+def test_the_protocol_compiles_elsewhere(tmp_path: Path) -> None:
+    run(["tar", "-xzf", str(DIST / f"chefshat-protocol-{VERSION}.tar.gz"), "-C", str(tmp_path)])
+    folder = tmp_path / f"chefshat-protocol-{VERSION}"
+    files = sorted(str(file) for file in folder.glob("chefshat/v1/*.proto"))
+    run([sys.executable, "-m", "grpc_tools.protoc", "-I", str(folder), f"--cpp_out={tmp_path}", *files])
+    assert len(list(tmp_path.glob("chefshat/v1/*.pb.h"))) == len(files) > 20
+
+
+def test_the_book_is_complete(tmp_path: Path) -> None:
+    run(["tar", "-xzf", str(DIST / f"chefshat-book-{VERSION}.tar.gz"), "-C", str(tmp_path)])
+    pages = {page.stem for page in (ROOT / "docs").glob("*.md")}
+    assert pages <= {page.stem for page in (tmp_path / "book").glob("*.html")}
+
+
+def test_the_bills_name_what_is_inside() -> None:
+    binary = json.loads((DIST / f"chefshat-{VERSION}.cdx.json").read_text())
+    page = json.loads((DIST / f"chefshat-page-{VERSION}.cdx.json").read_text())
+    assert binary["bomFormat"] == page["bomFormat"] == "CycloneDX"
+    assert {"tokio", "tonic", "prost", "rustls", "chefshat-engine"} <= {part["name"] for part in binary["components"]}
+    assert "preact" in {part["name"] for part in page["components"]}
+
+
+def test_the_source_is_complete(tmp_path: Path) -> None:
+    run(["tar", "-xzf", str(DIST / f"chefshat-{VERSION}-source.tar.gz"), "-C", str(tmp_path)])
+    folder = tmp_path / f"chefshat-{VERSION}-source"
+    tracked = run(["git", "ls-files"]).splitlines()
+    assert {str(file.relative_to(folder)) for file in folder.rglob("*") if not file.is_dir()} == set(tracked)
+
+
+def play(address: str) -> None:
+    """Plays a Shift on a server, from outside."""
+    with chefshat.Client(address) as client:
+        rules = chefshat.pb.RuleSet(target_shifts=1)
+        room = client.create_room("a release", rules=rules, seats=[None, "greedy", "random", "trained"])
+        ticket = client.join_room(room.join_code, "outside").ticket
+        assert client.play(RandomAgent(1), ticket).finished

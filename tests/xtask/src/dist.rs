@@ -1,0 +1,511 @@
+//! `cargo xtask dist`: everything of a release, in the folder `target/artefacts`, from the commit that is
+//! checked out: the static binary as an archive, a Debian package and an image, the wheels, the
+//! crates, the protocol, the book, the source, what they contain, checksums and a signature.
+//! docs/releases.md says what is for whom. The tests of `tests/deployment` try them on bare systems.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::book;
+use crate::command::{cargo, python_command, read, run as run_command, succeeds};
+use crate::failure::Failure;
+use crate::places::{DEPLOYMENT, Places};
+use crate::setup::{self, at};
+use crate::steps::Steps;
+use crate::wheels::{self, tool};
+
+/// The version of everything.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Where the binary runs: on every Linux of this processor, without libraries.
+const TARGET: &str = "x86_64-unknown-linux-musl";
+/// The same in the names of files, and Debian's word for the processor.
+const PLATFORM: &str = "x86_64-linux";
+const DEBIAN: &str = "amd64";
+/// The crates that others build on.
+const CRATES: [&str; 3] = ["chefshat-proto", "chefshat-engine", "chefshat-client"];
+/// Shells with completion scripts, and where Debian keeps them.
+const COMPLETIONS: [(&str, &str); 3] = [
+    ("bash", "usr/share/bash-completion/completions/chefshat"),
+    ("zsh", "usr/share/zsh/vendor-completions/_chefshat"),
+    ("fish", "usr/share/fish/vendor_completions.d/chefshat.fish"),
+];
+/// What a signature is for: part of what is signed.
+const NAMESPACE: &str = "chefshat-release";
+
+/// Makes the release; `key`: a file with the SSH key that signs the checksums.
+pub(crate) fn run(
+    places: &Places,
+    steps: &mut Steps,
+    key: Option<&Path>,
+    try_them: bool,
+) -> Result<(), Failure> {
+    let dist = places.dist();
+    let stage = places.own.join("dist");
+    steps.run("check that all is committed", || committed(places))?;
+    steps.run("empty the folder", || {
+        [&dist, &stage]
+            .into_iter()
+            .try_for_each(|folder| emptied(folder))
+    })?;
+
+    book::run(places, steps)?;
+    // With the page, which the binary contains.
+    wheels::run(places, steps, "dist", false)?;
+    steps.run("copy the wheels", || {
+        wheels::built(&places.wheels())?
+            .iter()
+            .try_for_each(|wheel| copy(wheel, &dist.join(file_name(wheel))))
+    })?;
+
+    let release = Release {
+        places,
+        dist: &dist,
+        stage: &stage,
+        date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
+    };
+    steps.program("static binary", &mut release.static_binary())?;
+    steps.run("check that it is static", || release.check_static())?;
+    steps.run("archive of the binary", || release.binary_archive())?;
+    steps.run("Debian package", || release.debian())?;
+    steps.program("package crates", &mut release.package_crates())?;
+    steps.run("copy the crates", || release.copy_crates())?;
+    steps.run("protocol and book", || release.protocol_and_book())?;
+    steps.run("source", || release.source())?;
+    let cyclonedx = setup::cargo_cyclonedx(places)?;
+    steps.run("what it contains", || release.contents(cyclonedx))?;
+    match setup::images() {
+        Ok(()) => steps.run("image", || release.image())?,
+        Err(failure) => steps.skip("image", &failure.to_string()),
+    }
+    steps.run("checksums", || release.sign(key))?;
+    if try_them {
+        steps.run("set up Python", || setup::python_packages(places))?;
+        let mut trying = python_command(places, DEPLOYMENT, "pytest");
+        trying.env("CHEFSHAT_DIST", &dist);
+        trying.args(["-p", "no:cacheprovider", "tests/test_release.py"]);
+        steps.program("try everything on bare systems", &mut trying)?;
+    }
+    steps.run("the release", || release.list())
+}
+
+/// A release in the making.
+struct Release<'a> {
+    places: &'a Places,
+    /// Where it is put.
+    dist: &'a Path,
+    /// Where it is prepared.
+    stage: &'a Path,
+    /// The time of the commit, seconds since 1970: that of all files in archives.
+    date: String,
+}
+
+impl Release<'_> {
+    fn static_binary(&self) -> Command {
+        let mut build = tool(self.places, "cargo-zigbuild", "");
+        build.args(["zigbuild", "--locked", "--profile", "dist"]);
+        build.args(["--target", TARGET, "--bin", "chefshat"]);
+        build
+    }
+
+    fn binary(&self) -> PathBuf {
+        self.places.target.join(TARGET).join("dist/chefshat")
+    }
+
+    fn check_static(&self) -> Result<(), Failure> {
+        let binary = self.binary();
+        let headers = read(
+            Command::new("readelf")
+                .arg("--program-headers")
+                .arg(&binary),
+        )?;
+        match headers.contains("INTERP") {
+            true => Err(Failure::new(format!(
+                "{} needs libraries",
+                binary.display()
+            ))),
+            false => Ok(()),
+        }
+    }
+
+    /// The binary with its manual pages, completions and unit, to unpack anywhere.
+    fn binary_archive(&self) -> Result<(), Failure> {
+        let name = format!("chefshat-{VERSION}-{PLATFORM}");
+        let folder = self.stage.join(&name);
+        copy(&self.binary(), &folder.join("chefshat"))?;
+        for document in ["README.md", "CHANGELOG.md", "LICENSE"] {
+            copy(&self.places.root.join(document), &folder.join(document))?;
+        }
+        for unit in ["chefshat.service", "chefshat.socket"] {
+            let from = self.places.root.join("docker/systemd").join(unit);
+            copy(&from, &folder.join("systemd").join(unit))?;
+        }
+        for (shell, path) in COMPLETIONS {
+            let script = read(Command::new(self.binary()).args(["completions", shell]))?;
+            let to = folder.join("completions").join(file_name(path.as_ref()));
+            write(&to, &format!("{script}\n"))?;
+        }
+        let man = folder.join("man");
+        run_command(
+            Command::new(self.binary())
+                .arg("man")
+                .arg("--out-dir")
+                .arg(&man),
+        )?;
+        self.archive(&name, self.stage, &[&name])
+    }
+
+    /// The same as a Debian package, with the user of the unit and its configuration.
+    fn debian(&self) -> Result<(), Failure> {
+        let root = self.stage.join("debian");
+        let unpacked = self.stage.join(format!("chefshat-{VERSION}-{PLATFORM}"));
+        let scripts = self.places.root.join("docker/debian");
+        copy(&unpacked.join("chefshat"), &root.join("usr/bin/chefshat"))?;
+        for (_, path) in COMPLETIONS {
+            let from = unpacked.join("completions").join(file_name(path.as_ref()));
+            copy(&from, &root.join(path))?;
+        }
+        for page in entries(&unpacked.join("man"))? {
+            let to = root.join("usr/share/man/man1").join(file_name(&page));
+            copy(&page, &to)?;
+            run_command(Command::new("gzip").args(["-9", "--no-name"]).arg(&to))?;
+        }
+        for unit in entries(&unpacked.join("systemd"))? {
+            copy(
+                &unit,
+                &root.join("lib/systemd/system").join(file_name(&unit)),
+            )?;
+        }
+        let licence = root.join("usr/share/doc/chefshat/copyright");
+        copy(&unpacked.join("LICENSE"), &licence)?;
+        let mut config = Command::new(self.binary());
+        config.arg("config").env_clear();
+        let settings = read(&mut config)?;
+        write(
+            &root.join("etc/chefshat/chefshat.toml"),
+            &format!("{settings}\n"),
+        )?;
+        write(
+            &root.join("DEBIAN/conffiles"),
+            "/etc/chefshat/chefshat.toml\n",
+        )?;
+        for script in ["postinst", "prerm"] {
+            copy(&scripts.join(script), &root.join("DEBIAN").join(script))?;
+        }
+        let control = scripts.join("control");
+        let control = fs::read_to_string(&control).map_err(|error| at(&control, &error))?;
+        let control = control.replace("@VERSION@", VERSION);
+        write(
+            &root.join("DEBIAN/control"),
+            &control.replace("@ARCHITECTURE@", DEBIAN),
+        )?;
+        let package = self.dist.join(format!("chefshat_{VERSION}_{DEBIAN}.deb"));
+        let mut build = Command::new("dpkg-deb");
+        build.args(["--build", "--root-owner-group", "-Zxz"]);
+        build
+            .arg(&root)
+            .arg(package)
+            .env("SOURCE_DATE_EPOCH", &self.date);
+        run_command(&mut build)
+    }
+
+    fn package_crates(&self) -> Command {
+        let mut package = cargo();
+        package.current_dir(&self.places.root);
+        package.args(["package", "--locked", "--quiet"]);
+        for name in CRATES {
+            package.args(["--package", name]);
+        }
+        package
+    }
+
+    fn copy_crates(&self) -> Result<(), Failure> {
+        CRATES.into_iter().try_for_each(|name| {
+            let file = format!("{name}-{VERSION}.crate");
+            copy(
+                &self.places.target.join("package").join(&file),
+                &self.dist.join(&file),
+            )
+        })
+    }
+
+    fn protocol_and_book(&self) -> Result<(), Failure> {
+        let protocol = format!("chefshat-protocol-{VERSION}");
+        let proto = self.places.root.join("proto");
+        let folder = self.stage.join(&protocol);
+        run_command(Command::new("mkdir").arg(&folder))?;
+        let mut copying = Command::new("cp");
+        copying.arg("-r").arg(proto.join("chefshat"));
+        copying.args([proto.join("README.md"), proto.join("buf.yaml")]);
+        run_command(copying.arg(self.places.root.join("LICENSE")).arg(&folder))?;
+        self.archive(&protocol, self.stage, &[&protocol])?;
+        let book = self.places.book();
+        let parent = book.parent().unwrap_or(&book);
+        self.archive(
+            &format!("chefshat-book-{VERSION}"),
+            parent,
+            &[&file_name(&book)],
+        )
+    }
+
+    fn source(&self) -> Result<(), Failure> {
+        let name = format!("chefshat-{VERSION}-source");
+        let mut archive = git(self.places);
+        archive.args(["archive", "--format=tar.gz"]);
+        archive.arg(format!("--prefix={name}/"));
+        archive.arg(format!("--output={}/{name}.tar.gz", self.dist.display()));
+        run_command(archive.arg("HEAD"))?;
+        // What describes the contents writes beside the manifests.
+        run_command(
+            Command::new("tar")
+                .arg("-xzf")
+                .arg(self.dist.join(format!("{name}.tar.gz")))
+                .arg("-C")
+                .arg(self.stage),
+        )
+    }
+
+    /// The bills of materials of the binary and of the page in it.
+    fn contents(&self, mut cyclonedx: Command) -> Result<(), Failure> {
+        let source = self.stage.join(format!("chefshat-{VERSION}-source"));
+        let manifest = source.join("server/cli/Cargo.toml");
+        cyclonedx
+            .current_dir(&source)
+            .arg("cyclonedx")
+            .arg("--manifest-path");
+        cyclonedx
+            .arg(&manifest)
+            .args(["--format", "json", "--quiet", "--target", TARGET]);
+        cyclonedx.args(["--override-filename", "contents"]);
+        cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);
+        run_command(&mut cyclonedx)?;
+        let binary = self.dist.join(format!("chefshat-{VERSION}.cdx.json"));
+        copy(&source.join("server/cli/contents.json"), &binary)?;
+        let mut npm = Command::new("npm");
+        npm.current_dir(self.places.web());
+        npm.args(["sbom", "--omit", "dev", "--sbom-format", "cyclonedx"]);
+        let page = self.dist.join(format!("chefshat-page-{VERSION}.cdx.json"));
+        write(&page, &format!("{}\n", read(&mut npm)?))
+    }
+
+    /// The image of docker/Dockerfile with the static binary, on a base that has certificate
+    /// authorities and nothing else. Nothing is pulled.
+    fn image(&self) -> Result<(), Failure> {
+        let release =
+            read(Command::new("sh").args(["-c", ". /etc/os-release; echo $VERSION_CODENAME"]))?;
+        let system = self.places.own.join("image-base");
+        if !system.join("etc/ssl/certs/ca-certificates.crt").exists() {
+            let _ = fs::remove_dir_all(&system);
+            let mut make = Command::new("/usr/sbin/debootstrap");
+            make.args(["--variant=minbase", "--include=ca-certificates", &release]);
+            run_command(make.arg(&system))?;
+        }
+        let authorities = "etc/ssl/certs/ca-certificates.crt";
+        let system = system.display().to_string();
+        let binary = self.binary().display().to_string();
+        self.base_image("base", &system, "/")?;
+        self.base_image(
+            "server-base",
+            &format!("{system}/{authorities}"),
+            &format!("/{authorities}"),
+        )?;
+        self.base_image("binary", &binary, "/chefshat")?;
+        let root = self.places.root.display();
+        let name = format!("localhost/chefshat:{VERSION}");
+        let mut build = self.buildah();
+        build.args([
+            "build",
+            "--format=docker",
+            "--isolation=chroot",
+            "--pull-never",
+        ]);
+        build.args(["--target=server", "--timestamp", &self.date, "--tag", &name]);
+        for (argument, image) in [
+            ("NODE_BASE", "base"),
+            ("SERVER_BASE", "server-base"),
+            ("BINARY", "binary"),
+        ] {
+            build.arg(format!("--build-arg={argument}=localhost/{image}"));
+        }
+        // No stage that is built reads the source tree.
+        build.arg(format!("--file={root}/docker/Dockerfile"));
+        run_command(build.arg(self.places.root.join("docker")))?;
+        let file = self.dist.join(format!("chefshat-{VERSION}-image.tar"));
+        let to = format!("docker-archive:{}:chefshat:{VERSION}", file.display());
+        run_command(self.buildah().args(["push", "--quiet", &name, &to]))?;
+        run_command(self.buildah().args(["rmi", "--all", "--force"]))
+    }
+
+    /// An image that contains a file or folder.
+    fn base_image(&self, name: &str, from: &str, to: &str) -> Result<(), Failure> {
+        let container = read(self.buildah().args(["from", "scratch"]))?;
+        run_command(
+            self.buildah()
+                .args(["copy", "--quiet", &container, from, to]),
+        )?;
+        let image = format!("localhost/{name}");
+        run_command(
+            self.buildah()
+                .args(["commit", "--quiet", "--rm", &container, &image]),
+        )
+    }
+
+    fn buildah(&self) -> Command {
+        let storage = self.stage.join("images");
+        let mut buildah = Command::new("buildah");
+        buildah.arg("--root").arg(storage.join("root"));
+        buildah.arg("--runroot").arg(storage.join("run"));
+        buildah
+    }
+
+    /// Writes the checksums of all files, and signs them.
+    fn sign(&self, key: Option<&Path>) -> Result<(), Failure> {
+        let files: Vec<String> = entries(self.dist)?
+            .iter()
+            .map(|file| file_name(file))
+            .collect();
+        let mut sums = Command::new("sha256sum");
+        let sums = read(sums.current_dir(self.dist).arg("--").args(files))?;
+        let file = self.dist.join("SHA256SUMS");
+        write(&file, &format!("{sums}\n"))?;
+        let Some(key) = key else {
+            println!("    not signed: give --key FILE");
+            return Ok(());
+        };
+        let mut sign = Command::new("ssh-keygen");
+        sign.args(["-Y", "sign", "-q", "-n", NAMESPACE, "-f"]);
+        run_command(sign.arg(key).arg(&file))
+    }
+
+    fn list(&self) -> Result<(), Failure> {
+        for file in entries(self.dist)? {
+            let metadata = fs::metadata(&file).map_err(|error| at(&file, &error))?;
+            let megabytes = metadata.len() as f64 / 1e6;
+            println!("    {megabytes:>7.2} MB  {}", file_name(&file));
+        }
+        println!("    in {}", self.dist.display());
+        Ok(())
+    }
+
+    /// An archive that is the same for the same files.
+    fn archive(&self, name: &str, folder: &Path, what: &[&str]) -> Result<(), Failure> {
+        let mut tar = Command::new("tar");
+        tar.args(["--sort=name", "--owner=0", "--group=0", "--numeric-owner"]);
+        tar.arg("--mode=u=rwX,go=rX")
+            .arg(format!("--mtime=@{}", self.date));
+        tar.args(["--use-compress-program=gzip -9 -n", "-cf"]);
+        tar.arg(self.dist.join(format!("{name}.tar.gz")));
+        run_command(tar.arg("-C").arg(folder).args(what))
+    }
+}
+
+fn git(places: &Places) -> Command {
+    let mut git = Command::new("git");
+    git.current_dir(&places.root);
+    git
+}
+
+/// A release is what a commit contains.
+fn committed(places: &Places) -> Result<(), Failure> {
+    let mut status = git(places);
+    status.args(["status", "--porcelain", "--untracked-files=no"]);
+    match read(&mut status)?.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new(
+            "commit your changes: a release is made from a commit",
+        )),
+    }
+}
+
+fn emptied(folder: &Path) -> Result<(), Failure> {
+    // Images have files that only `rm` of their owner removes.
+    if folder.exists() && !succeeds("rm", &["-rf", &folder.display().to_string()]) {
+        return Err(Failure::new(format!(
+            "{} cannot be removed",
+            folder.display()
+        )));
+    }
+    fs::create_dir_all(folder).map_err(|error| at(folder, &error))
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
+    let folder = to.parent().unwrap_or(to);
+    fs::create_dir_all(folder).map_err(|error| at(folder, &error))?;
+    fs::copy(from, to)
+        .map(drop)
+        .map_err(|error| at(from, &error))
+}
+
+fn write(file: &Path, text: &str) -> Result<(), Failure> {
+    let folder = file.parent().unwrap_or(file);
+    fs::create_dir_all(folder).map_err(|error| at(folder, &error))?;
+    fs::write(file, text).map_err(|error| at(file, &error))
+}
+
+/// What is in a folder, sorted.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let listed = fs::read_dir(folder).map_err(|error| at(folder, &error))?;
+    let mut paths: Vec<PathBuf> = listed
+        .filter_map(|it| it.ok().map(|it| it.path()))
+        .collect();
+    paths.sort();
+    Ok(paths)
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// All packages have one version, and name each other with it.
+#[test]
+fn the_versions_agree() {
+    let root = Places::find().unwrap().root;
+    let quoted = format!("\"{VERSION}\"");
+    let exact = format!("=={VERSION}\"");
+    let cases = [
+        ("Cargo.toml", format!("\nversion = {quoted}"), 1),
+        (
+            "Cargo.toml",
+            format!("version = \"={VERSION}\""),
+            CRATES.len(),
+        ),
+        (
+            "clients/python/pyproject.toml",
+            format!("\nversion = {quoted}"),
+            1,
+        ),
+        ("clients/python/pyproject.toml", exact.clone(), 2),
+        (
+            "clients/robot/pyproject.toml",
+            format!("\nversion = {quoted}"),
+            1,
+        ),
+        (
+            "clients/robot/pyproject.toml",
+            format!("\"chefshat{exact}"),
+            1,
+        ),
+        (
+            "tests/deployment/pyproject.toml",
+            format!("\nversion = {quoted}"),
+            1,
+        ),
+        (
+            "clients/node/package.json",
+            format!("\"version\": {quoted}"),
+            1,
+        ),
+        (
+            "clients/web/package.json",
+            format!("\"version\": {quoted}"),
+            1,
+        ),
+        ("CITATION.cff", format!("\nversion: {VERSION}\n"), 1),
+        ("CHANGELOG.md", format!("\n## [{VERSION}]"), 1),
+    ];
+    for (file, words, times) in cases {
+        let text = fs::read_to_string(root.join(file)).unwrap();
+        assert_eq!(text.matches(&words).count(), times, "{file}: {words}");
+    }
+}
