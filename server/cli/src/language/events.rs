@@ -4,11 +4,10 @@
 use chefshat_client::v1::{self, game_event::Kind};
 
 use super::cards::{cards, hand, name, subject};
-use super::words;
 use crate::narration::hand::Hand;
 use crate::narration::story;
 use crate::narration::view::GameView;
-use crate::narration::{clean, title};
+use crate::narration::{clean, title, words};
 use crate::numbers::{counted, ordinal};
 
 /// Maximum characters of what another participant says.

@@ -7,7 +7,6 @@ pub(crate) mod live;
 #[cfg(test)]
 mod tests;
 pub(crate) mod text;
-pub(crate) mod words;
 
 /// Key of the annotation with the reason for a decision.
 pub(crate) const REASON: &str = "reason";

@@ -13,6 +13,7 @@ pub(crate) mod story;
 mod tests;
 mod text;
 pub(crate) mod view;
+pub(crate) mod words;
 
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{Opening, RuleSet};

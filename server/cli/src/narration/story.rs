@@ -5,6 +5,7 @@ use chefshat_client::v1::{self, game_event::Kind};
 
 use super::text::{MAX_NAME, clean};
 use super::view::GameView;
+use super::words;
 use crate::kind::kind_name;
 use crate::numbers::ordinal;
 
@@ -93,8 +94,16 @@ fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
         }
         Kind::ServerRestarted(_) => heading("the server was restarted; the game resumes".into()),
         Kind::ExpressionShown(shown) => {
-            let label = shown.expression.as_ref().map_or("", |it| &it.label);
-            about(shown.seat, format!("shows {}", clean(label, 40)))
+            let said = shown.expression.as_ref();
+            let words = said.and_then(|it| words::from_data_url(&it.media));
+            let label = said.map_or("", |it| &it.label);
+            about(
+                shown.seat,
+                match words {
+                    Some(words) => format!("says “{}”", clean(&words, MAX_TEXT)),
+                    None => format!("shows {}", clean(label, 40)),
+                },
+            )
         }
         Kind::HandReported(reported) => {
             let seat = reported.hand.as_ref().map_or(0, |hand| hand.seat);

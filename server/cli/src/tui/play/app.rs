@@ -11,6 +11,9 @@ use crate::narration::view::GameView;
 use crate::tui::log::Log;
 use crate::tui::screen::Key;
 
+/// Most characters of a line to the table.
+pub(super) const MAX_LINE: usize = 60;
+
 /// Expressions by key: label, valence and arousal, the same as in the page.
 pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
     ("joy", 0.8, 0.5),
@@ -48,6 +51,8 @@ pub(super) enum Do {
         took_ms: u64,
     },
     Express(usize),
+    /// Write to everybody at the table.
+    Say(String),
     /// Ask for a hint for a decision. `ticket` is that of a game of a tournament; `None`: the person's
     /// own.
     AskHint {
@@ -66,6 +71,7 @@ pub(super) enum Dialog {
     Help,
     Leave,
     Express,
+    Write,
 }
 
 /// State of the connection.
@@ -109,6 +115,8 @@ pub(super) struct App {
     /// Whom of the others the game waits for.
     pub(super) awaited: Option<AwaitedSeat>,
     pub(super) dialog: Option<Dialog>,
+    /// What the person is writing to the table.
+    pub(super) line: String,
     pub(super) link: Link,
     /// A notice for the person: why a key was refused, or a message of the server.
     pub(super) notice: String,
@@ -146,6 +154,7 @@ impl App {
             open: None,
             awaited: None,
             dialog: None,
+            line: String::new(),
             link: Link::Connecting,
             notice: String::new(),
             log: Log::default(),
@@ -372,6 +381,7 @@ impl App {
             KeyCode::Char('?') => self.dialog = Some(Dialog::Help),
             KeyCode::Char('q') | KeyCode::Esc => self.dialog = Some(Dialog::Leave),
             KeyCode::Char('e') => self.dialog = Some(Dialog::Express),
+            KeyCode::Char('t') => self.dialog = Some(Dialog::Write),
             KeyCode::Char('r') if self.substituted() => return Some(Do::Resume),
             code => return self.decide(code, now_ms),
         }
@@ -379,6 +389,9 @@ impl App {
     }
 
     fn dialog_key(&mut self, dialog: Dialog, code: KeyCode) -> Option<Do> {
+        if dialog == Dialog::Write {
+            return self.write(code);
+        }
         self.dialog = None;
         match (dialog, code) {
             (Dialog::Leave, KeyCode::Char('y' | 'Y')) => self.leave(),
@@ -388,6 +401,24 @@ impl App {
             }
             _ => None,
         }
+    }
+
+    /// Handles a key for the line to the table.
+    fn write(&mut self, code: KeyCode) -> Option<Do> {
+        match code {
+            KeyCode::Char(sign) if self.line.chars().count() < MAX_LINE => self.line.push(sign),
+            KeyCode::Backspace => drop(self.line.pop()),
+            KeyCode::Enter => {
+                self.dialog = None;
+                let words = std::mem::take(&mut self.line);
+                let words = words.trim();
+                return (!words.is_empty()).then(|| Do::Say(words.to_owned()));
+            }
+            // What was written stays for the next time.
+            KeyCode::Esc => self.dialog = None,
+            _ => {}
+        }
+        None
     }
 
     fn leave(&mut self) -> Option<Do> {

@@ -4,9 +4,10 @@ use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::{ActionId, RuleSetSpec};
 use ratatui::crossterm::event::KeyCode;
 
-use super::app::{Dialog, Do, Input};
+use super::app::{Dialog, Do, Input, MAX_LINE};
 use super::keys::key_of;
 use super::tests::{GameSession, shifts};
+use crate::narration::words;
 use crate::tui::screen::Key;
 
 /// With decks of any size every stack has its own key, which the screen shows.
@@ -206,6 +207,47 @@ fn a_hint_selects_the_suggested_action() {
     let refused = Err("this room gives no hints".to_owned());
     session.app.take(Input::Hint(id, refused), 0);
     assert!(session.screen().contains("! this room gives no hints"));
+}
+
+#[test]
+fn a_line_to_the_table_is_written_sent_and_shown() {
+    let mut session = GameSession::new(&shifts(1), 3);
+    for key in "tq d".chars() {
+        assert_eq!(session.press(KeyCode::Char(key)), None);
+    }
+    assert!(session.screen().contains("q d▏"), "{}", session.screen());
+    session.press(KeyCode::Backspace);
+    // The line is kept.
+    session.press(KeyCode::Esc);
+    for key in "tup!".chars() {
+        session.press(KeyCode::Char(key));
+    }
+    let said = session.press(KeyCode::Enter);
+    assert_eq!(said, Some(Do::Say("q up!".to_owned())));
+    for key in [KeyCode::Char('t'), KeyCode::Enter] {
+        assert_eq!(session.press(key), None);
+    }
+    assert!(session.app.dialog.is_none());
+    session.press(KeyCode::Char('t'));
+    for _ in 0..=MAX_LINE {
+        session.press(KeyCode::Char('è'));
+    }
+    assert_eq!(session.app.line.chars().count(), MAX_LINE);
+    session.press(KeyCode::Esc);
+    let shown = v1::GameEvent {
+        kind: Some(Kind::ExpressionShown(Box::new(v1::ExpressionShown {
+            seat: 1,
+            expression: Some(words::said("q up!")),
+        }))),
+        ..v1::GameEvent::default()
+    };
+    let events = vec![shown];
+    session.receive(Update::Events(v1::EventBatch { events }));
+    assert!(
+        session.screen().contains("says “q up!”"),
+        "{}",
+        session.screen()
+    );
 }
 
 #[test]

@@ -14,6 +14,7 @@ use super::link::{Connection, Order};
 use super::part::{Part, PartInput};
 use super::view;
 use crate::CommandError;
+use crate::narration::words;
 use crate::tui::screen::{Screen, Wake};
 use crate::tui::theme::Theme;
 
@@ -150,6 +151,7 @@ pub(super) fn command(what: Do, times: bool) -> Option<Command> {
             }),
         })),
         Do::Resume => Some(Command::Resume(v1::ResumeSeat {})),
+        Do::Say(words) => Some(Command::Express(words::said(&words))),
         Do::Express(index) => {
             let (label, valence, arousal) = EXPRESSIONS.get(index).copied()?;
             Some(Command::Express(v1::Expression {

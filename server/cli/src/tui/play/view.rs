@@ -7,7 +7,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::app::{App, Dialog, EXPRESSIONS, Hint, Link, Open};
+use super::app::{App, Dialog, EXPRESSIONS, Hint, Link, MAX_LINE, Open};
 use super::keys::key_of;
 use super::lobby_view;
 use super::part::Part;
@@ -31,7 +31,7 @@ const EXCHANGE_KEYS: &str = " 1-9 ←→ card  J joker  Enter give  e feeling  ?
 const SPECIAL_KEYS: &str = " d declare  n decline  e feeling  ? keys  q leave";
 const WAITING_KEYS: &str = " PgUp what happened  e feeling  ? keys  q leave";
 
-const HELP: [&str; 18] = [
+const HELP: [&str; 19] = [
     "Be the first to get rid of your cards. A play is cards of one",
     "face, with or without jokers. Its face must be lower than the one",
     "on the board, and it needs at least as many cards. If you pass,",
@@ -48,6 +48,7 @@ const HELP: [&str; 18] = [
     "h         a hint, if the room gives them   e   show a feeling",
     "PgUp      earlier events, PgDn later ones",
     "s         in a tournament: the standings",
+    "t         say something to the table, if the room allows it",
     "r         take your seat back from a substitute",
     "q         leave; the room's rules say who replaces you",
 ];
@@ -356,6 +357,16 @@ fn draw_over(frame: &mut Frame<'_>, theme: Theme, app: &App) {
                 .zip(EXPRESSIONS)
                 .map(|(key, (label, ..))| plain(&format!("{key}  {label}")));
             popup(frame, theme, "show the table", lines.collect());
+        }
+        (None, _, Some(Dialog::Write)) => {
+            let line = format!("{:<MAX_LINE$}", format!("{}▏", app.line));
+            let keys = Span::styled("Enter says it, Esc goes back", theme.dim());
+            popup(
+                frame,
+                theme,
+                "to the table",
+                vec![plain(&line), Line::from(keys)],
+            );
         }
         (None, _, None) => {}
     }

@@ -1,6 +1,7 @@
-//! Words of a participant, as the protocol carries them: an expression with the label "say" and a
-//! data URL (RFC 2397). The page and the robots send and read the same.
+//! Words that a participant says, as the protocol carries them: an expression with the label "say"
+//! and a data URL (RFC 2397). The page and the robots send and read the same.
 
+use chefshat_client::v1;
 use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 
 /// Label of an expression with words.
@@ -9,6 +10,16 @@ pub(crate) const SAY: &str = "say";
 const PREFIX: &str = "data:,";
 /// Maximum bytes of `media` in the protocol.
 const MAX_MEDIA: usize = 256;
+
+/// An expression that says these words.
+pub(crate) fn said(words: &str) -> v1::Expression {
+    v1::Expression {
+        label: SAY.to_owned(),
+        media: to_data_url(words),
+        source: v1::ExpressionSource::SelfReport.into(),
+        ..v1::Expression::default()
+    }
+}
 
 /// The words in `media`; `None` if it refers to something else.
 pub(crate) fn from_data_url(media: &str) -> Option<String> {
