@@ -132,7 +132,8 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   if (form.rounds.trim() !== "") whole.push(["rounds", [1, 1000]]);
   if (form.start === "joined") whole.push(["startWhen", [2, MAX_PARTICIPANTS]]);
   const seconds: [TournamentField, Bounds][] = [["noShowSeconds", [1, 86_400]]];
-  if (form.otherClocks) seconds.push(["agentSeconds", [0.01, 86_400]], ["robotSeconds", [0.01, 86_400]], ["modelSeconds", [0.01, 86_400]]);
+  if (form.otherClocks)
+    seconds.push(["agentSeconds", [0.01, 86_400]], ["robotSeconds", [0.01, 86_400]], ["modelSeconds", [0.01, 86_400]]);
   for (const [field, bounds] of whole) problems[field] = wholeProblem(String(form[field]), bounds);
   for (const [field, bounds] of seconds) problems[field] = secondsProblem(String(form[field]), bounds);
   const wrong = Object.values(form.builtIn).find(isNoCount);

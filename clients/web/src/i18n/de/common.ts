@@ -54,7 +54,14 @@ export const common: Texts["common"] = {
       "Damit verschwinden von diesem Gerät deine Plätze an Tischen und in Turnieren, die Räume und Turniere, die du erstellt hast, dein Name und deine Einstellungen. Du kannst sie nicht zurückholen.",
     forgetDo: "Alles vergessen",
   },
-  kinds: { agent: "Agent", human: "Person", robot: "Roboter", model: "Modell", builtIn: "eingebauter Agent", open: "frei" },
+  kinds: {
+    agent: "Agent",
+    human: "Person",
+    robot: "Roboter",
+    model: "Modell",
+    builtIn: "eingebauter Agent",
+    open: "frei",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Koch", waiter: "Kellner", dishwasher: "Tellerwäscher" },
   faces: [
     "Trüffel",

@@ -55,7 +55,14 @@ export const common: Texts["common"] = {
       "Se borran de este dispositivo tus asientos, tus plazas en torneos, las salas y los torneos que has creado, tu nombre y tus ajustes. No podrás recuperarlos.",
     forgetDo: "Olvidar todo",
   },
-  kinds: { agent: "agente", human: "persona", robot: "robot", model: "modelo", builtIn: "agente integrado", open: "libre" },
+  kinds: {
+    agent: "agente",
+    human: "persona",
+    robot: "robot",
+    model: "modelo",
+    builtIn: "agente integrado",
+    open: "libre",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cocinero", waiter: "Camarero", dishwasher: "Lavaplatos" },
   faces: [
     "trufa",

@@ -9,7 +9,14 @@ export const people: Texts["people"] = {
   title: "Clasificación",
   text: "Quienes han jugado una partida puntuable en este servidor. Cada cual elige su nombre; los nombres no están protegidos.",
   ratedGames: (games) => plural(games, { one: "# partida puntuable", other: "# partidas puntuables" }),
-  kinds: { label: "Quién", all: "Todos", human: "Personas", robot: "Robots", agent: "Agentes", model: "Modelos de lenguaje" },
+  kinds: {
+    label: "Quién",
+    all: "Todos",
+    human: "Personas",
+    robot: "Robots",
+    agent: "Agentes",
+    model: "Modelos de lenguaje",
+  },
   minGames: {
     label: "Con al menos",
     games: (games) => plural(games, { one: "# partida", other: "# partidas" }),

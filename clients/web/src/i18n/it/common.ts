@@ -52,7 +52,14 @@ export const common: Texts["common"] = {
       "Da questo dispositivo vengono eliminati i tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni. Non potrai recuperarli.",
     forgetDo: "Dimentica tutto",
   },
-  kinds: { agent: "agente", human: "persona", robot: "robot", model: "modello", builtIn: "agente integrato", open: "libero" },
+  kinds: {
+    agent: "agente",
+    human: "persona",
+    robot: "robot",
+    model: "modello",
+    builtIn: "agente integrato",
+    open: "libero",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cuoco", waiter: "Cameriere", dishwasher: "Lavapiatti" },
   faces: [
     "tartufo",
