@@ -113,10 +113,10 @@ impl Target {
     ///
     /// # Panics
     /// A header has characters that headers cannot have.
-    pub async fn post<const N: usize>(
+    pub async fn post(
         &self,
         body: impl Into<Bytes>,
-        headers: [(&'static str, String); N],
+        headers: impl IntoIterator<Item = (&'static str, String)>,
         time: Duration,
         longest: usize,
     ) -> Result<Answer, PostError> {

@@ -135,11 +135,11 @@ impl AgentCommand {
             Pass::Ticket(ticket) => return Ok(ticket),
             Pass::Code(code) => code,
         };
-        let (standard, kind) = match self.agent {
+        let (default_name, kind) = match self.agent {
             AgentArg::Player(player) => (player.display_name(&self.llm), player.kind()),
             AgentArg::Replay => (BuiltInAgent::REPLAY.to_owned(), KindArg::Agent),
         };
-        let name = self.name.clone().unwrap_or(standard);
+        let name = self.name.clone().unwrap_or(default_name);
         let kind = self.kind_of.unwrap_or(kind);
         let joined = client
             .join(v1::JoinRoomRequest {

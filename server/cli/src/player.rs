@@ -1,5 +1,5 @@
-//! Who plays the seats of `chefshat agent` and `chefshat tournament join`: a built-in agent or a
-//! language model.
+//! The players of `chefshat agent` and `chefshat tournament join`: a built-in agent or a language
+//! model.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -86,7 +86,7 @@ impl Players<'_> {
         match &self.source {
             Source::BuiltIn(agent) => RemoteAgent::named(*agent, seed, self.pace).into(),
             Source::Model(llm, endpoint) => {
-                let model = llm.agent(endpoint.clone(), seed, self.pace);
+                let model = llm.agent(endpoint.clone(), seed);
                 Player::Model(model.into())
             }
         }

@@ -120,7 +120,7 @@ pub enum Unrated {
     /// A recorded player was imitated.
     #[error("a recorded player took part")]
     RecordedPlayer,
-    /// A person played as a robot or an agent.
+    /// A person played as another kind of participant.
     #[error("a person played as another kind of participant")]
     Wizard,
 }

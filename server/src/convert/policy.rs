@@ -190,16 +190,16 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     if chosen {
         return Ok(clocks);
     }
-    for standard in [KindClock::PEOPLE, KindClock::MODELS] {
-        match clocks.iter_mut().find(|clock| clock.kind == standard.kind) {
+    for default in [KindClock::PEOPLE, KindClock::MODELS] {
+        match clocks.iter_mut().find(|clock| clock.kind == default.kind) {
             None => clocks.push(KindClock {
                 absence_time: None,
-                ..standard
+                ..default
             }),
             Some(clock) => {
                 let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
                 if absence_alone && clock.absence_time.is_some() {
-                    (clock.decision_time, clock.bank) = (standard.decision_time, standard.bank);
+                    (clock.decision_time, clock.bank) = (default.decision_time, default.bank);
                 }
             }
         }

@@ -80,7 +80,7 @@ pub(super) async fn new_room(
         convert::check_budget("seats", agent).map_err(refused)?;
     }
     if request.physical && !convert::wizards_from_proto(&request.seats).is_empty() {
-        let problem = "a person cannot play as a robot or an agent at a table with real cards";
+        let problem = "a person cannot play as another kind at a table with real cards";
         return Err(refused(FieldProblem::new("seats", problem)));
     }
     if request.physical {

@@ -1,5 +1,5 @@
 //! `chefshat agent llm` with a scripted endpoint, which may lie, stall, talk nonsense or cost more
-//! than there is: the game goes on without it.
+//! than there is: the seat decides in time.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -28,7 +28,7 @@ type Script = fn(usize, &[Value]) -> Said;
 
 /// An answer.
 enum Said {
-    /// A completion with this text that took so many tokens.
+    /// A completion with this text, and the tokens that it took.
     Text(String, u64),
     /// A status and a body.
     Other(StatusCode, Vec<u8>),

@@ -83,6 +83,10 @@ pub(crate) fn run(
         steps.run("set up Python", || setup::python_packages(places))?;
         let mut trying = python_command(places, DEPLOYMENT, "pytest");
         trying.env("CHEFSHAT_DIST", &dist);
+        if let Some(key) = key {
+            let key = std::path::absolute(key).map_err(|error| at(key, &error))?;
+            trying.env("CHEFSHAT_RELEASE_KEY", key);
+        }
         trying.args(["-p", "no:cacheprovider", "tests/test_release.py"]);
         steps.program("try everything on bare systems", &mut trying)?;
     }
@@ -180,7 +184,15 @@ impl Release<'_> {
         copy(&unpacked.join("LICENSE"), &licence)?;
         let mut config = Command::new(self.binary());
         config.arg("config").env_clear();
+        // As comments, so that a later version's defaults count.
         let settings = read(&mut config)?;
+        let settings = settings
+            .lines()
+            .map(|line| match line.ends_with("# default") {
+                true => format!("# {line}"),
+                false => line.to_owned(),
+            });
+        let settings = settings.collect::<Vec<_>>().join("\n");
         write(
             &root.join("etc/chefshat/chefshat.toml"),
             &format!("{settings}\n"),
@@ -408,7 +420,7 @@ fn git(places: &Places) -> Command {
 /// A release is what a commit contains.
 fn committed(places: &Places) -> Result<(), Failure> {
     let mut status = git(places);
-    status.args(["status", "--porcelain", "--untracked-files=no"]);
+    status.args(["status", "--porcelain", "--untracked-files=normal"]);
     match read(&mut status)?.is_empty() {
         true => Ok(()),
         false => Err(Failure::new(

@@ -27,8 +27,8 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
 
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
-    let kept = ["breaking", "proto", "--against", RELEASED_PROTOCOL];
-    steps.program("buf breaking", tool(places, "buf").args(kept))?;
+    let breaking = ["breaking", "proto", "--against", RELEASED_PROTOCOL];
+    steps.program("buf breaking", tool(places, "buf").args(breaking))?;
     book::check_and_build(places, steps)?;
     schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
     for name in ["compose", "compose.proxy", "compose.cluster"] {

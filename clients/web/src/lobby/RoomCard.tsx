@@ -7,7 +7,7 @@ import { ButtonLink } from "../parts/Button";
 import { StateChip } from "../parts/StateChip";
 import { pathOf } from "../router";
 import css from "./RoomCard.module.css";
-import { clockOfPeople, isOpen, visibilityWords } from "./rooms";
+import { clockOf, isOpen, visibilityWords } from "./rooms";
 import { Seats } from "./Seats";
 import { heldSeat, hostedRoom } from "./seat";
 
@@ -76,9 +76,6 @@ export function RoomStateChip({ room }: { room: Room }) {
   }
 }
 
-/** Kinds of participants with the clock of people, or perhaps. */
-const PERHAPS_PEOPLE = [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN];
-
 /** The length of a game and the time per decision, in one line. */
 export function rulesInShort(room: Room): string {
   const words = t().lobby.rooms;
@@ -86,14 +83,16 @@ export function rulesInShort(room: Room): string {
   const stop = room.rules?.stop;
   if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
   if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
-  const withPeople = room.seats.some(({ kind, reservedFor, builtInAgent, atTable }) => {
-    return builtInAgent === "" && !atTable && PERHAPS_PEOPLE.includes(kind || reservedFor);
+  const kinds = room.seats.flatMap(({ kind, reservedFor, builtInAgent, atTable }) => {
+    return builtInAgent === "" && !atTable ? [kind || reservedFor] : [];
   });
+  // The most patient: people may also take a seat for everybody.
+  const patient = [ParticipantKind.HUMAN, ParticipantKind.UNSPECIFIED, ParticipantKind.MODEL];
+  const whose = patient.find((kind) => kinds.includes(kind)) ?? ParticipantKind.AGENT;
   // At a table with real cards only remote participants have a clock.
   const timed = room.seats.some(({ atTable, builtInAgent }) => !atTable && builtInAgent === "");
   if (room.policy && (timed || room.origin !== GameOrigin.PHYSICAL)) {
-    const clock = withPeople ? clockOfPeople(room.policy).decisionTimeMs : room.policy.decisionTimeMs;
-    parts.push(words.decisionTime(clock ?? 0));
+    parts.push(words.decisionTime(clockOf(room.policy, whose || ParticipantKind.HUMAN).decisionTimeMs));
   }
   if (room.origin === GameOrigin.PHYSICAL) parts.push(t().attend.room.realCards);
   if (room.tournamentId) parts.push(words.ofTournament);

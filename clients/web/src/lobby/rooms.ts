@@ -39,16 +39,23 @@ export function isForAgents(seats: readonly Participant[]): boolean {
   return seats.some((seat) => isFree(seat) && kinds.includes(seat.reservedFor));
 }
 
-/**
- * The clock of a person under a policy, milliseconds: per decision, and for the game beyond that. The
- * absence time of people; undefined in games without one.
- */
-export function clockOfPeople(policy: RoomPolicy): {
+interface Clock {
   decisionTimeMs: number;
   bankMs: number;
   absenceTimeMs: number | undefined;
-} {
-  const own = policy.clocks.find(({ kind }) => kind === ParticipantKind.HUMAN);
+}
+
+/** The clock of a person under a policy. */
+export function clockOfPeople(policy: RoomPolicy): Clock {
+  return clockOf(policy, ParticipantKind.HUMAN);
+}
+
+/**
+ * The clock of a kind of participants under a policy, milliseconds: per decision, and for the game
+ * beyond that. The absence time; undefined in games without one.
+ */
+export function clockOf(policy: RoomPolicy, whose: ParticipantKind): Clock {
+  const own = policy.clocks.find(({ kind }) => kind === whose);
   return {
     decisionTimeMs: own?.decisionTimeMs ?? policy.decisionTimeMs ?? 0,
     bankMs: own?.bankMs ?? policy.bankMs ?? 0,

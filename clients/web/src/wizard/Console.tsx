@@ -1,4 +1,4 @@
-// The console of a person who plays a robot's or an agent's seat: how long the robot should seem to
+// The console of a person who plays a seat of another kind: how long the robot should seem to
 // think, every legal move with the agent's suggestion, lines to say, and expressions. Others see the
 // same as from a robot.
 

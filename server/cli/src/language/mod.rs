@@ -8,6 +8,10 @@ pub(crate) mod live;
 mod tests;
 pub(crate) mod text;
 
+use chefshat_engine::RuleSet;
+
+use crate::output::{rules_in_short, variations};
+
 /// Key of the annotation with the reason for a decision.
 pub(crate) const REASON: &str = "reason";
 /// Maximum bytes of a reason. Annotations of a decision have at most 4 KiB.
@@ -18,8 +22,21 @@ pub(crate) const RULES: &str = "\
 The rules in short: get rid of your cards first. A lower number is rarer and beats a higher one. A play is cards of one number; a joker (J) counts as one \
 more of them, and a joker alone is the weakest play. You must play a lower number than the board shows, and at least as many cards, or pass; a pass \
 counts until the pizza is done. When everybody else has passed, the board is cleared and whoever played last leads with anything. 11* is the Golden \
-card, which opens the Shift. Places give 5, 3, 1 and 0 points; the game ends after the Shift in which somebody has 15. Between Shifts, the last two give \
-their rarest cards to the first two, who give back any.";
+card, which opens the Shift. Places give points, with which the game ends. Between Shifts, the last two give their rarest cards to the first two, who \
+give back any.";
+
+/// The rules of one game beside [`RULES`], in a sentence.
+pub(crate) fn this_game(rules: Option<&RuleSet>) -> String {
+    let Some(rules) = rules else {
+        return String::new();
+    };
+    let mut words = rules_in_short(rules);
+    for variation in variations(rules) {
+        words.push_str("; ");
+        words.push_str(&variation);
+    }
+    format!("This game: {words}.")
+}
 
 /// A reason as its annotation has it; `None` if it says nothing.
 pub(crate) fn reason(words: &str) -> Option<String> {

@@ -1,6 +1,7 @@
 //! The chat completions that servers of language models share: `POST …/chat/completions` with
 //! messages, and a text with the tokens it took.
 
+use std::fmt;
 use std::time::Duration;
 
 use chefshat_server::post::{PostError, Target};
@@ -61,7 +62,6 @@ pub(super) enum EndpointError {
 }
 
 /// A server of language models.
-#[derive(Debug)]
 pub(crate) struct Endpoint {
     target: Target,
     key: Option<String>,
@@ -95,6 +95,13 @@ struct Said {
 struct Usage {
     #[serde(default)]
     total_tokens: Option<u64>,
+}
+
+/// Leaves out the key.
+impl fmt::Debug for Endpoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Endpoint").field(&self.model).finish()
+    }
 }
 
 impl Endpoint {
@@ -152,13 +159,10 @@ impl Endpoint {
         if let Some(seed) = self.seed {
             question["seed"] = json!(seed);
         }
-        let authorization = self
-            .key
-            .as_ref()
-            .map_or(String::new(), |key| format!("Bearer {key}"));
         let asked: usize = messages.iter().map(|message| message.content.len()).sum();
         let body = question.to_string();
-        let headers = [("authorization", authorization)];
+        let key = self.key.iter();
+        let headers = key.map(|key| ("authorization", format!("Bearer {key}")));
         let answer = self
             .target
             .post(body, headers, time, MAX_ANSWER_BYTES)
@@ -176,7 +180,7 @@ impl Endpoint {
     }
 }
 
-/// Tokens that a text of so many bytes has at least, whatever a server reports.
+/// Tokens that a text with this number of bytes has at least, whatever a server reports.
 fn at_least(bytes: usize) -> u64 {
     u64::try_from(bytes.div_ceil(MOST_BYTES_PER_TOKEN)).unwrap_or(u64::MAX)
 }

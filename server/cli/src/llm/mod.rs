@@ -7,13 +7,14 @@ mod endpoint;
 mod reply;
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::v1::{self, seat_update::Update};
-use chefshat_client::{ActionId, Agent, Outcome, legal_actions, legal_count};
+use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
 use clap::Args;
 use tokio::runtime::Handle;
+use tokio::time::Instant;
 use tracing::warn;
 
 use crate::CommandError;
@@ -29,11 +30,12 @@ use reply::Reply;
 pub(crate) const NAME: &str = "llm";
 /// The environment variable with the key of the endpoint.
 const KEY_VARIABLE: &str = "CHEFSHAT_LLM_KEY";
-/// Part of the time for a decision that is left for the answer to reach the server: one in so many.
+/// The part of the time for a decision that is left for the answer to reach the server, as its
+/// divisor.
 const RESERVE: u32 = 10;
 /// Least and most of that.
 const RESERVE_RANGE: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
-/// After so many decisions in a row without an answer in time, the model is not asked again in this
+/// Decisions in a row without a usable answer after which the model is not asked again in this
 /// Shift.
 const MAX_SILENT: u32 = 3;
 
@@ -63,26 +65,34 @@ pub(crate) struct LlmArgs {
     /// For llm: the name of the model.
     #[arg(long, value_name = "NAME", required_if_eq("agent", NAME))]
     model: Option<String>,
-    /// For llm: tokens of questions and answers for each game; then the fallback plays on.
+    /// For llm: tokens of questions and answers for each game; then the fallback decides.
     #[arg(long, value_name = "TOKENS", default_value_t = 200_000)]
     budget: u64,
     /// For llm: maximum tokens of an answer.
     #[arg(long, value_name = "TOKENS", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..))]
     answer_tokens: u32,
-    /// For llm: how often a decision is asked again after an answer that cannot be used.
+    /// For llm: maximum number of retries for one decision, after answers that cannot be used.
     #[arg(long, value_name = "TIMES", default_value_t = 2, value_parser = clap::value_parser!(u32).range(..=10))]
     retries: u32,
     /// For llm: the temperature, 0 to 2. Default: the endpoint's.
     #[arg(long, value_parser = temperature)]
     temperature: Option<f32>,
-    /// For llm: the built-in agent that decides without a usable answer.
-    #[arg(long, value_name = "AGENT", default_value_t = AgentKind::Greedy.into(), value_parser = named_agent)]
+    /// For llm: the built-in agent that decides without a usable answer; it does not search.
+    #[arg(long, value_name = "AGENT", default_value_t = AgentKind::Greedy.into(), value_parser = fallback)]
     fallback: NamedAgent,
 }
 
 fn temperature(text: &str) -> Result<f32, String> {
     let temperature = text.parse().ok().filter(|it| (0.0..=2.0).contains(it));
     temperature.ok_or_else(|| "a temperature is a number from 0 to 2".to_owned())
+}
+
+/// An agent that decides at once: a search would need time that the model has used.
+fn fallback(name: &str) -> Result<NamedAgent, String> {
+    match named_agent(name)? {
+        agent @ NamedAgent::Kind(_) => Ok(agent),
+        NamedAgent::MonteCarlo(_) => Err("a fallback does not search".to_owned()),
+    }
 }
 
 impl LlmArgs {
@@ -116,18 +126,13 @@ impl LlmArgs {
         Ok(Arc::new(endpoint))
     }
 
-    /// The agent. `seed` and `pace`: of the fallback.
-    pub(crate) fn agent(
-        &self,
-        endpoint: Arc<Endpoint>,
-        seed: [u8; 32],
-        pace: Duration,
-    ) -> LanguageModel {
+    /// The agent. `seed`: of the fallback, which decides without a pause.
+    pub(crate) fn agent(&self, endpoint: Arc<Endpoint>, seed: [u8; 32]) -> LanguageModel {
         LanguageModel {
             endpoint,
             budget: self.budget,
             retries: self.retries,
-            fallback: RemoteAgent::named(self.fallback, seed, pace),
+            fallback: RemoteAgent::named(self.fallback, seed, Duration::ZERO),
             fallback_name: self.fallback.name(),
             began: Instant::now(),
             live: Live::new(GameView::default(), None),
@@ -194,7 +199,7 @@ impl LanguageModel {
         }
         let asked = self.ask_until(request, self.deadline()).await;
         match &asked {
-            Ok(reply) if !is_legal(request, reply) => {}
+            Ok(reply) if !is_legal(request, ActionId(reply.action)) => {}
             Ok(_) => self.silent = 0,
             Err(_) => self.silent += 1,
         }
@@ -208,13 +213,14 @@ impl LanguageModel {
     ) -> Result<Reply, String> {
         let mut messages = vec![
             Message::system(format!(
-                "You play the card game Chef's Hat. {RULES}\n\n{FORM}"
+                "You play the card game Chef's Hat. {RULES} {}\n\n{FORM}",
+                language::this_game(self.live.view.rules.as_ref())
             )),
             Message::user(text::decision(&self.live, self.now_ms())),
         ];
         let told = messages.len();
         let (_, mut refused) = self.answered.take().unwrap_or_default();
-        // Answers, each with what was said about it. Of one that was lost nobody said anything.
+        // Answers, each with the reply to it. One that was lost has none.
         refused.truncate(refused.len() / 2 * 2);
         let attempts = u32::try_from(refused.len() / 2).unwrap_or(u32::MAX);
         messages.extend(refused);
@@ -248,11 +254,12 @@ impl LanguageModel {
                 continue;
             };
             // The server counts illegal answers; the last one would cost the decision.
-            if !is_legal(request, &reply) && request.invalid_attempts_left == Some(1) {
+            let action = ActionId(reply.action);
+            if !is_legal(request, action) && request.invalid_attempts_left == Some(1) {
                 return Err(format!("action {} is illegal", reply.action));
             }
-            let action = serde_json::json!({ "action": reply.action }).to_string();
-            messages.push(Message::assistant(action));
+            let answer = serde_json::json!({ "action": reply.action }).to_string();
+            messages.push(Message::assistant(answer));
             self.answered = Some((request.decision_id, messages.split_off(told)));
             return Ok(reply);
         }
@@ -295,10 +302,6 @@ impl LanguageModel {
     }
 }
 
-fn is_legal(request: &v1::DecisionRequest, reply: &Reply) -> bool {
-    legal_actions(request).any(|ActionId(id)| id == reply.action)
-}
-
 impl Agent for LanguageModel {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let id = request.decision_id;
@@ -313,7 +316,7 @@ impl Agent for LanguageModel {
             self.live.take(Update::Decision(request.clone()), now_ms);
         }
         self.said = v1::Annotations::default();
-        // Who has no choice need not ask.
+        // Without a choice there is nothing to ask.
         if legal_count(request) == 1 {
             return self.fallback.decide(request);
         }

@@ -129,6 +129,11 @@ impl Seat {
         })
     }
 
+    /// The rules of this game.
+    pub(super) fn rules(&self) -> String {
+        self.read(|live| language::this_game(live.view.rules.as_ref()))
+    }
+
     /// The whole table.
     pub(super) fn table(&self) -> String {
         self.read(|live| text::table(live, elapsed_ms(self.began)))

@@ -101,7 +101,11 @@ impl Server {
         };
         let handle = self.seats().join(request).await.map_err(in_words)?;
         let seat = self.seat(Some(&handle))?;
-        Ok(format!("table {handle}\n{}", seat.table()))
+        Ok(format!(
+            "table {handle}\n{}\n{}",
+            seat.rules(),
+            seat.table()
+        ))
     }
 
     async fn wait_for_turn(&self, wait: Wait) -> Said {
@@ -126,18 +130,19 @@ impl Server {
 
     async fn express(&self, it: Express) -> Said {
         let seat = self.seat(it.table.as_deref())?;
-        let (label, media) = match (it.label, it.words) {
-            (_, Some(words)) => (words::SAY.to_owned(), words::to_data_url(&words)),
-            (Some(label), None) => (label, String::new()),
+        let shown = match (it.label, it.words) {
+            (_, Some(words)) => words::said(&words),
+            (Some(label), None) => v1::Expression {
+                label,
+                ..v1::Expression::default()
+            },
             (None, None) => return Err("Give a label or words.".to_owned()),
         };
         let expression = v1::Expression {
-            label,
-            media,
             valence: it.valence,
             arousal: it.arousal,
             source: v1::ExpressionSource::Model.into(),
-            ..v1::Expression::default()
+            ..shown
         };
         seat.express(expression).await.map_err(in_words)?;
         Ok("ok".to_owned())

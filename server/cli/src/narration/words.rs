@@ -11,6 +11,15 @@ const PREFIX: &str = "data:,";
 /// Maximum bytes of `media` in the protocol.
 const MAX_MEDIA: usize = 256;
 
+/// Whether words can be said whole.
+pub(crate) fn fits(words: &str) -> bool {
+    encoded(words).len() <= MAX_MEDIA
+}
+
+fn encoded(words: &str) -> String {
+    format!("{PREFIX}{}", utf8_percent_encode(words, NON_ALPHANUMERIC))
+}
+
 /// An expression that says these words.
 pub(crate) fn said(words: &str) -> v1::Expression {
     v1::Expression {
@@ -29,7 +38,6 @@ pub(crate) fn from_data_url(media: &str) -> Option<String> {
 
 /// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
 pub(crate) fn to_data_url(words: &str) -> String {
-    let encoded = |words: &str| format!("{PREFIX}{}", utf8_percent_encode(words, NON_ALPHANUMERIC));
     let mut media = encoded(words);
     let mut cut = words.to_owned();
     while media.len() > MAX_MEDIA {

@@ -115,7 +115,7 @@ export const lobby: Texts["lobby"] = {
   },
   make: {
     title: "Raum erstellen",
-    text: "Wähle, wer spielt, nach welchen Regeln und wie schnell. Lade dann Personen, Roboter und Agenten ein.",
+    text: "Wähle, wer spielt, nach welchen Regeln und wie schnell. Lade dann Personen, Roboter, Agenten und Sprachmodelle ein.",
     link: "Raum erstellen…",
     name: "Name des Raums",
     namePlaceholder: "Freitagabend",

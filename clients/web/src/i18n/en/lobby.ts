@@ -114,7 +114,7 @@ export const lobby = {
   },
   make: {
     title: "Create a room",
-    text: "Choose who plays, by which rules, and how fast. Then invite people, robots and agents.",
+    text: "Choose who plays, by which rules, and how fast. Then invite people, robots, agents and language models.",
     link: "Create a room…",
     name: "Name of the room",
     namePlaceholder: "Friday evening",

@@ -115,7 +115,7 @@ export const lobby: Texts["lobby"] = {
   },
   make: {
     title: "Crear una sala",
-    text: "Elige quién juega, con qué reglas y a qué ritmo. Después invita a personas, robots y agentes.",
+    text: "Elige quién juega, con qué reglas y a qué ritmo. Después invita a personas, robots, agentes y modelos de lenguaje.",
     link: "Crear una sala…",
     name: "Nombre de la sala",
     namePlaceholder: "Viernes por la noche",

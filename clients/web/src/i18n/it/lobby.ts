@@ -115,7 +115,7 @@ export const lobby: Texts["lobby"] = {
   },
   make: {
     title: "Crea una stanza",
-    text: "Scegli chi gioca, con quali regole e a che ritmo. Poi invita persone, robot e agenti.",
+    text: "Scegli chi gioca, con quali regole e a che ritmo. Poi invita persone, robot, agenti e modelli linguistici.",
     link: "Crea una stanza…",
     name: "Nome della stanza",
     namePlaceholder: "Venerdì sera",

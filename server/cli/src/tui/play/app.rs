@@ -8,6 +8,7 @@ use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
 use crate::narration::awaited::AwaitedSeat;
 use crate::narration::view::GameView;
+use crate::narration::words;
 use crate::tui::log::Log;
 use crate::tui::screen::Key;
 
@@ -371,6 +372,9 @@ impl App {
             return None;
         }
         if self.table.end.is_some() || matches!(self.link, Link::Over(_)) {
+            if self.ends_line(code) {
+                return None;
+            }
             let done = matches!(code, KeyCode::Enter | KeyCode::Esc | KeyCode::Char('q'));
             return done.then(|| self.leave()).flatten();
         }
@@ -403,10 +407,24 @@ impl App {
         }
     }
 
+    /// Whether a key still belongs to a line to the table, which the end of the game interrupted.
+    pub(super) fn ends_line(&mut self, code: KeyCode) -> bool {
+        let writes = self.dialog == Some(Dialog::Write);
+        if writes && matches!(code, KeyCode::Enter | KeyCode::Esc) {
+            self.dialog = None;
+        }
+        writes
+    }
+
     /// Handles a key for the line to the table.
     fn write(&mut self, code: KeyCode) -> Option<Do> {
         match code {
-            KeyCode::Char(sign) if self.line.chars().count() < MAX_LINE => self.line.push(sign),
+            KeyCode::Char(sign) => {
+                let longer = format!("{}{sign}", self.line);
+                if longer.chars().count() <= MAX_LINE && words::fits(&longer) {
+                    self.line = longer;
+                }
+            }
             KeyCode::Backspace => drop(self.line.pop()),
             KeyCode::Enter => {
                 self.dialog = None;

@@ -229,11 +229,17 @@ fn a_line_to_the_table_is_written_sent_and_shown() {
     }
     assert!(session.app.dialog.is_none());
     session.press(KeyCode::Char('t'));
-    for _ in 0..=MAX_LINE {
-        session.press(KeyCode::Char('è'));
+    // What does not fit is refused at once.
+    for (sign, most) in [('x', MAX_LINE), ('è', 41)] {
+        for _ in 0..=MAX_LINE {
+            session.press(KeyCode::Char(sign));
+        }
+        let line = &session.app.line;
+        assert_eq!((line.chars().count(), words::fits(line)), (most, true));
+        session.app.line.clear();
     }
-    assert_eq!(session.app.line.chars().count(), MAX_LINE);
-    session.press(KeyCode::Esc);
+    // The end of the game takes the line away, not the person's next keys.
+    assert!(!session.app.ends_line(KeyCode::Esc) || session.app.dialog.is_none());
     let shown = v1::GameEvent {
         kind: Some(Kind::ExpressionShown(Box::new(v1::ExpressionShown {
             seat: 1,

@@ -289,7 +289,7 @@ impl Part {
             }
             (Some(game), Some(_)) if is_over(game) => {
                 match code {
-                    code if game.log.key(code) => {}
+                    code if game.ends_line(code) || game.log.key(code) => {}
                     KeyCode::Enter | KeyCode::Char(' ') | KeyCode::Esc => self.dismiss(),
                     KeyCode::Char('q') => self.ask_to_leave(),
                     _ => {}
