@@ -13,6 +13,8 @@ use crate::proxies::TrustedProxies;
 use crate::tls::TlsFiles;
 use crate::webhooks::WebhookSettings;
 
+/// Version of this server, as its records and webhooks name it.
+pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Largest message a client may send, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Largest message between nodes, bytes: a batch of inputs of one client, or of updates for it.

@@ -7,6 +7,7 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use chefshat_proto::v1;
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use chefshat_record::signature::{PublicKey, SigningKey};
 use futures::future::Either;
@@ -16,7 +17,7 @@ use tracing::error;
 use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert;
 use crate::limits::{Background, Key};
-use crate::store::{Journal, Signed, StoreError};
+use crate::store::{Journal, StoreError};
 use chefshat_room::journal::GameHeader;
 
 /// The file of the key in a data directory.
@@ -128,7 +129,7 @@ impl Signer {
         header: Arc<GameHeader>,
         journal: &mut dyn Journal,
         background: Option<(&Background, Key)>,
-    ) -> Result<Option<Signed>, StoreError> {
+    ) -> Result<Option<v1::RecordSignature>, StoreError> {
         let Some(key) = self.key.clone() else {
             return Ok(None);
         };
@@ -142,19 +143,16 @@ impl Signer {
         let entries = journal.entries().await?;
         let signing = move || {
             let lines = convert::record_lines(&header, &entries);
-            Signed {
-                server_version: convert::SERVER_VERSION.to_owned(),
-                signature: key.sign(&lines),
-            }
+            key.sign(&lines)
         };
-        let signed = match background {
+        let signature = match background {
             Some((background, _)) => background.run(signing).await,
             None => tokio::task::spawn_blocking(signing).await.ok(),
         };
-        if signed.is_none() {
+        if signature.is_none() {
             error!(%game, "a record could not be signed; it stays unsigned");
         }
-        Ok(signed)
+        Ok(signature)
     }
 }
 

@@ -134,6 +134,8 @@ pub struct GameHeader {
     pub rules: RuleSet,
     /// Version of the rules it is played by.
     pub rules_version: u32,
+    /// Version of the server that created it.
+    pub server_version: String,
     /// The policy.
     pub policy: Policy,
     /// What fills each seat.

@@ -34,7 +34,9 @@ pub use kind::{kind_from_proto, kind_to_proto};
 pub use marker::marker_to_proto;
 pub use name::checked_name;
 pub use players::recorded_player;
-pub use policy::{millis, policy_from_proto, policy_to_proto, requested_policy};
+pub use policy::{
+    millis, policy_from_proto, policy_to_proto, requested_policy, set_default_clock_of_models,
+};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines};
 pub use room::{
@@ -48,7 +50,7 @@ pub use study::{
     study_participant, study_plan, study_to_proto,
 };
 pub use study_view::{answers_from_proto, study_view};
-pub use summary::{SERVER_VERSION, summary};
+pub use summary::summary;
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,

@@ -22,8 +22,17 @@ const DAY_MS: u32 = 86_400_000;
 /// The first field that is out of its range.
 pub fn requested_policy(message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
     let mut policy = policy_from_proto(message)?;
+    set_default_clock_of_models(&mut policy, message);
     policy.set_default_absence_times(ABSENCE_TIME_OF_PEOPLE);
     Ok(policy)
+}
+
+/// Gives language models their default times, unless the request sets times. What is stored keeps the
+/// clocks that it has: earlier versions knew no models.
+pub fn set_default_clock_of_models(policy: &mut Policy, request: &v1::RoomPolicy) {
+    if !sets_times(request) {
+        set_default_clock(&mut policy.clocks, KindClock::MODELS);
+    }
 }
 
 /// A stored policy. Games of earlier servers have no absence time; other unset fields take their
@@ -170,7 +179,7 @@ fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
 }
 
 /// Clocks for kinds of participants, each kind at most once. A time set for the room applies to
-/// everybody, people and language models included. [`Policy::set_default_absence_times`] completes them.
+/// everybody, people included. [`Policy::set_default_absence_times`] completes them.
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
     for message in &policy.clocks {
@@ -186,25 +195,31 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
             absence_time: time("clocks", message.absence_time_ms, 0..=DAY_MS)?,
         });
     }
-    let chosen = policy.decision_time_ms.is_some() || policy.bank_ms.is_some();
-    if chosen {
-        return Ok(clocks);
+    if !sets_times(policy) {
+        set_default_clock(&mut clocks, KindClock::PEOPLE);
     }
-    for default in [KindClock::PEOPLE, KindClock::MODELS] {
-        match clocks.iter_mut().find(|clock| clock.kind == default.kind) {
-            None => clocks.push(KindClock {
-                absence_time: None,
-                ..default
-            }),
-            Some(clock) => {
-                let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
-                if absence_alone && clock.absence_time.is_some() {
-                    (clock.decision_time, clock.bank) = (default.decision_time, default.bank);
-                }
+    Ok(clocks)
+}
+
+/// Whether a policy sets times for everybody.
+fn sets_times(policy: &v1::RoomPolicy) -> bool {
+    policy.decision_time_ms.is_some() || policy.bank_ms.is_some()
+}
+
+/// Gives a kind its default times, unless its clock has times.
+fn set_default_clock(clocks: &mut Vec<KindClock>, default: KindClock) {
+    match clocks.iter_mut().find(|clock| clock.kind == default.kind) {
+        None => clocks.push(KindClock {
+            absence_time: None,
+            ..default
+        }),
+        Some(clock) => {
+            let absence_alone = clock.decision_time.is_none() && clock.bank.is_none();
+            if absence_alone && clock.absence_time.is_some() {
+                (clock.decision_time, clock.bank) = (default.decision_time, default.bank);
             }
         }
     }
-    Ok(clocks)
 }
 
 /// Whole milliseconds, as messages count time.

@@ -15,7 +15,7 @@ use super::marker::last_marker;
 use super::physical_record::physical_record_lines;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
-use crate::store::{Signed, StoredGame};
+use crate::store::StoredGame;
 use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
@@ -99,25 +99,16 @@ fn by_wizard(header: &GameHeader, line: &mut Line) {
 /// All lines of the record of a stored game.
 pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match stored {
-        StoredGame::Hosted(header, journal, signed) => {
+        StoredGame::Hosted(header, journal, signature) => {
             let mut lines = record_lines(header, journal);
-            if let Some(signed) = signed {
-                put_signature(&mut lines, signed);
+            if let Some(signature) = signature
+                && let Some(Line::Footer(footer)) = lines.last_mut().and_then(|it| it.line.as_mut())
+            {
+                footer.signature = Some(v1::RecordSignature::clone(signature));
             }
             Cow::Owned(lines)
         }
         StoredGame::Imported(lines) => Cow::Borrowed(lines),
-    }
-}
-
-/// Makes the lines those that were signed when the game ended, by an earlier version perhaps.
-fn put_signature(lines: &mut [v1::RecordLine], signed: &Signed) {
-    for line in lines {
-        match &mut line.line {
-            Some(Line::Header(header)) => header.server_version.clone_from(&signed.server_version),
-            Some(Line::Footer(footer)) => footer.signature = Some(signed.signature.clone()),
-            _ => {}
-        }
     }
 }
 

@@ -14,9 +14,6 @@ use super::room::{
 };
 use super::start::{origin, start_to_proto};
 
-/// Version of this server, as its records name it.
-pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");
-
 /// The header of a record.
 pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
     let header = core.header();
@@ -32,7 +29,7 @@ pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
         seats: recorded_participants(core),
         seed_commitment: seed_commitment(header),
         created_at_ms: header.created_at_ms,
-        server_version: SERVER_VERSION.into(),
+        server_version: header.server_version.clone(),
         action_space: Some(action_space(&header.rules.actions())),
         start: start_to_proto(&header.start, header.rules.faces()),
         tournament_id: tournament_id(header),

@@ -24,7 +24,7 @@ use crate::config::{
     MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION,
     MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
     MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL,
-    MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
+    MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, SERVER_VERSION, ServerConfig,
 };
 use crate::convert;
 use crate::limits::CallLimits;
@@ -127,7 +127,7 @@ impl ServerService for Info {
             })
             .collect();
         Ok(Response::new(v1::GetServerInfoResponse {
-            server_version: env!("CARGO_PKG_VERSION").into(),
+            server_version: SERVER_VERSION.into(),
             rules_version: RULES_VERSION,
             presets,
             built_in_agents: NamedAgent::NAMES.map(str::to_owned).to_vec(),

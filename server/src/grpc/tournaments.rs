@@ -244,6 +244,7 @@ impl TournamentService for TournamentCalls {
         plan.policy.durability = supported_policy(&self.recorded, &asked)
             .map_err(|problem| refused_within("policy", &problem))?
             .durability;
+        convert::set_default_clock_of_models(&mut plan.policy, &asked);
         plan.policy
             .set_default_absence_times(ABSENCE_TIME_IN_TOURNAMENTS);
         let reach = self.recorded.reach();

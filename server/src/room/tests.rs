@@ -29,7 +29,7 @@ use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
-use crate::store::{Journal, MemoryStore, Signed, Store as _, StoreError};
+use crate::store::{Journal, MemoryStore, Store as _, StoreError};
 use crate::webhooks::Webhooks;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
@@ -88,6 +88,7 @@ async fn room_of_node(
         .validate()
         .expect("a valid rule set"),
         rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
         policy,
         display_names: BTreeMap::new(),
         wizards: std::collections::BTreeSet::new(),
@@ -435,9 +436,9 @@ impl Journal for PanicsAfter {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.journal.finish(summary, signed)
+        self.journal.finish(summary, signature)
     }
 }
 
@@ -555,10 +556,10 @@ impl Journal for Observed {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.signed.set(signed.is_some()).expect("one end");
-        self.journal.finish(summary, signed)
+        self.signed.set(signature.is_some()).expect("one end");
+        self.journal.finish(summary, signature)
     }
 }
 

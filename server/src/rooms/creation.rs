@@ -12,6 +12,7 @@ use super::table::{CreateError, Entry};
 use super::{CODES_TRIED, Rooms};
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::cluster::News;
+use crate::config::SERVER_VERSION;
 use crate::limits::{Held, Key, Refused};
 use crate::room::{Handle, TaskContext, spawn_room};
 use crate::store::StoreError;
@@ -265,6 +266,7 @@ impl Reservation {
             rules: new.rules,
             policy: new.policy,
             rules_version: RULES_VERSION,
+            server_version: SERVER_VERSION.into(),
             fills: new.fills,
             wizards: new.wizards,
             display_names: new.display_names,

@@ -9,7 +9,7 @@ use futures::future::{BoxFuture, ready};
 use tracing::error;
 
 use super::form;
-use super::{Journal, Signed, StoreError};
+use super::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// Stores one game when it has ended.
@@ -67,10 +67,10 @@ impl<W: StoreWhole> Journal for EphemeralJournal<W> {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let entries = std::mem::take(&mut self.encoded);
-        let signature = signed.as_ref().map(form::signed_to_bytes);
+        let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
             let stored = (self.whole).store_whole(&self.header, entries, summary, signature);
             match stored.await {

@@ -11,8 +11,8 @@ use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    ForgetError, Forgotten, Journal, Keep, MemoryStore, Part, ResumableGame, Signed, Store,
-    StoreError, StoredGame,
+    ForgetError, Forgotten, Journal, Keep, MemoryStore, Part, ResumableGame, Store, StoreError,
+    StoredGame,
 };
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
@@ -201,8 +201,8 @@ impl Journal for FailingJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.finish(summary, signed)
+        self.inner.finish(summary, signature)
     }
 }

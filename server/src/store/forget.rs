@@ -144,14 +144,14 @@ pub(super) fn forget_stored(
     who: &Pseudonym,
 ) -> Redactions {
     let redactions = match stored {
-        StoredGame::Hosted(header, entries, signed) => {
+        StoredGame::Hosted(header, entries, signature) => {
             let mut changed = entries.to_vec();
             let mut seats = ParticipantSeats::default();
             let mut redactions = forget_entries(&mut changed, &mut seats, who);
             if redactions != Redactions::default() {
                 redactions.names += forget_header(Arc::make_mut(header), who);
                 *entries = changed.into();
-                *signed = None;
+                *signature = None;
             }
             redactions
         }

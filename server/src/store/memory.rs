@@ -13,8 +13,8 @@ use super::forget::forget_stored;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Signed, Store, StoreError,
-    StoredGame, matches_filter,
+    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame,
+    matches_filter,
 };
 use crate::clock::since_epoch_ms;
 use chefshat_room::ids::Id;
@@ -361,7 +361,7 @@ impl Journal for MemoryJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let entries = std::mem::take(&mut self.entries).into();
         if let Some(summary) = summary {
@@ -369,7 +369,11 @@ impl Journal for MemoryJournal {
                 id: self.header.game_id,
                 ended_at_ms: summary.ended_at_ms,
                 summary: *summary,
-                stored: StoredGame::Hosted(Arc::clone(&self.header), entries, signed.map(Arc::new)),
+                stored: StoredGame::Hosted(
+                    Arc::clone(&self.header),
+                    entries,
+                    signature.map(Arc::new),
+                ),
             });
         }
         ready(Ok(())).boxed()

@@ -53,20 +53,15 @@ pub enum StoreError {
     Fenced(Id),
 }
 
-/// The signature of the record of a hosted game.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Signed {
-    /// Version of the server that signed it, which the record's header names.
-    pub server_version: String,
-    /// The signature.
-    pub signature: v1::RecordSignature,
-}
-
 /// A finished game in the store.
 #[derive(Debug, Clone)]
 pub enum StoredGame {
     /// A hosted game: its header, its journal, and the signature of its record, if it has one.
-    Hosted(Arc<GameHeader>, Arc<[Entry]>, Option<Arc<Signed>>),
+    Hosted(
+        Arc<GameHeader>,
+        Arc<[Entry]>,
+        Option<Arc<v1::RecordSignature>>,
+    ),
     /// An imported game: the lines of its record.
     Imported(Arc<[v1::RecordLine]>),
 }
@@ -353,7 +348,7 @@ pub trait Journal: Send + 'static {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
 }
 

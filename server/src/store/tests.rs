@@ -41,6 +41,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
             ..Policy::default()
         },
         rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
         fills: vec![Fill::Open { reserved_for: None }; 4],
         display_names: Default::default(),
         wizards: std::collections::BTreeSet::new(),
@@ -133,24 +134,21 @@ async fn a_cursor_reaches_every_game_that_finishes_later() {
 async fn a_signature_is_stored_with_the_end_of_its_game() {
     with_each_store(async |store| {
         for (game, durability) in [(1, Durability::Durable), (2, Durability::Ephemeral)] {
-            let signed = Signed {
-                server_version: "0.0.1".into(),
-                signature: v1::RecordSignature {
-                    public_key: vec![game; 32],
-                    signature: vec![game; 64],
-                },
+            let signature = v1::RecordSignature {
+                public_key: vec![game; 32],
+                signature: vec![game; 64],
             };
             let mut journal = created(store, game, durability).await;
             let entries = journal.entries().await.expect("readable");
             assert_eq!(entries.len(), 1, "what is signed can be read back");
             let header = header(game, durability);
-            let finished = journal.finish(Some(summary(&header)), Some(signed.clone()));
+            let finished = journal.finish(Some(summary(&header)), Some(signature.clone()));
             finished.await.expect("committed");
             let stored = store.finished(header.game_id).await.expect("readable");
             let Some(StoredGame::Hosted(_, _, Some(stored))) = stored else {
                 panic!("{stored:?}");
             };
-            assert_eq!(*stored, signed);
+            assert_eq!(*stored, signature);
         }
     })
     .await;

@@ -23,7 +23,7 @@ use tracing::{debug, warn};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
 use crate::clock::since_epoch;
-use crate::convert::SERVER_VERSION;
+use crate::config::SERVER_VERSION;
 use crate::limits::LogPace;
 use crate::metrics::{Metrics, WebhookOutcome};
 use crate::post::PostError;

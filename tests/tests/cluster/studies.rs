@@ -177,8 +177,11 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
     // Each node answers the same request with the same study, and lists it.
     for node in &cluster.nodes {
         let mut service = StudyServiceClient::new(node.client().await.channel());
-        let repeated = service.create_study(request.clone()).await;
-        let repeated = repeated.expect("the same").into_inner();
+        let repeated = settled(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.create_study(request).await }
+        });
+        let repeated = repeated.await.into_inner();
         assert_eq!(repeated.owner_token, owner_token);
         let request = v1::ListStudiesRequest {
             owner_tokens: vec![owner_token.clone()],

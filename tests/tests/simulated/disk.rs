@@ -10,7 +10,7 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_server::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_server::store::{
-    Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
+    Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
@@ -237,7 +237,7 @@ impl Journal for DiskJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        _signed: Option<Signed>,
+        _signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let (id, aborted) = (self.game, summary.is_none());
         let finish = move |games: &mut BTreeMap<Id, OnDisk>| {

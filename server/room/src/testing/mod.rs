@@ -51,6 +51,7 @@ impl Table {
             name: "table".into(),
             rules: rules.validate().expect("a valid rule set"),
             rules_version: RULES_VERSION,
+            server_version: String::new(),
             policy,
             display_names: BTreeMap::new(),
             wizards: std::collections::BTreeSet::new(),

@@ -19,9 +19,7 @@ use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use crate::store::{
-    Journal, MemoryStore, Part, ResumableGame, Signed, Store, StoreError, StoredGame,
-};
+use crate::store::{Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
 
 #[derive(Clone)]
 enum Row {
@@ -258,7 +256,7 @@ impl Journal for FakeJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             self.reached().await;
@@ -267,7 +265,7 @@ impl Journal for FakeJournal {
             self.written(written)?;
             let finished = &self.database.finished;
             let game = finished.create(Arc::clone(&self.header), self.entries.clone());
-            game.await?.finish(summary, signed).await?;
+            game.await?.finish(summary, signature).await?;
             if self.unanswered.wait_for(|it| !it).await.is_err() {
                 pending().await
             }

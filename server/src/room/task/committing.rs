@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_proto::v1;
 use chefshat_room::State;
 use chefshat_room::ids::Id;
 use tokio::time::Instant;
@@ -12,7 +13,7 @@ use tracing::{error, info, warn};
 use super::Room;
 use crate::convert;
 use crate::outbox::StreamEnd;
-use crate::store::{Signed, StoreError};
+use crate::store::StoreError;
 
 /// How long a node tries to read a journal to sign the record, as long as its store tries to commit
 /// the end of the game, and the pause before the next attempt.
@@ -78,13 +79,13 @@ impl Room {
         let has_record = summary.is_some();
         let announced = summary.clone().filter(|_| self.context.webhooks.is_on());
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
-        let signed = match has_record {
+        let signature = match has_record {
             true => self.sign().await,
             false => Ok(None),
         };
-        let finished = match signed {
-            Ok(signed) => {
-                let finished = self.journal.finish(summary.map(Box::new), signed);
+        let finished = match signature {
+            Ok(signature) => {
+                let finished = self.journal.finish(summary.map(Box::new), signature);
                 // A node that has a lease learns from its beat that the game is over, maybe before
                 // it learns the outcome: it is fenced then, and not lost.
                 let lost = async {
@@ -124,7 +125,7 @@ impl Room {
     ///
     /// # Errors
     /// The room was fenced meanwhile.
-    async fn sign(&mut self) -> Result<Option<Signed>, StoreError> {
+    async fn sign(&mut self) -> Result<Option<v1::RecordSignature>, StoreError> {
         let background = self.core.is_built_in_only();
         let background = background.then_some((&*self.context.background, self.context.owner));
         let header = self.core.header();
@@ -139,7 +140,7 @@ impl Room {
             let journal = &mut *self.journal;
             let signing = self.context.signer.sign(header, journal, background);
             let error = match signing.await {
-                Ok(signed) => return Ok(signed),
+                Ok(signature) => return Ok(signature),
                 Err(error) => error,
             };
             if began.elapsed() >= limit {

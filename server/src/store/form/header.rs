@@ -55,7 +55,13 @@ struct HeaderForm {
     table: Vec<u8>,
     #[prost(message, optional, tag = "19")]
     study: Option<StudyForm>,
+    /// Empty: `FIRST_VERSION`.
+    #[prost(string, tag = "20")]
+    server_version: String,
 }
+
+/// The version of the server whose headers do not name it.
+const FIRST_VERSION: &str = "0.1.0";
 
 #[derive(Clone, PartialEq, Message)]
 struct StudyForm {
@@ -126,6 +132,7 @@ pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
         series: (header.series()).map_or_else(Vec::new, |series| series.0.to_vec()),
         table: (header.table).map_or_else(Vec::new, |table| table.bytes().to_vec()),
         study: header.study.as_deref().map(study_to_form),
+        server_version: header.server_version.clone(),
     }
     .encode_to_vec()
 }
@@ -195,6 +202,10 @@ pub(in crate::store) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Un
         game_id: Id(array(&form.game_id, "the game's id")?),
         name: form.name,
         rules_version: form.rules_version,
+        server_version: match form.server_version.as_str() {
+            "" => FIRST_VERSION.into(),
+            _ => form.server_version,
+        },
         policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
         fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
         wizards: convert::wizards_from_proto(&form.seats),

@@ -14,7 +14,7 @@ use super::values::Owned;
 use super::writer::Queue;
 use crate::store::ephemeral::StoreWhole;
 use crate::store::form;
-use crate::store::{Journal, Signed, StoreError};
+use crate::store::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// The journal of a game that survives its node.
@@ -75,7 +75,7 @@ impl Journal for DurableJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             self.settle().await?;
@@ -83,7 +83,7 @@ impl Journal for DurableJournal {
                 owned: self.owned,
                 number: self.number,
                 rows: self.position,
-                end: end(summary, signed.as_ref().map(form::signed_to_bytes)),
+                end: end(summary, signature.as_ref().map(form::signature_to_bytes)),
             };
             self.commands.commit(Arc::new(finish)).await.map(drop)
         }

@@ -243,11 +243,11 @@ impl Reader {
         let header = stored_header(row.get(2)).map_err(unreadable)?;
         let (entries, _) = self.journal(row.get(0)).await?.map_err(unreadable)?;
         let signature: Option<&[u8]> = row.get(4);
-        let signed = signature.map(form::signed_from_bytes).transpose();
+        let signature = signature.map(form::signature_from_bytes).transpose();
         Ok(Some(StoredGame::Hosted(
             Arc::new(header),
             entries.into(),
-            signed.map_err(unreadable)?.map(Arc::new),
+            signature.map_err(unreadable)?.map(Arc::new),
         )))
     }
 

@@ -14,7 +14,7 @@ use super::writer::{Pending, Row, WriteCommand};
 use crate::store::codec::Codec;
 use crate::store::ephemeral::StoreWhole;
 use crate::store::form;
-use crate::store::{Journal, Signed, StoreError};
+use crate::store::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// The queue of the writer.
@@ -123,7 +123,7 @@ impl Journal for DurableJournal {
     fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
-        signed: Option<Signed>,
+        signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         self.queue
             .send(WriteCommand::Finish {
@@ -132,7 +132,7 @@ impl Journal for DurableJournal {
                 state: v1::RoomState::Aborted.into(),
                 last_row: self.last_row,
                 summary,
-                signature: signed.as_ref().map(form::signed_to_bytes),
+                signature: signature.as_ref().map(form::signature_to_bytes),
             })
             .boxed()
     }

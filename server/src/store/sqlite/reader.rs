@@ -133,11 +133,11 @@ impl Reader {
         let journal = self.journal(row.get(0), row.get(4)).await?;
         let journal = journal.map_err(unreadable)?;
         let signature: Option<&[u8]> = row.get(5);
-        let signed = signature.map(form::signed_from_bytes).transpose();
+        let signature = signature.map(form::signature_from_bytes).transpose();
         Ok(Some(StoredGame::Hosted(
             Arc::new(header),
             journal.entries.into(),
-            signed.map_err(unreadable)?.map(Arc::new),
+            signature.map_err(unreadable)?.map(Arc::new),
         )))
     }
 

@@ -36,6 +36,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         name: "a room with ünïcode".into(),
         rules: RuleSetSpec::default().validate().expect("the standard"),
         rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
         policy: Policy {
             durability,
             bank: Duration::from_millis(1_234),
@@ -544,7 +545,8 @@ fn the_encoding_of_stored_data_does_not_change() {
     let former = include_str!("fixtures/form1.hex");
     let (first, second) = former.split_once('\n').expect("two lines");
     let bytes = hex::decode(first).expect("hexadecimal digits");
-    form::header_from_bytes(&bytes).expect("readable");
+    let read = form::header_from_bytes(&bytes).expect("readable");
+    assert_eq!(read.server_version, "0.1.0", "the first version named none");
     let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
     let mut read = Vec::new();
     form::read_entries(&bytes, &mut read).expect("readable");

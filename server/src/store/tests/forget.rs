@@ -102,13 +102,6 @@ fn summary_of(header: &GameHeader) -> Box<v1::RecordSummary> {
     })
 }
 
-fn signed() -> Signed {
-    Signed {
-        server_version: "0.0.1".into(),
-        signature: v1::RecordSignature::default(),
-    }
-}
-
 #[tokio::test]
 async fn a_participant_is_removed_from_its_games_and_others_stay() {
     with_each_store(async |store| {
@@ -117,7 +110,10 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
         let mut journal = created.expect("a new game");
         let mut rest = rest;
         journal.append(&mut rest).await.expect("committed");
-        let ended = journal.finish(Some(summary_of(&header)), Some(signed()));
+        let ended = journal.finish(
+            Some(summary_of(&header)),
+            Some(v1::RecordSignature::default()),
+        );
         ended.await.expect("committed");
         let mut other = created_of_others(store).await;
         finish(&mut other, 2).await;
