@@ -2,6 +2,7 @@
 
 import json
 import stat
+import time
 from pathlib import Path
 
 from chefshat import Decision, RandomAgent, pb
@@ -39,6 +40,9 @@ def test_a_game_resumes_from_a_backup_and_is_signed_by_the_same_key(server: Guar
     with server.client("host") as client:
         over = client.create_room("over", rules=SHORT, seats=["greedy"] * 4).room
         list(client.watch(over.room_id))
+        # Its file is written after the game, by and by.
+        while not (data / "records" / f"{over.game_id}.jsonl").exists():
+            time.sleep(0.05)
         policy = pb.RoomPolicy(decision_time_ms=60_000)
         room = client.create_room("resumes", rules=SHORT, policy=policy, seats=[None, "greedy", "greedy", "greedy"])
         (data / "any-other-file").write_text("its content")

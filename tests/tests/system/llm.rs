@@ -190,6 +190,8 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
             ..v1::RoomPolicy::default()
         }),
         seats: std::iter::once(open).chain(others).collect(),
+        // Deals in which the model has more decisions than the tests look at.
+        game_seed: vec![7; 32],
         ..v1::CreateRoomRequest::default()
     });
     let created = created.await.expect("a room");

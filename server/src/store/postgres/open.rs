@@ -19,6 +19,8 @@ const MIGRATIONS: [(i64, &str, &str); 2] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (2, "studies", include_str!("migrations/0002_studies.sql")),
 ];
+/// The advisory lock of whoever creates or upgrades the schema: "chefshat" in ASCII.
+pub(super) const CREATING: i64 = 0x6368_6566_7368_6174;
 /// How long connecting may take.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 /// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;
@@ -119,6 +121,19 @@ enum Schema {
     Foreign,
 }
 
+impl Schema {
+    /// Whether it has all that this version needs.
+    fn is_complete(&self) -> bool {
+        matches!(self, Self::Ours { version, .. } if *version >= NEWEST)
+    }
+}
+
+/// Waits until nobody else creates or upgrades the schema. The lock ends with the connection.
+async fn lock(connection: &mut PgConnection) -> sqlx::Result<()> {
+    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(CREATING);
+    locking.execute(connection).await.map(drop)
+}
+
 async fn schema(connection: &mut PgConnection) -> sqlx::Result<Schema> {
     let (migrations, support): (bool, bool) = sqlx::query_as(
         "SELECT to_regclass('_sqlx_migrations') IS NOT NULL, to_regclass('schema_support') IS NOT NULL",
@@ -156,7 +171,13 @@ pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseErro
     if synchronous == "off" {
         return Err(DatabaseError::Unsafe);
     }
-    let usable = match schema(&mut connection).await? {
+    let mut found = schema(&mut connection).await?;
+    if !found.is_complete() {
+        // Another node may be about to create it.
+        lock(&mut connection).await?;
+        found = schema(&mut connection).await?;
+    }
+    let usable = match found {
         Schema::Empty => migrations(&mut connection).await,
         Schema::Ours { version, .. } if version < NEWEST => Err(DatabaseError::Older),
         Schema::Ours { oldest, .. } if oldest > NEWEST => Err(DatabaseError::Newer),
@@ -177,6 +198,7 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
     // Its statements may take long.
     let address = address(url)?.disable_statement_logging();
     let mut connection = connect(&address).await?;
+    lock(&mut connection).await?;
     let before = match schema(&mut connection).await? {
         Schema::Empty => 0,
         Schema::Ours { version, .. } if version > NEWEST => return Err(DatabaseError::Newer),
@@ -189,8 +211,7 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
     Ok((before, NEWEST))
 }
 
-/// Runs what is missing, each migration in a transaction. Several nodes may do so at the same time:
-/// they wait for one another.
+/// Runs what is missing, each migration in a transaction. The caller has the lock.
 async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> {
     let all = MIGRATIONS.iter().map(|(version, name, sql)| {
         let sql = (*sql).into_sql_str();

@@ -131,3 +131,32 @@ async fn connections_are_encrypted_and_certificates_checked() {
         assert!(matches!(error, DatabaseError::Other(_)), "{error}");
     }
 }
+
+#[tokio::test]
+async fn who_finds_a_schema_that_another_node_is_creating_waits_for_it() {
+    let database = chefshat_postgres::database();
+    let mut creating = connected(&database).await;
+    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(open::CREATING);
+    locking.execute(&mut creating).await.expect("free");
+    // As between two migrations, or in the middle of a look at the tables.
+    database.run("CREATE TABLE half_a_schema (id bigint)");
+    let address = open::address(database.url()).expect("an address");
+    let completing = async {
+        waiting(&mut creating, "advisory").await;
+        database.run("DROP TABLE half_a_schema");
+        drop(creating);
+    };
+    let (opened, ()) = futures::future::join(open::check(&address), completing).await;
+    opened.expect("an empty database");
+    assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
+}
+
+#[tokio::test]
+async fn nodes_that_start_together_on_an_empty_database_all_start() {
+    let database = chefshat_postgres::database();
+    let address = open::address(database.url()).expect("an address");
+    let opening = (0..8).map(|_| open::check(&address));
+    for opened in futures::future::join_all(opening).await {
+        opened.expect("created by one of them");
+    }
+}
