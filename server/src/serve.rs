@@ -339,6 +339,7 @@ impl Server {
                 .run_until_cancelled_owned(Arc::clone(&access).follow()),
         );
         tracker.spawn(rooms.webhooks().clone().deliver(closing.clone()));
+        let encrypted = tls.is_some();
         if let Some(tls) = tls {
             tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
         }
@@ -401,7 +402,7 @@ impl Server {
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins))
             .layer(cors(&config.allowed_origins)?)
-            .layer(PageLayer)
+            .layer(PageLayer { tls: encrypted })
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))

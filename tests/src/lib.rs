@@ -25,7 +25,10 @@ pub use nodes::{TestNode, TestNodes};
 pub use process::{Ended, Launch, Process, own_address, set_up};
 pub use scores::scores;
 pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
-pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
+pub use server::{
+    TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four,
+    until_watched_by, watched,
+};
 
 use std::time::Duration;
 

@@ -12,8 +12,11 @@ use chefshat_server::host::{Host, HostError};
 use chefshat_server::serve::ServeError;
 use chefshat_server::store::{MemoryStore, Store};
 use tempfile::TempDir;
+use tokio::task::JoinHandle;
 use tonic::Streaming;
 use tonic::transport::Channel;
+
+use crate::patiently;
 
 /// A server that runs until it is stopped or dropped.
 #[derive(Debug)]
@@ -177,4 +180,24 @@ pub async fn narrow_spectator(
         .await
         .expect("a stream")
         .into_inner()
+}
+
+/// Watches a room until the task is aborted.
+pub fn watched(client: &Client, room_id: &str) -> JoinHandle<()> {
+    let mut spectator = client.spectate(room_id, 0);
+    tokio::spawn(async move { while let Ok(Some(_)) = spectator.next().await {} })
+}
+
+/// Waits until a room has a number of spectators.
+///
+/// # Panics
+/// It never has.
+pub async fn until_watched_by(client: &Client, room_id: &str, spectators: usize) {
+    let counting = async {
+        let now = async || client.get_room(room_id).await.expect("a room").spectators;
+        while usize::try_from(now().await) != Ok(spectators) {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    };
+    patiently(&format!("{spectators} spectators"), counting).await;
 }

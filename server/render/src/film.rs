@@ -9,6 +9,7 @@ use chefshat_engine::{Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
 
 use super::figure::Figure;
+use super::scene::Scene;
 use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::{ReplayError, walk};
 use cut::{Cut, chronicle_of};
@@ -214,6 +215,21 @@ impl Film {
             last: self.shifts,
         }
     }
+}
+
+/// The scene at the end of a game, without the rest of its film.
+///
+/// # Errors
+/// As [`Film::new`].
+pub fn last_scene(lines: &[v1::RecordLine], perspective: Perspective) -> Result<Scene, FilmError> {
+    let mut cut = Cut::new(viewer(lines, perspective)?);
+    walk(lines, |moment| {
+        cut.take(&moment);
+        let before = cut.frames.len().saturating_sub(1);
+        cut.frames.drain(..before);
+    })?;
+    let last = cut.frames.pop().ok_or(FilmError::Empty)?;
+    Ok(last.scene)
 }
 
 /// The action table of a decision.

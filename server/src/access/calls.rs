@@ -345,8 +345,10 @@ pub const CALLS: &[Call] = &[
 
 /// The calls that only nodes make of each other, on a listener of their own. The rest of the server
 /// does not have them.
-const CALLS_OF_NODES: &[Call] =
-    &[call("/chefshat.peer.v1.PeerService/Play", Player, Compared).streaming()];
+const CALLS_OF_NODES: &[Call] = &[
+    call("/chefshat.peer.v1.PeerService/Play", Player, Compared).streaming(),
+    call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).streaming(),
+];
 
 #[cfg(test)]
 mod tests {

@@ -197,6 +197,7 @@ pub fn describe(core: &Core) -> v1::Room {
         tournament_id: tournament_id(header),
         series_id: series_id(header),
         awaited: None,
+        spectators: 0,
     }
 }
 

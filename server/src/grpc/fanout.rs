@@ -10,10 +10,12 @@ use std::sync::{Arc, Mutex, Weak};
 
 use bytes::Bytes;
 use chefshat_proto::v1::{self, SpectatorServiceWatchRequest};
+use futures::future::BoxFuture;
 use futures::stream::unfold;
 use http::{HeaderMap, Response};
 use http_body_util::StreamBody;
 use prost::Message as _;
+use tokio::sync::watch;
 use tonic::body::Body;
 
 use super::status::room_gone;
@@ -78,14 +80,15 @@ impl Fanout {
     }
 
     /// Answers a request with the stream of others who have sent the same, or else with what `open`
-    /// answers, which others may then share. The other node counts that stream. One who shares it
-    /// begins with the `present` room.
+    /// answers, which others may then share. The other node counts that stream, and learns by `tell`
+    /// how many share it besides one. One who shares it begins with the `present` room.
     pub(super) async fn answer<E>(
         &self,
         key: SameRequest,
         caller: Key,
         present: impl Future<Output = Option<v1::Room>>,
         open: impl Future<Output = Result<Response<Body>, E>>,
+        tell: impl FnOnce(watch::Receiver<u32>) -> BoxFuture<'static, ()>,
     ) -> Result<Response<Body>, E> {
         if let Some(reader) = self.join(&key)
             && let Some(place) = self.limits.share_stream(caller)
@@ -110,6 +113,7 @@ impl Fanout {
         let (parts, body) = answer.into_parts();
         opening.0.answered(parts.status, parts.headers);
         let receiving = Arc::clone(&opening.0);
+        tokio::spawn(tell(receiving.others()));
         tokio::spawn(async move { receiving.receive(body).await });
         let answer = response(own).await;
         Ok(answer.unwrap_or_else(|| room_gone().into_http()))

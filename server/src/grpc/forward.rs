@@ -17,9 +17,13 @@ use chefshat_proto::v1::{self, room_service_client::RoomServiceClient};
 use futures::future::{BoxFuture, Either};
 use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
 use http_body::{Frame, SizeHint};
+use tokio::sync::watch;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::WatchStream;
 use tonic::Status;
 use tonic::body::Body;
 use tonic::metadata::MetadataMap;
+use tonic::transport::Channel;
 use tower::{Layer, Service, ServiceExt as _};
 use tracing::debug;
 
@@ -32,6 +36,8 @@ use crate::config::MAX_STUDY_MESSAGE_BYTES;
 use crate::connections::peer_address;
 use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
+use crate::wire::peer::ShareRequest;
+use crate::wire::peer::peer_service_client::PeerServiceClient;
 
 /// How often a call looks for the node that has its room or tournament.
 const ATTEMPTS: u32 = 3;
@@ -219,7 +225,9 @@ impl Gateway {
                         .get()
                         .map_or(address, |key: &Charged| key.0);
                     let present = self.room(&elsewhere.peer, key.room.clone());
-                    self.layer.fanout.answer(key, caller, present, sent).await
+                    let channel = self.peers().channel(&elsewhere.peer);
+                    let tell = tell_sharing(channel, key.room.clone());
+                    (self.layer.fanout.answer(key, caller, present, sent, tell)).await
                 }
                 None => sent.await,
             };
@@ -257,6 +265,28 @@ impl Gateway {
         Some(v1::Room {
             awaited: None,
             ..room
+        })
+    }
+}
+
+/// Tells the node that has a room how many share a stream of it, until they have left.
+fn tell_sharing(
+    channel: Channel,
+    room_id: String,
+) -> impl FnOnce(watch::Receiver<u32>) -> BoxFuture<'static, ()> {
+    move |mut others| {
+        Box::pin(async move {
+            // Most streams have one spectator.
+            if others.wait_for(|others| *others > 0).await.is_err() {
+                return;
+            }
+            let counts = WatchStream::new(others).map(move |others| ShareRequest {
+                room_id: room_id.clone(),
+                others,
+            });
+            if let Err(error) = PeerServiceClient::new(channel).share(counts).await {
+                debug!(%error, "the spectators who share a stream are not counted");
+            }
         })
     }
 }

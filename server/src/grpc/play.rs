@@ -27,7 +27,7 @@ use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
 use super::limits::Arrived;
 use super::reach::Reach;
-use super::status::{Refusal, field, request_id, stream_ended, ticket_unknown};
+use super::status::{Refusal, field, request_id, room_unknown, stream_ended, ticket_unknown};
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
@@ -38,10 +38,10 @@ use crate::room::SeatAction;
 use crate::rooms::Rooms;
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
-use crate::wire::peer::PlayRequest;
 use crate::wire::peer::peer_service_server::PeerService;
+use crate::wire::peer::{PlayRequest, ShareRequest, ShareResponse};
 use crate::wire::service::play_service_server::PlayService;
-use chefshat_room::ids::Token;
+use chefshat_room::ids::{Id, Token};
 use reader::{Reader, Requests, express_action};
 
 /// The service.
@@ -118,6 +118,27 @@ impl PeerService for Play {
         let caller = Caller::of(request.extensions());
         let reader = self.reader(caller, &outbox, true).by_gateway();
         Ok(self.responses(reader, request.into_inner(), updates))
+    }
+
+    async fn share(
+        &self,
+        request: Request<Streaming<ShareRequest>>,
+    ) -> Result<Response<ShareResponse>, Status> {
+        let mut requests = request.into_inner();
+        let mut sharing = None;
+        while let Some(message) = self.closing.run_until_cancelled(requests.message()).await
+            && let Ok(Some(ShareRequest { room_id, others })) = message
+        {
+            let counted = match &mut sharing {
+                Some(counted) => counted,
+                unknown => {
+                    let room = Id::parse(&room_id).and_then(|id| self.rooms.get(id));
+                    unknown.insert(room.ok_or_else(room_unknown)?.sharing())
+                }
+            };
+            counted.set(others);
+        }
+        Ok(Response::new(ShareResponse {}))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The handle of a room: sends messages to its mailbox and returns the answers.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use chefshat_engine::Seat;
@@ -34,6 +35,30 @@ pub struct Handle {
     resting: Arc<Resting<Room>>,
     fence: CancellationToken,
     clock: RoomClock,
+    sharing: Arc<AtomicU32>,
+}
+
+/// Spectators who share a stream of a room at another node; they count until it is dropped.
+#[derive(Debug)]
+pub struct Sharing {
+    all: Arc<AtomicU32>,
+    others: u32,
+}
+
+impl Sharing {
+    /// Sets how many they are besides the one for whom the stream counts.
+    pub fn set(&mut self, others: u32) {
+        // Wraps where fewer share it than before.
+        let more = others.wrapping_sub(self.others);
+        self.all.fetch_add(more, Ordering::Relaxed);
+        self.others = others;
+    }
+}
+
+impl Drop for Sharing {
+    fn drop(&mut self) {
+        self.set(0);
+    }
 }
 
 /// Starts a room, with a new or a resumed game. `over_since`: the game is already over, and its end
@@ -54,6 +79,7 @@ pub fn spawn_room(
         resting,
         fence,
         clock,
+        sharing: Arc::default(),
     }
 }
 
@@ -226,7 +252,18 @@ impl Handle {
     /// # Errors
     /// The room is gone.
     pub async fn describe(&self) -> Result<v1::Room, RoomGone> {
-        self.ask(Message::Describe).await
+        let mut room = self.ask(Message::Describe).await?;
+        let sharing = self.sharing.load(Ordering::Relaxed);
+        room.spectators = room.spectators.saturating_add(sharing);
+        Ok(room)
+    }
+
+    /// Counts spectators who share one of its streams at another node.
+    pub fn sharing(&self) -> Sharing {
+        Sharing {
+            all: Arc::clone(&self.sharing),
+            others: 0,
+        }
     }
 
     /// Whether one of these secrets is the ticket of a seat.

@@ -342,7 +342,7 @@ impl Subscriber {
             || backlog >= MAX_PENDING_EVENTS
             || (at_once && (backlog > 0 || !self.pending.is_empty()));
         if !due {
-            return !self.outbox_is_abandoned_by_spectator();
+            return !self.is_abandoned();
         }
         if self.stalled && !self.flush() {
             return self.keeps_up(visible);
@@ -386,7 +386,7 @@ impl Subscriber {
                 Role::Spectator { .. } => self.end(StreamEnd::Complete),
             }
         }
-        !self.ended && !self.outbox_is_abandoned_by_spectator()
+        !self.ended && !self.is_abandoned()
     }
 
     /// Whom the game waits for, if the subscriber is sent this: not its own seat.
@@ -454,7 +454,8 @@ impl Subscriber {
         self.stalled && self.pending.weight() >= MAX_PENDING_UPDATES
     }
 
-    fn outbox_is_abandoned_by_spectator(&self) -> bool {
+    /// Whether it is a spectator who has left.
+    pub fn is_abandoned(&self) -> bool {
         matches!(self.role, Role::Spectator { .. }) && self.outbox.is_abandoned()
     }
 }

@@ -16,7 +16,7 @@ pub(super) struct File {
 }
 
 /// The document, which draws the page named by the path.
-const DOCUMENT: &str = "index.html";
+pub(super) const DOCUMENT: &str = "index.html";
 /// Names of files in this folder change with their content.
 const ASSETS: &str = "assets/";
 /// The answer if the page is not built in.
@@ -49,7 +49,27 @@ pub(super) fn answer<B>(
     find: impl Fn(&str) -> Option<File>,
     request: &Request<B>,
 ) -> Response<Bytes> {
-    let mut response = chosen(find, request);
+    finished(chosen(find, request), request.method())
+}
+
+/// The answer with something that was made for this request; `None`: there is no such thing.
+pub(super) fn made(
+    media_type: &'static str,
+    bytes: Option<Bytes>,
+    method: &Method,
+) -> Response<Bytes> {
+    let response = match bytes {
+        Some(bytes) => {
+            let mut response = plain(StatusCode::OK, media_type, b"");
+            *response.body_mut() = bytes;
+            response
+        }
+        None => plain(StatusCode::NOT_FOUND, "text/plain", b"no such file\n"),
+    };
+    finished(response, method)
+}
+
+fn finished(mut response: Response<Bytes>, method: &Method) -> Response<Bytes> {
     let length = response.body().len();
     response.headers_mut().extend(RULES);
     if response.status() != StatusCode::NOT_MODIFIED {
@@ -57,7 +77,7 @@ pub(super) fn answer<B>(
             .headers_mut()
             .insert(header::CONTENT_LENGTH, length.into());
     }
-    if request.method() == Method::HEAD {
+    if method == Method::HEAD {
         *response.body_mut() = Bytes::new();
     }
     response

@@ -5,20 +5,21 @@
 
 mod answer;
 mod origin;
+mod preview;
 
 use std::borrow::Cow;
-use std::future::{Ready, ready};
 use std::task::{Context, Poll};
 
 use bytes::Bytes;
-use futures::future::Either;
+use futures::future::{BoxFuture, Either};
 use http::{Method, Request, Response, header};
 use rust_embed::RustEmbed;
 use tonic::body::Body;
-use tower::{Layer, Service};
+use tower::{BoxError, Layer, Service};
 
-use answer::{File, answer};
+use answer::{DOCUMENT, File, answer, made};
 pub use origin::{OriginLayer, Origins};
+use preview::Link;
 
 #[derive(RustEmbed)]
 #[folder = "../clients/web/dist"]
@@ -26,7 +27,7 @@ struct Dist;
 
 /// Whether the page is built in.
 pub fn is_built_in() -> bool {
-    find("index.html").is_some()
+    find(DOCUMENT).is_some()
 }
 
 /// A built file; `None` for hidden ones, which belong to the source tree.
@@ -48,41 +49,95 @@ fn find(name: &str) -> Option<File> {
 
 /// Puts the page in front of the services.
 #[derive(Debug, Clone, Copy)]
-pub struct PageLayer;
+pub struct PageLayer {
+    /// Whether browsers reach this server with TLS.
+    pub tls: bool,
+}
 
 impl<S> Layer<S> for PageLayer {
     type Service = WithPage<S>;
 
     fn layer(&self, services: S) -> Self::Service {
-        WithPage { services }
+        WithPage {
+            layer: *self,
+            services,
+        }
     }
 }
 
 /// The services with the page in front of them.
 #[derive(Debug, Clone)]
 pub struct WithPage<S> {
+    layer: PageLayer,
     services: S,
 }
 
-impl<S, B> Service<Request<B>> for WithPage<S>
+impl<S> Service<Request<Body>> for WithPage<S>
 where
-    S: Service<Request<B>, Response = Response<Body>>,
+    S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Error: Into<BoxError>,
+    S::Future: Send,
 {
     type Response = Response<Body>;
     type Error = S::Error;
-    type Future = Either<Ready<Result<Self::Response, Self::Error>>, S::Future>;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
 
     fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
         self.services.poll_ready(context)
     }
 
-    fn call(&mut self, request: Request<B>) -> Self::Future {
-        if is_for_page(&request) {
-            Either::Left(ready(Ok(
-                answer(find, &request).map(|bytes| Body::new(axum::body::Body::from(bytes)))
-            )))
-        } else {
-            Either::Right(self.services.call(request))
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
+        if !is_for_page(&request) {
+            return Either::Left(self.services.call(request));
+        }
+        // The clone that is ready serves this request.
+        let clone = self.services.clone();
+        let services = std::mem::replace(&mut self.services, clone);
+        let tls = self.layer.tls;
+        Either::Right(Box::pin(async move {
+            let request = request.map(drop);
+            let answer = match Link::of(request.uri().path()) {
+                None => answer(find, &request),
+                Some(link) => previewed(link, services, &request, tls).await,
+            };
+            Ok(answer.map(|bytes| Body::new(axum::body::Body::from(bytes))))
+        }))
+    }
+}
+
+/// The answer to a request for the replay of a game or its picture.
+async fn previewed<S>(
+    link: Link<'_>,
+    services: S,
+    request: &Request<()>,
+    tls: bool,
+) -> Response<Bytes>
+where
+    S: Service<Request<Body>, Response = Response<Body>>,
+    S::Error: Into<BoxError>,
+{
+    let extensions = request.extensions().clone();
+    match link {
+        Link::Picture(game) => {
+            let picture = match preview::record(services, game, extensions).await {
+                Some(lines) => preview::picture(lines).await,
+                None => None,
+            };
+            made("image/png", picture, request.method())
+        }
+        Link::Replay(game) => {
+            let document = find(DOCUMENT).zip(preview::origin(request, tls));
+            let tagged = match document {
+                Some((document, origin)) => {
+                    let lines = preview::record(services, game, extensions).await;
+                    lines.and_then(|lines| preview::document(&document.bytes, &lines, &origin))
+                }
+                None => None,
+            };
+            match tagged {
+                Some(tagged) => made("text/html; charset=utf-8", Some(tagged), request.method()),
+                None => answer(find, request),
+            }
         }
     }
 }

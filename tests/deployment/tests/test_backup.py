@@ -40,8 +40,10 @@ def test_a_game_resumes_from_a_backup_and_is_signed_by_the_same_key(server: Guar
     with server.client("host") as client:
         over = client.create_room("over", rules=SHORT, seats=["greedy"] * 4).room
         list(client.watch(over.room_id))
-        # Its file is written after the game, by and by.
+        # Its file is written after the game.
+        deadline = time.monotonic() + 300
         while not (data / "records" / f"{over.game_id}.jsonl").exists():
+            assert time.monotonic() < deadline, "the record of a finished game is never written"
             time.sleep(0.05)
         policy = pb.RoomPolicy(decision_time_ms=60_000)
         room = client.create_room("resumes", rules=SHORT, policy=policy, seats=[None, "greedy", "greedy", "greedy"])

@@ -11,7 +11,7 @@ use chefshat_proto::v1::{self, play_service_client::PlayServiceClient, seat_upda
 use chefshat_record::replay::replay;
 use chefshat_tests::{
     Held, Ledger, StreamSeat, TestNodes, first_legal, first_update, one_shift, patiently, play_on,
-    random_agents,
+    random_agents, until_watched_by, watched,
 };
 use futures::future::join_all;
 
@@ -218,6 +218,23 @@ async fn a_spectator_at_another_node_sees_what_one_at_the_owner_sees() {
     let (seen, _) = patiently("the game to end", all).await;
     assert!(seen[0].len() > 20);
     assert!(seen.iter().all(|events| *events == seen[2]));
+}
+
+#[tokio::test]
+async fn spectators_who_share_a_stream_are_all_counted() {
+    let nodes = TestNodes::start(2).await;
+    let gateway = nodes.nodes[0].client().await;
+    let (room_id, _) = room(&nodes, 1, &gateway).await;
+    let owner = nodes.nodes[1].client().await;
+    let all = [&gateway, &owner, &gateway, &gateway];
+    let mut watching = Vec::from(all.map(|client| watched(client, &room_id)));
+    until_watched_by(&gateway, &room_id, watching.len()).await;
+    while let Some(spectator) = watching.pop() {
+        spectator.abort();
+        for client in [&gateway, &owner] {
+            until_watched_by(client, &room_id, watching.len()).await;
+        }
+    }
 }
 
 #[tokio::test]

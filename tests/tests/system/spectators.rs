@@ -4,7 +4,10 @@ use chefshat_proto::v1::{
     self, SpectatorServiceWatchRequest, game_event::Kind,
     spectator_service_client::SpectatorServiceClient,
 };
-use chefshat_tests::{TestServer, narrow_spectator, one_shift, patiently, play_out, room_of_four};
+use chefshat_tests::{
+    TestServer, narrow_spectator, one_shift, patiently, play_out, room_of_four, until_watched_by,
+    watched,
+};
 use tonic::Code;
 use tonic_types::StatusExt as _;
 
@@ -58,6 +61,23 @@ async fn spectators_receive_all_public_events_from_the_requested_one() {
     let mut late = client.spectate(&room_id, 20);
     let first = late.next().await.expect("a watched room");
     assert_eq!(first.as_ref(), all.get(19));
+}
+
+#[tokio::test]
+async fn spectators_are_counted_until_they_leave() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let room_id = created.room.expect("a room").room_id;
+    let mut watching = Vec::new();
+    for count in 1..=3 {
+        watching.push(watched(&client, &room_id));
+        until_watched_by(&client, &room_id, count).await;
+    }
+    while let Some(spectator) = watching.pop() {
+        spectator.abort();
+        until_watched_by(&client, &room_id, watching.len()).await;
+    }
 }
 
 #[tokio::test]

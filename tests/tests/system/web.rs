@@ -8,8 +8,9 @@ use chefshat_proto::v1::{
     seat_update::Update,
 };
 use chefshat_tests::{
-    TestServer, attach_all, first_legal, one_shift, patiently, play_on, room_of_four,
+    TestServer, attach_all, first_legal, one_shift, patiently, play_on, play_out, room_of_four,
 };
+use http_body_util::BodyExt as _;
 use hyper_util::client::legacy::Client as HttpClient;
 use hyper_util::rt::TokioExecutor;
 use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
@@ -107,6 +108,55 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
         others.await.expect("the others play"),
         [v1::DetachReason::GameOver; 3]
     );
+}
+
+/// What a chat gets that follows a link: the status, the media type and the content.
+async fn followed(server: &TestServer, path: &str) -> (http::StatusCode, String, bytes::Bytes) {
+    let http = HttpClient::builder(TokioExecutor::new())
+        .build_http::<http_body_util::Empty<bytes::Bytes>>();
+    let uri = format!("{}{path}", server.url()).parse().expect("a URI");
+    let answer = patiently("an answer", http.get(uri)).await;
+    let (head, body) = answer.expect("the server answers").into_parts();
+    let media_type = head.headers["content-type"].to_str().expect("text");
+    let body = body.collect().await.expect("a body").to_bytes();
+    (head.status, media_type.to_owned(), body)
+}
+
+#[tokio::test]
+async fn a_link_to_a_replay_has_a_title_and_a_picture_unless_the_game_is_private() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for (visibility, is_shown) in [
+        (v1::Visibility::Unlisted, true),
+        (v1::Visibility::Private, false),
+    ] {
+        let policy = v1::RoomPolicy {
+            visibility: visibility.into(),
+            ..v1::RoomPolicy::default()
+        };
+        let (created, tickets) = room_of_four(&client, one_shift(), policy).await;
+        let game = created.room.expect("a room").game_id;
+        let path = format!("/replay/{game}");
+        let running = followed(&server, &format!("{path}.png")).await;
+        assert_eq!(running.0, http::StatusCode::NOT_FOUND, "it has not ended");
+        play_out(&server, tickets).await;
+        let (status, media_type, picture) = followed(&server, &format!("{path}.png")).await;
+        let (_, _, document) = followed(&server, &path).await;
+        let document = String::from_utf8_lossy(&document);
+        if is_shown {
+            assert_eq!((status.as_u16(), media_type.as_str()), (200, "image/png"));
+            // The width stands behind the signature and the head of the first chunk.
+            assert_eq!(picture[16..20], 1200_u32.to_be_bytes());
+            if chefshat_server::web::is_built_in() {
+                let tag = format!("content=\"{}{path}.png\"", server.url());
+                assert!(document.contains(&tag), "{document}");
+                assert!(document.contains("1. agent "), "{document}");
+            }
+        } else {
+            assert_eq!(status, http::StatusCode::NOT_FOUND);
+            assert!(!document.contains("og:"), "{document}");
+        }
+    }
 }
 
 #[tokio::test]

@@ -21,7 +21,10 @@ export function RoomCard({ room }: { room: Room }) {
         <h3>{room.name || words.unnamed}</h3>
         <RoomStateChip room={room} />
       </header>
-      <p class="soft small">{rulesInShort(room)}</p>
+      <p class="soft small">
+        {rulesInShort(room)}
+        {room.spectators > 0 && ` · ${t().table.watch.spectators(room.spectators)}`}
+      </p>
       <Seats room={room} mine={held?.seat} />
       <div class={css.actions}>
         <RoomActions room={room} />

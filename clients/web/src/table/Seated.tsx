@@ -9,6 +9,7 @@ import type { Acting } from "./acting";
 import { useAttention } from "./attention";
 import { useAutoPass } from "./auto-pass";
 import { useAnnounced } from "./following";
+import { Caption } from "./view/Caption";
 import { TableView } from "./view/TableView";
 import { WaitingRoom } from "./view/WaitingRoom";
 
@@ -53,7 +54,7 @@ export function Seated({ acting, study, banner, tools, onward, below, onPick }: 
       banner={banner}
       tools={tools}
       onward={onward}
-      caption={table.roomName}
+      caption={<Caption table={table} />}
       hint={acting.hint.value}
       plans={!study && !wizard && isOn("plans")}
       autoPassing={autoPassing}

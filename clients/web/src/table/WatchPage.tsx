@@ -8,6 +8,7 @@ import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
 import { useAnnounced } from "./following";
 import { type Spectating, startSpectating } from "./spectating";
+import { Caption } from "./view/Caption";
 import { TableView } from "./view/TableView";
 import { WaitingRoom } from "./view/WaitingRoom";
 
@@ -36,7 +37,7 @@ function Watched({ spectating }: { spectating: Spectating }) {
       own={undefined}
       awaited={spectating.awaited.value}
       banner={banner}
-      caption={`${table.roomName} · ${t().table.watch.viewer}`}
+      caption={<Caption table={table} watched />}
     />
   );
 }

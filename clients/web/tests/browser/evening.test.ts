@@ -116,6 +116,28 @@ test("a phrase is read in the reader's language, and covers no name on a phone",
   expect([...rosa.faults, ...carlo.faults]).toEqual([]);
 });
 
+test("players and spectators see how many watch", async () => {
+  const { roomId, code } = await newRoom(server, { seats: ["person", "greedy", "random", "greedy"] });
+  const { page, faults } = await person(browser);
+  await sitDown(page, server, code, "Rosa");
+  await nextDecision(page);
+  const head = page.locator('[data-part="table-head"]');
+  await head.getByText("Friday evening", { exact: true }).waitFor();
+  const [first, second] = [await person(browser), await person(browser)];
+  for (const { page } of [first, second]) {
+    await page.goto(`${server.url}/watch/${roomId}`);
+    await page.locator('[data-part="table-head"]').getByText("spectator view").waitFor();
+  }
+  await head.getByText("Friday evening · 2 spectators").waitFor();
+  await second.page.context().close();
+  await head.getByText("Friday evening · 1 spectator", { exact: true }).waitFor();
+  await first.page.getByText("spectator view · 1 spectator").waitFor();
+  await first.page.goto(server.url);
+  await first.page.getByRole("heading", { name: "Friday evening" }).waitFor();
+  await head.getByText("Friday evening", { exact: true }).waitFor();
+  expect(faults).toEqual([]);
+});
+
 test("the page can be installed, and its service worker caches nothing", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/`);

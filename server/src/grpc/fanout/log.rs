@@ -10,7 +10,7 @@ use chefshat_proto::v1;
 use http::{HeaderMap, StatusCode};
 use http_body::Frame;
 use http_body_util::BodyExt as _;
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 use tokio::time::{Instant, timeout};
 use tonic::Status;
 use tonic::body::Body;
@@ -40,6 +40,8 @@ pub(super) struct SharedStream {
     grown: Notify,
     /// Notified of what the receiver waits for.
     read: Notify,
+    /// How many read it besides one.
+    others: watch::Sender<u32>,
 }
 
 /// A stream so far.
@@ -179,7 +181,19 @@ impl SharedStream {
             log: Mutex::default(),
             grown: Notify::new(),
             read: Notify::new(),
+            others: watch::Sender::default(),
         })
+    }
+
+    /// How many read it besides one, now and whenever that changes.
+    pub(super) fn others(&self) -> watch::Receiver<u32> {
+        self.others.subscribe()
+    }
+
+    fn count(&self, log: &Log) {
+        let others = log.readers.len().saturating_sub(1);
+        let others = u32::try_from(others).unwrap_or(u32::MAX);
+        (self.others).send_if_modified(|known| std::mem::replace(known, others) != others);
     }
 
     fn log(&self) -> MutexGuard<'_, Log> {
@@ -195,6 +209,7 @@ impl SharedStream {
         let number = log.next_reader;
         log.next_reader += 1;
         log.readers.insert(number, 0);
+        self.count(&log);
         drop(log);
         Some(Reader {
             stream: Arc::clone(self),
@@ -364,6 +379,7 @@ impl Drop for Reader {
         let mut log = self.stream.log();
         log.readers.remove(&self.number);
         log.find_furthest();
+        self.stream.count(&log);
         drop(log);
         self.stream.read.notify_one();
     }

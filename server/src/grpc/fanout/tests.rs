@@ -63,6 +63,11 @@ fn present() -> v1::Room {
     }
 }
 
+/// Tells nobody how many share a stream.
+fn tell(_: watch::Receiver<u32>) -> BoxFuture<'static, ()> {
+    async {}.boxed()
+}
+
 async fn opened_from(
     fanout: &Fanout,
     from: u64,
@@ -72,7 +77,7 @@ async fn opened_from(
     let key = request_from(&[], false, from).expect("shared");
     let present = async { Some(present()) };
     let open = async { Ok::<_, Infallible>(open()) };
-    let Ok(response) = fanout.answer(key, caller, present, open).await;
+    let Ok(response) = fanout.answer(key, caller, present, open, tell).await;
     response.into_body()
 }
 
@@ -331,11 +336,11 @@ async fn a_stream_that_is_refused_is_shared_by_nobody() {
     let mut waiting = Box::pin(async {
         let open = std::future::pending::<Result<Response<Body>, ()>>();
         fanout
-            .answer(key.clone(), Key::Local, present(), open)
+            .answer(key.clone(), Key::Local, present(), open, tell)
             .await
     });
     assert!((&mut waiting).now_or_never().is_none());
-    let mut second = Box::pin(fanout.answer(key.clone(), Key::Local, present(), refused));
+    let mut second = Box::pin(fanout.answer(key.clone(), Key::Local, present(), refused, tell));
     assert!(
         (&mut second).now_or_never().is_none(),
         "it waits for the first"

@@ -123,7 +123,16 @@ impl Room {
             Release::Left(reply, left) => {
                 answer(reply, Some(left.map(|()| convert::describe(&self.core))));
             }
-            Release::Describe(reply) => answer(reply, convert::describe_at(&self.core, self.now)),
+            Release::Describe(reply) => {
+                let watching = (self.spectators.iter())
+                    .filter(|it| !it.is_abandoned())
+                    .count();
+                let room = v1::Room {
+                    spectators: u32::try_from(watching).unwrap_or(u32::MAX),
+                    ..convert::describe_at(&self.core, self.now)
+                };
+                answer(reply, room);
+            }
             Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
             Release::Reported(reply, outcome) => {
                 let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));

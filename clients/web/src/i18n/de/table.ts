@@ -326,5 +326,8 @@ export const table: Texts["table"] = {
     toJoin: "Ich habe einen Beitrittscode",
     invite: "Die Einladung steht unten.",
   },
-  watch: { viewer: "Zuschauersicht" },
+  watch: {
+    viewer: "Zuschauersicht",
+    spectators: (count: number) => plural(count, { one: "# sieht zu", other: "# sehen zu" }),
+  },
 };

@@ -321,5 +321,8 @@ export const table = {
     toJoin: "I have a join code",
     invite: "The invitation is below.",
   },
-  watch: { viewer: "spectator view" },
+  watch: {
+    viewer: "spectator view",
+    spectators: (count: number) => plural(count, { one: "# spectator", other: "# spectators" }),
+  },
 };

@@ -326,5 +326,8 @@ export const table: Texts["table"] = {
     toJoin: "Tengo un código de acceso",
     invite: "La invitación está más abajo.",
   },
-  watch: { viewer: "vista de espectador" },
+  watch: {
+    viewer: "vista de espectador",
+    spectators: (count: number) => plural(count, { one: "# espectador", other: "# espectadores" }),
+  },
 };

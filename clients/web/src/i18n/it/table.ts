@@ -326,5 +326,8 @@ export const table: Texts["table"] = {
     toJoin: "Ho un codice d’ingresso",
     invite: "L’invito è qui sotto.",
   },
-  watch: { viewer: "vista da spettatore" },
+  watch: {
+    viewer: "vista da spettatore",
+    spectators: (count: number) => plural(count, { one: "# spettatore", other: "# spettatori" }),
+  },
 };

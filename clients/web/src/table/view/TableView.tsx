@@ -56,7 +56,7 @@ interface TableViewProps {
   /** A record is shown: no seat is "you", and no links follow the end. */
   replayed?: boolean;
   /** Name of the room or record. */
-  caption?: string;
+  caption?: ComponentChildren;
   /** The next step after the game, before the links. */
   onward?: ComponentChildren;
   /** Additional tools of the table. */

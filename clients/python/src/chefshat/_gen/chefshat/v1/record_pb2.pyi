@@ -120,7 +120,7 @@ class RecordHeader(_message.Message):
     created_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when the room was created."""
     server_version: _builtins.str
-    """Version of the server that hosted it."""
+    """Version of the server that created its room."""
     tournament_id: _builtins.str
     """The tournament of the game; empty if there was none."""
     series_id: _builtins.str
