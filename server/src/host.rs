@@ -11,6 +11,7 @@ use tokio::net::TcpListener;
 use tokio::task::{JoinError, JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
 
+use crate::access::{AccessSettings, Mode};
 use crate::config::ServerConfig;
 use crate::serve::{ServeError, serve};
 use crate::store::{MemoryStore, Store};
@@ -54,7 +55,7 @@ impl Host {
     }
 
     /// Starts a server for this process only. Games are stored in memory; records are written to
-    /// files if there is a folder for them. Stopping it does not wait for running games.
+    /// files if there is a folder for them. Every program of this machine may use it. Stopping it does not wait for running games.
     ///
     /// # Errors
     /// No port is free.
@@ -62,6 +63,11 @@ impl Host {
         let config = ServerConfig {
             data_dir,
             grace: Duration::ZERO,
+            // Tokens in the folder are those of the server that has its games there.
+            access: AccessSettings {
+                mode: Some(Mode::Open),
+                ..AccessSettings::default()
+            },
             ..ServerConfig::default()
         };
         Self::start(config, Arc::new(MemoryStore::default())).await

@@ -15,6 +15,7 @@ use chefshat_server::access::{
     AccessSettings, CALLS, Call, Mode, NewToken, Role, Scope, Scoped, TokenFile, TokenId,
 };
 use chefshat_server::config::ServerConfig;
+use chefshat_server::host::Host;
 use chefshat_server::store::MemoryStore;
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
 use http::{Method, Request, StatusCode};
@@ -411,6 +412,24 @@ async fn a_foreign_page_creates_no_room() {
 }
 
 /// A page of an allowed origin asks the browser to send a token, and the browser asks the server.
+#[tokio::test]
+async fn a_server_inside_a_command_needs_no_token_of_the_one_that_has_the_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let tokens = TokenFile::of(folder.path());
+    let player = NewToken {
+        role: Role::Player,
+        label: String::new(),
+        lifetime: None,
+        scope: None,
+    };
+    tokens.create(player).expect("a token");
+    let host = Host::in_memory(Some(folder.path().to_path_buf())).await;
+    let host = host.expect("a free port");
+    let client = Client::connect(host.url()).await.expect("it listens");
+    room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    host.stop().await.expect("it stops");
+}
+
 #[tokio::test]
 async fn a_page_of_an_allowed_origin_may_send_tokens() {
     const ORIGIN: &str = "https://page.example";

@@ -55,12 +55,13 @@ class JoinOptions:
 
 
 def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False, default: str | None = None) -> None:
-    """Adds --address (and other `flags` for the same), --token, --ca, --secret. A required address may be in the environment."""
+    """Adds --address (and other `flags` for the same), --token, --ca, --secret. Without --address the environment is asked."""
     what = "the server" if required or default else "a running server"
-    unless = f" (default: {default})" if default else ""
-    if required:
-        unless = f" (default: that of the environment variable {SERVER})"
-        default = os.environ.get(SERVER)
+    unless = ""
+    if required or default:
+        otherwise = f", otherwise {default}" if default else ""
+        unless = f" (default: that of the environment variable {SERVER}{otherwise})"
+        default = os.environ.get(SERVER, default)
     parser.add_argument(
         *flags,
         "--address",

@@ -17,7 +17,7 @@ const MAX_LABEL: usize = 40;
 
 /// An event in words.
 #[derive(Debug)]
-pub(crate) struct Told {
+pub(crate) struct EventText {
     pub(crate) sequence: u64,
     pub(crate) words: String,
     /// Whether a Shift begins with it.
@@ -25,21 +25,21 @@ pub(crate) struct Told {
 }
 
 /// Applies an event and returns it in words for a reader at seat `me`.
-pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> Told {
+pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> EventText {
     let words = match &event.kind {
         None => String::new(),
         // The names come with the beginning of the game; other words need the state before the event.
         Some(kind @ Kind::GameStarted(_)) => {
             view.apply(event);
-            told(view, me, kind)
+            in_words(view, me, kind)
         }
         Some(kind) => {
-            let words = told(view, me, kind);
+            let words = in_words(view, me, kind);
             view.apply(event);
             words
         }
     };
-    Told {
+    EventText {
         sequence: event.sequence,
         words,
         begins_shift: matches!(event.kind, Some(Kind::ShiftStarted(_))),
@@ -47,7 +47,7 @@ pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEven
 }
 
 /// An event in words, from the state before it.
-fn told(view: &GameView, me: Option<u32>, kind: &Kind) -> String {
+fn in_words(view: &GameView, me: Option<u32>, kind: &Kind) -> String {
     let name = |seat| name(view, me, seat);
     let because = |source| story::reason(source).map_or_else(String::new, |it| format!(" ({it})"));
     match kind {
@@ -138,9 +138,9 @@ fn standings(view: &GameView, me: Option<u32>, table: &[v1::Standing]) -> String
 }
 
 /// Events in one line for each Shift and each pizza.
-pub(crate) fn history<'a>(told: impl IntoIterator<Item = &'a Told>) -> String {
+pub(crate) fn history<'a>(events: impl IntoIterator<Item = &'a EventText>) -> String {
     let mut text = String::new();
-    for Told { words, .. } in told.into_iter().filter(|it| !it.words.is_empty()) {
+    for EventText { words, .. } in events.into_iter().filter(|it| !it.words.is_empty()) {
         if words.starts_with("Shift ") && !text.is_empty() {
             text.push('\n');
         } else if !text.is_empty() && !text.ends_with('\n') {

@@ -1,10 +1,10 @@
-//! What the server has told a seat so far: the state of the game, its events in words, the open
+//! What the server has sent a seat so far: the state of the game, its events in words, the open
 //! decision. Takes updates, and has no connection or clock: `seat` has them, `text` words the state.
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::ActionSpace;
 
-use super::events::{self, Told};
+use super::events::{self, EventText};
 use crate::narration::awaited::AwaitedSeat;
 use crate::narration::hand::Hand;
 use crate::narration::view::GameView;
@@ -33,7 +33,7 @@ impl Open {
 pub(crate) struct Live {
     pub(crate) view: GameView,
     pub(crate) me: Option<u32>,
-    pub(crate) told: Vec<Told>,
+    pub(crate) events: Vec<EventText>,
     pub(crate) open: Option<Open>,
     pub(crate) awaited: Option<AwaitedSeat>,
     /// Cards that all seats have played in this Shift.
@@ -48,7 +48,7 @@ impl Live {
         Self {
             view,
             me,
-            told: Vec::new(),
+            events: Vec::new(),
             open: None,
             awaited: None,
             played: Hand::default(),
@@ -58,7 +58,7 @@ impl Live {
 
     /// Number of the last event; 0 before the first.
     pub(crate) fn sequence(&self) -> u64 {
-        self.told.last().map_or(0, |told| told.sequence)
+        self.events.last().map_or(0, |event| event.sequence)
     }
 
     /// The numbering of actions.
@@ -124,13 +124,13 @@ impl Live {
         if self.is_decided_by(event) {
             self.open = None;
         }
-        let told = events::advance(&mut self.view, self.me, event);
+        let text = events::advance(&mut self.view, self.me, event);
         match &event.kind {
             Some(Kind::ShiftStarted(_)) => self.played = Hand::default(),
             Some(Kind::Play(play)) => self.put(play),
             _ => {}
         }
-        self.told.push(told);
+        self.events.push(text);
     }
 
     fn put(&mut self, play: &v1::Play) {

@@ -88,8 +88,8 @@ fn what_happened_begins_after_the_event_that_was_asked_for() {
     live.take(Update::Events(batch), 0);
     let last = events.last().unwrap().sequence;
     assert_eq!(live.sequence(), last);
-    let told: Vec<u64> = live.told.iter().map(|told| told.sequence).collect();
-    assert_eq!(told, (1..=last).collect::<Vec<_>>());
+    let numbers: Vec<u64> = live.events.iter().map(|event| event.sequence).collect();
+    assert_eq!(numbers, (1..=last).collect::<Vec<_>>());
     let all = text::since(&live, 0, 0);
     assert!(
         all.contains("The game begins: Ada, Ben, Cleo, Dan"),

@@ -19,7 +19,7 @@ use crate::numbers::ordinal;
 /// What happened after an event, then the open decision, or whom the game waits for.
 pub(crate) fn since(live: &Live, after: u64, now_ms: u64) -> String {
     let mut text = format!("seq {}", live.sequence());
-    let news = history(live.told.iter().filter(|it| it.sequence > after));
+    let news = history(live.events.iter().filter(|it| it.sequence > after));
     if !news.is_empty() {
         write!(text, "\n{news}").expect("a String takes everything");
     }
@@ -186,8 +186,8 @@ fn left(live: &Live) -> String {
 
 /// What happened in this Shift, then the whole table, for a reader who remembers nothing.
 pub(crate) fn decision(live: &Live, now_ms: u64) -> String {
-    let shift = live.told.iter().rposition(|told| told.begins_shift);
-    let news = history(live.told.iter().skip(shift.unwrap_or(0)));
+    let shift = live.events.iter().rposition(|event| event.begins_shift);
+    let news = history(live.events.iter().skip(shift.unwrap_or(0)));
     format!("{news}\n{}", state(live, now_ms))
 }
 

@@ -48,7 +48,7 @@ const TOKENS: &str = "tokens";
 const UNREADABLE: &str =
     "Your answer has no action. Answer with one JSON object: {\"action\": ID, \"reason\": \"…\"}";
 
-/// The end of what a model is told at first.
+/// The end of the first message to a model.
 const FORM: &str = "\
 Each message shows the table as you see it and ends with your decision: `options` has the legal actions, one in a line, as `id=cards`; 2x7 J is two 7s and \
 a joker, and * marks the Golden card. Answer with one JSON object and nothing after it, with the id of one option and a short reason: \
@@ -218,7 +218,7 @@ impl LanguageModel {
             )),
             Message::user(text::decision(&self.live, self.now_ms())),
         ];
-        let told = messages.len();
+        let before = messages.len();
         let (_, mut refused) = self.answered.take().unwrap_or_default();
         // Answers, each with the reply to it. One that was lost has none.
         refused.truncate(refused.len() / 2 * 2);
@@ -260,7 +260,7 @@ impl LanguageModel {
             }
             let answer = serde_json::json!({ "action": reply.action }).to_string();
             messages.push(Message::assistant(answer));
-            self.answered = Some((request.decision_id, messages.split_off(told)));
+            self.answered = Some((request.decision_id, messages.split_off(before)));
             return Ok(reply);
         }
         Err(problem)

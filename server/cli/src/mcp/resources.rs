@@ -89,7 +89,10 @@ pub(super) async fn read(seats: &Seats, uri: &str) -> Result<ReadResourceResult,
         let seat = seats
             .get(Some(handle))
             .map_err(|error| unknown(uri, &error))?;
-        (seat.read(|live| events::history(&live.told)), "text/plain")
+        (
+            seat.read(|live| events::history(&live.events)),
+            "text/plain",
+        )
     } else if let Some(game_id) = uri.strip_prefix(RECORDS) {
         let (game_id, complete) = match game_id.strip_suffix(COMPLETE) {
             Some(game_id) => (game_id, true),
@@ -158,7 +161,7 @@ fn as_json(lines: &[v1::RecordLine]) -> serde_json::Result<String> {
 /// A record in words: its events, and after a decision the reason for it.
 fn in_text(lines: &[v1::RecordLine]) -> String {
     let mut view = GameView::default();
-    let mut told = Vec::new();
+    let mut texts = Vec::new();
     let mut reason = None;
     for line in lines.iter().filter_map(|line| line.line.as_ref()) {
         match line {
@@ -173,10 +176,10 @@ fn in_text(lines: &[v1::RecordLine]) -> String {
                 if let Some(reason) = reason.take() {
                     event.words = format!("{} ({reason})", event.words);
                 }
-                told.push(event);
+                texts.push(event);
             }
             _ => {}
         }
     }
-    events::history(&told)
+    events::history(&texts)
 }
