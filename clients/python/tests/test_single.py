@@ -24,6 +24,7 @@ def test_rows_are_those_of_the_columns(rules: Any) -> None:
     for seat in (0, 1):
         with VectorEnv(rules=rules, seed=6, rewards="winning", client_seats=[seat], invalid="ask_again") as env:
             chance = np.random.default_rng(seat)
+            env.sample(seat)
             readers: dict[type[Table], SingleRow] = {}
             for _ in range(steps):
                 action = env.sample() if chance.random() < 0.9 else chance.integers(0, env.num_actions, 1)
