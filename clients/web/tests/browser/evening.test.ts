@@ -133,7 +133,7 @@ test("players and spectators see how many watch", async () => {
   await head.getByText("Friday evening · 1 spectator", { exact: true }).waitFor();
   await first.page.getByText("spectator view · 1 spectator").waitFor();
   await first.page.goto(server.url);
-  await first.page.getByRole("heading", { name: "Friday evening" }).waitFor();
+  await first.page.locator('[data-part="room-card"]').first().waitFor();
   await head.getByText("Friday evening", { exact: true }).waitFor();
   expect(faults).toEqual([]);
 });
